@@ -1,0 +1,1 @@
+"""Self-commissioning drive service for induction motors."""

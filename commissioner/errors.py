@@ -1,0 +1,126 @@
+"""The one tree of surprises. Expected failures are values; what is raised is one of these.
+
+    CommissionerError                 exit code
+    |-- UsageError                    2   a wrong call: flag, file name, verb
+    |   `-- ConfigurationError        2   file, key, value and what would be right
+    |-- DataRefused                   3   the data cannot carry an answer
+    |-- CheckFailed                   3   a pre-energise check says no; nothing was energised
+    |-- Aborted                       4   a guard or the operator stopped the run
+    `-- DriveError                    5   the drive or the link failed
+        |-- DriveFault                    the drive tripped, or does not do what it acknowledged
+        |-- IdentityMismatch              not the drive, firmware or values that were expected
+        |-- WriteBackFailed               read-back differs; says whether the snapshot was restored
+        |-- SamplesLost                   the stream lost more than the estimate can bridge
+        `-- LinkError                     the wire
+            |-- LinkUnreachable           nothing answers at the URL
+            |-- ReplyTimeout              a request without an answer
+            |-- ReplyMismatch             wrong function, address, length, session or check sum
+            `-- RequestRefused            the drive answered with a Modbus exception
+
+Every error carries four facts, each one sentence or less: the step in which it happened, the value seen,
+the limit or expectation it broke, and the remedy.
+"""
+
+from __future__ import annotations
+
+
+class CommissionerError(Exception):
+    """What happened (`str`), where (`step`), what was seen (`value`), what was allowed (`limit`), what to do (`remedy`)."""
+
+    exit_code = 5
+    outcome = "faulted"
+
+    def __init__(self, what: str, *, step: str, value: object = None, limit: object = None, remedy: str = "") -> None:
+        super().__init__(what)
+        self.what = what
+        self.step = step
+        self.value = value
+        self.limit = limit
+        self.remedy = remedy
+
+    def as_dict(self) -> dict[str, object]:
+        """The error as the JSON object that every verb prints under `error`."""
+        return {
+            "kind": type(self).__name__,
+            "what": self.what,
+            "step": self.step,
+            "value": self.value,
+            "limit": self.limit,
+            "remedy": self.remedy,
+        }
+
+
+class UsageError(CommissionerError):
+    exit_code = 2
+    outcome = "usage"
+
+
+class ConfigurationError(UsageError):
+    """A file said something that cannot be right."""
+
+    def __init__(self, *, file: str, key: str, value: object, expected: str) -> None:
+        super().__init__(
+            f"{file}: {key} = {value!r} cannot be used",
+            step="read configuration",
+            value=value,
+            limit=expected,
+            remedy=f"correct {key} in {file}: {expected}",
+        )
+        self.file = file
+        self.key = key
+
+
+class DataRefused(CommissionerError):
+    exit_code = 3
+    outcome = "rejected"
+
+
+class CheckFailed(CommissionerError):
+    exit_code = 3
+    outcome = "rejected"
+
+
+class Aborted(CommissionerError):
+    exit_code = 4
+    outcome = "aborted"
+
+
+class DriveError(CommissionerError):
+    exit_code = 5
+    outcome = "faulted"
+
+
+class DriveFault(DriveError):
+    pass
+
+
+class IdentityMismatch(DriveError):
+    pass
+
+
+class WriteBackFailed(DriveError):
+    pass
+
+
+class SamplesLost(DriveError):
+    pass
+
+
+class LinkError(DriveError):
+    pass
+
+
+class LinkUnreachable(LinkError):
+    pass
+
+
+class ReplyTimeout(LinkError):
+    pass
+
+
+class ReplyMismatch(LinkError):
+    pass
+
+
+class RequestRefused(LinkError):
+    pass

@@ -1,0 +1,248 @@
+"""Read and write the recording table: SI columns at a fixed rate, `key: value` metadata.
+
+CSV (`.csv`, `.csv.gz`): `# key: value` comment lines, one header line, then rows. Parquet: the same keys as schema
+metadata. Nothing in a file is ever executed; size limits hold for files from strangers.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pa_parquet
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.records import RunningRecording, Signal, StandstillRecording
+
+MAX_BYTES = 2 * 1024**3
+"""A file (or what a `.gz` unpacks to) above this is refused: about 8 h of five channels at 5 kHz as Parquet."""
+MAX_METADATA_LINES = 1000
+STEP_TOLERANCE = 0.02
+"""Time stamps may deviate from the grid by this fraction of a sample period (printed digits, not jitter)."""
+
+TEXT_KEYS = frozenset({"connection", "name", "drive", "source", "note", "motor", "scenario", "run", "kind"})
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns by name, `(n,)` float64 each, and the metadata as it stood in the file."""
+
+    columns: Mapping[str, Signal]
+    metadata: Mapping[str, float | str]
+    source: str
+
+
+def read_table(path: Path) -> Table:
+    """The table in `path`. Raises UsageError where there is no such file, DataRefused where it is not a table."""
+    if not path.is_file():
+        raise UsageError(
+            f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
+            remedy="check the path",
+        )
+    if path.stat().st_size > MAX_BYTES:
+        raise _refuse(path, "the file is too large", path.stat().st_size, f"{MAX_BYTES} bytes", "split the recording")
+    try:
+        if path.suffix == ".parquet":
+            return _read_parquet(path)
+        return _read_csv(path)
+    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, UnicodeDecodeError, EOFError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise _refuse(
+            path, "the file is not a readable table", reason, "CSV with one header line, or Parquet",
+            "export the recording again in the documented format",
+        ) from error
+
+
+def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str, float | str]) -> None:
+    """Write the table whole or not at all (a temporary file is renamed into place)."""
+    temporary = path.with_name(path.name + ".part")
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if path.suffix == ".parquet":
+        schema = table.schema.with_metadata({k: str(v) for k, v in metadata.items()})
+        pa_parquet.write_table(table.cast(schema), temporary, compression="zstd")
+    else:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(temporary, "wb") as file:
+            file.write("".join(f"# {k}: {v}\n" for k, v in metadata.items()).encode())
+            pa_csv.write_csv(table, file, pa_csv.WriteOptions(quoting_style="none"))
+    temporary.replace(path)
+
+
+def to_standstill(table: Table) -> StandstillRecording:
+    """The table as a standstill recording; refuses missing columns, NaN, and time that does not lie on a grid."""
+    columns = table.columns
+    needed = ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
+    _require(table, needed, "a standstill recording")
+    optional = [name for name in ("current_w_a", "dc_link_v") if name in columns]
+    _require_finite(table, [*needed, *optional])
+    segment = columns["segment"]
+    if np.any(segment != np.round(segment)):
+        bad = float(segment[segment != np.round(segment)][0])
+        raise _refuse(table.source, "segment is not a whole number", bad, "0, 1, 2, ...", "number the segments")
+    period = sample_period(table, segment)
+    return StandstillRecording(
+        time_s=columns["time_s"],
+        segment=segment.astype(np.int64),
+        axis_deg=columns["axis_deg"],
+        voltage_axis_v=columns["voltage_axis_v"],
+        current_u_a=columns["current_u_a"],
+        current_v_a=columns["current_v_a"],
+        current_w_a=columns.get("current_w_a"),
+        dc_link_v=columns.get("dc_link_v"),
+        sample_period_s=period,
+        metadata=table.metadata,
+        source=table.source,
+    )
+
+
+def to_running(table: Table) -> RunningRecording:
+    """The table as a running-motor recording. NaN, gaps and jitter are left for the audit, which names them."""
+    columns = table.columns
+    phase = ("voltage_u_v", "voltage_v_v", "voltage_w_v")
+    line = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
+    is_line = phase[0] not in columns
+    voltages = line if is_line else phase
+    _require(table, ("time_s", "current_u_a", "current_v_a", "current_w_a", *voltages), "a running-motor recording")
+    time = columns["time_s"]
+    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    return RunningRecording(
+        time_s=time,
+        currents_a=(columns["current_u_a"], columns["current_v_a"], columns["current_w_a"]),
+        voltages_v=(columns[voltages[0]], columns[voltages[1]], columns[voltages[2]]),
+        voltages_are_line_to_line=is_line,
+        speed_rad_per_s=columns.get("speed_rad_per_s"),
+        sample_period_s=period,
+        metadata=table.metadata,
+        source=table.source,
+    )
+
+
+def sample_period(table: Table, segment: Signal) -> float:
+    """The grid's period. Steps inside a segment must be whole multiples of it: larger ones are gaps."""
+    time = table.columns["time_s"]
+    if time.size < 2:
+        raise _refuse(table.source, "the recording has too few samples", time.size, "at least 2", "record longer")
+    steps = np.diff(time)[np.diff(segment) == 0]
+    if steps.size == 0 or np.any(steps <= 0):
+        raise _refuse(
+            table.source, "time does not run forward inside a segment", float(steps.min()) if steps.size else None,
+            "steps above 0 s", "sort the rows by time and number the segments",
+        )
+    named = table.metadata.get("sample_period_s")
+    period = float(named) if named not in (None, "") else float(np.median(steps))  # type: ignore[arg-type]
+    multiple = steps / period
+    deviation = np.abs(multiple - np.maximum(np.round(multiple), 1.0))
+    worst = int(np.argmax(deviation))
+    if deviation[worst] > STEP_TOLERANCE:
+        raise _refuse(
+            table.source, "the time steps are not equal", float(steps[worst]),
+            f"multiples of {period:.6g} s within {STEP_TOLERANCE:.0%}",
+            "record at a fixed rate, or resample with known time stamps",
+        )
+    return period
+
+
+def _read_parquet(path: Path) -> Table:
+    file = pa_parquet.ParquetFile(path)
+    rows, columns = file.metadata.num_rows, file.metadata.num_columns
+    if rows * columns * 8 > MAX_BYTES:
+        raise _refuse(path, "the file unpacks to too much", rows * columns * 8, f"{MAX_BYTES} bytes", "split it")
+    raw = file.schema_arrow.metadata or {}
+    metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
+    return _as_table(path, file.read(), _typed(path, metadata))
+
+
+def _read_csv(path: Path) -> Table:
+    text: IO[bytes]
+    if path.suffix == ".gz":
+        with gzip.open(path, "rb") as packed:
+            data = packed.read(MAX_BYTES + 1)
+    else:
+        data = path.read_bytes()
+    if len(data) > MAX_BYTES:
+        raise _refuse(path, "the file unpacks to too much", f"> {MAX_BYTES}", f"{MAX_BYTES} bytes", "split it")
+    text = io.BytesIO(data)
+    metadata: dict[str, str] = {}
+    start = 0
+    for _ in range(MAX_METADATA_LINES):
+        line = text.readline(65536)
+        if not line.startswith(b"#"):
+            break
+        start = text.tell()
+        key, separator, value = line[1:].decode("utf-8").partition(":")
+        if separator:
+            metadata[key.strip()] = value.strip()
+    text.seek(start)
+    table = pa_csv.read_csv(text, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
+    return _as_table(path, table, _typed(path, metadata))
+
+
+def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) -> Table:
+    if table.num_rows == 0:
+        raise _refuse(path, "the file has no rows", 0, "at least 2 rows", "record again")
+    columns: dict[str, Signal] = {}
+    for name in table.column_names:
+        column = table.column(name)
+        if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
+            values = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
+            columns[name] = np.ascontiguousarray(values, dtype=np.float64)
+        elif name in _KNOWN:
+            raise _refuse(path, f"column {name} is not numeric", str(column[0]), "numbers in SI units", "decimal points, no units")
+    return Table(columns, metadata, str(path))
+
+
+_KNOWN = frozenset(
+    "time_s segment axis_deg voltage_axis_v current_u_a current_v_a current_w_a dc_link_v voltage_u_v voltage_v_v "
+    "voltage_w_v voltage_uv_v voltage_vw_v voltage_wu_v speed_rad_per_s".split()
+)
+
+
+def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
+    """Numbers as numbers; keys that are text stay text. A rated value that is no finite number is refused."""
+    typed: dict[str, float | str] = {}
+    for key, value in metadata.items():
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if key in TEXT_KEYS:
+            typed[key] = value
+        elif math.isfinite(number):
+            typed[key] = number
+        elif key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}:
+            raise _refuse(path, f"metadata {key} is not a number", value, "a finite number in SI units", f"correct {key}")
+        else:
+            typed[key] = value
+    return typed
+
+
+def _require(table: Table, names: Sequence[str], what: str) -> None:
+    missing = [name for name in names if name not in table.columns]
+    if missing:
+        raise _refuse(
+            table.source, f"{what} needs the column {missing[0]}", ", ".join(table.columns), ", ".join(names),
+            "rename or add the columns: " + ", ".join(missing),
+        )
+
+
+def _require_finite(table: Table, names: Sequence[str]) -> None:
+    for name in names:
+        bad = ~np.isfinite(table.columns[name])
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise _refuse(
+                table.source, f"column {name} holds {int(bad.sum())} values that are not numbers", f"row {row}",
+                "finite numbers", "leave lost samples out as missing rows: gaps are honoured, filled values are not",
+            )
+
+
+def _refuse(source: object, what: str, value: object, limit: object, remedy: str) -> DataRefused:
+    return DataRefused(f"{source}: {what}", step="read recording", value=value, limit=limit, remedy=remedy)

@@ -1,0 +1,72 @@
+"""What flows between the layers: plain frozen records, SI units, signals as `(n,)` float64 arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Signal = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SampleBlock:
+    """One window of the stream as decoded from the drive: consecutive samples, no holes inside.
+
+    `lost_before` counts the samples missing between the previous block and this one; they are never filled.
+    `current_*_a[k]` is sampled at `(first_index + k) * sample_period_s`; `voltage_axis_v[k]` is the mean voltage
+    commanded along the axis over the period that starts there.
+    """
+
+    session: int
+    first_index: int
+    sample_period_s: float
+    axis_deg: float
+    voltage_axis_v: Signal
+    current_u_a: Signal
+    current_v_a: Signal
+    current_w_a: Signal | None
+    dc_link_v: float
+    lost_before: int = 0
+    clipped: bool = False
+
+    @property
+    def count(self) -> int:
+        return int(self.current_u_a.shape[0])
+
+
+@dataclass(frozen=True)
+class StandstillRecording:
+    """A standstill recording in the contract's format. Missing samples are missing rows: `time_s` jumps.
+
+    `segment` numbers stretches between which the motor was de-energised. `metadata` holds the contract's keys
+    (`rated_power_w` ... `sample_period_s`) as they stood in the file.
+    """
+
+    time_s: Signal
+    segment: NDArray[np.int64]
+    axis_deg: Signal
+    voltage_axis_v: Signal
+    current_u_a: Signal
+    current_v_a: Signal
+    current_w_a: Signal | None
+    dc_link_v: Signal | None
+    sample_period_s: float
+    metadata: Mapping[str, float | str] = field(default_factory=dict)
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class RunningRecording:
+    """A recording of a running motor. Voltages are `(n,)` each, phase (u, v, w) or line-to-line (uv, vw, wu)."""
+
+    time_s: Signal
+    currents_a: tuple[Signal, Signal, Signal]
+    voltages_v: tuple[Signal, Signal, Signal]
+    voltages_are_line_to_line: bool
+    speed_rad_per_s: Signal | None
+    sample_period_s: float
+    metadata: Mapping[str, float | str] = field(default_factory=dict)
+    source: str = ""

@@ -1,0 +1,1 @@
+"""A simulated open-firmware inverter with its motor: another author, another physics, another encoder."""
