@@ -70,3 +70,57 @@ class RunningRecording:
     sample_period_s: float
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
+
+
+@dataclass(frozen=True)
+class DriveIdentity:
+    """Who answers at the other end of the wire."""
+
+    drive_type: str
+    serial_number: int
+    firmware_version: str
+    map_version: int
+    rated_drive_current_a: float
+    control_period_s: float
+    switching_frequency_hz: float
+
+
+@dataclass(frozen=True)
+class DriveStatus:
+    """One reading of the drive's status. `state` is the decoded CiA 402 state, `interlocks` the named bits."""
+
+    state: str
+    is_energised: bool
+    fault_code: int
+    fault_text: str
+    trip_value: float
+    trip_limit: float
+    interlocks: Mapping[str, bool]
+    dc_link_v: float
+    heatsink_degc: float
+    winding_degc: float
+    shaft_speed_rad_per_s: float
+    current_magnitude_a: float
+    heartbeat_echo: int
+    session: int
+
+
+@dataclass(frozen=True)
+class ParameterSnapshot:
+    """The drive's motor parameters as a run found them: in use and in non-volatile memory, SI, by profile name."""
+
+    identity: DriveIdentity
+    in_use: Mapping[str, float]
+    stored: Mapping[str, float]
+    store_count: int
+
+
+@dataclass(frozen=True)
+class WrittenParameter:
+    """One row of the contract's `written` list."""
+
+    name: str
+    register: int
+    before: float
+    after: float
+    read_back: float

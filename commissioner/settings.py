@@ -1,0 +1,179 @@
+"""Configuration files in, frozen dataclasses out. A file that says something impossible names file, key, value, remedy."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.motor.nameplate import Nameplate, check
+from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
+
+CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
+MAX_BYTES = 1_000_000
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Percent = Annotated[float, Field(gt=0, le=100)]
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MotorFile(_File):
+    """`config/motors/*.toml`: what the plate says."""
+
+    name: str = ""
+    rated_power_w: Annotated[float, Field(ge=20, le=20e6, description="watts at the shaft, 20 ... 20e6")]
+    rated_voltage_v: Annotated[float, Field(ge=24, le=15e3, description="volts line-to-line rms, 24 ... 15000")]
+    rated_frequency_hz: Annotated[float, Field(ge=5, le=1000, description="hertz, 5 ... 1000")]
+    rated_current_a: Annotated[float, Field(ge=0.05, le=5e3, description="amperes line rms, 0.05 ... 5000")]
+    rated_speed_rpm: Annotated[float, Field(ge=50, le=60e3, description="revolutions per minute, 50 ... 60000")]
+    power_factor: Annotated[float, Field(gt=0.2, le=1, description="cos phi at rated load, 0.2 ... 1")]
+    pole_pairs: Annotated[int, Field(ge=1, le=24, description="pole pairs (half the pole number), 1 ... 24")]
+    connection: Literal["star", "delta"] = "star"
+    inertia_kg_m2: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+
+
+class _Axes(_File):
+    orientations_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=12)]
+    repeat_first: bool
+
+
+class _Supervision(_File):
+    watchdog_s: Annotated[float, Field(ge=0.1, le=2.0)]
+    max_watchdog_s: Annotated[float, Field(ge=0.1, le=2.0)]
+    standstill_dwell_s: Annotated[float, Field(ge=0.05, le=60)]
+    reply_timeout_s: Annotated[float, Field(ge=0.02, le=5)]
+
+
+class _Limits(_File):
+    current_fraction: Annotated[float, Field(gt=0.05, le=1.2)]
+    trip_fraction: Annotated[float, Field(gt=0.1, le=2.0)]
+    flux_fraction: Annotated[float, Field(gt=0.1, le=0.98)]
+    axis_time_s: Annotated[float, Field(gt=1, le=600)]
+    total_time_s: Annotated[float, Field(gt=1, le=7200)]
+
+
+class _Excitation(_File):
+    seconds: Annotated[float, Field(ge=2, le=600)]
+    first_scale: Annotated[float, Field(gt=0, le=0.5)]
+    scale_ramp_per_s: Annotated[float, Field(gt=0, le=10)]
+
+
+class _Acceptance(_File):
+    resistance_std_percent: Percent
+    leakage_std_percent: Percent
+    rotor_resistance_std_percent: Percent
+    magnetizing_std_percent: Percent
+    axis_spread_percent: Percent
+
+
+class ProcedureFile(_File):
+    """`config/procedure.toml`."""
+
+    axes: _Axes
+    supervision: _Supervision
+    limits: _Limits
+    excitation: _Excitation
+    acceptance: _Acceptance
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_motor(name_or_path: str) -> Nameplate:
+    """The nameplate in `config/motors/NAME.toml` or in a file. Raises ConfigurationError where the plate is impossible."""
+    path = _resolve(name_or_path, "motors")
+    model = _load(path, MotorFile)
+    nameplate = Nameplate(**model.model_dump(exclude={"name"}))
+    for problem in check(nameplate):
+        raise ConfigurationError(
+            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
+        )
+    return nameplate
+
+
+def load_procedure(path: Path | None = None) -> ProcedurePlan:
+    """The procedure's plan from `path` or from the file that ships with the product."""
+    source = path or CONFIG_FOLDER / "procedure.toml"
+    model = _load(source, ProcedureFile)
+    if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
+        raise ConfigurationError(
+            file=str(source), key="supervision.watchdog_s", value=model.supervision.watchdog_s,
+            expected=f"at most supervision.max_watchdog_s = {model.supervision.max_watchdog_s} s",
+        )
+    return ProcedurePlan(
+        axes_deg=tuple(model.axes.orientations_deg),
+        repeat_first=model.axes.repeat_first,
+        supervision=Supervision(**model.supervision.model_dump()),
+        limits=Limits(**model.limits.model_dump()),
+        excitation=ExcitationPlan(**model.excitation.model_dump()),
+        acceptance=Acceptance(**model.acceptance.model_dump()),
+    )
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The document in a TOML file of bounded size."""
+    if not path.is_file():
+        raise UsageError(
+            f"there is no file {path}", step="read configuration", value=str(path), limit="an existing TOML file",
+            remedy="check the path",
+        )
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigurationError(file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected="at most 1 MB")
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            file=str(path), key="(syntax)", value=str(error), expected="valid TOML in UTF-8"
+        ) from error
+
+
+def _resolve(name_or_path: str, folder: str) -> Path:
+    """A path as given, else a name in the product's configuration folder."""
+    if name_or_path.endswith(".toml") or "/" in name_or_path:
+        return Path(name_or_path)
+    shipped = CONFIG_FOLDER / folder / f"{name_or_path}.toml"
+    if not shipped.is_file():
+        known = ", ".join(sorted(p.stem for p in (CONFIG_FOLDER / folder).glob("*.toml")))
+        raise UsageError(
+            f"there is no {folder[:-1]} named {name_or_path!r}", step="read configuration", value=name_or_path,
+            limit=f"one of: {known}", remedy="give one of these names or the path of a .toml file",
+        )
+    return shipped
+
+
+def _load(path: Path, model: type[Model]) -> Model:
+    try:
+        return model.model_validate(read_toml(path))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise ConfigurationError(
+            file=str(path), key=key, value=_shown(first), expected=_expected(model, first)
+        ) from error
+
+
+def _shown(problem: Any) -> object:
+    return None if problem["type"] == "missing" else problem["input"]
+
+
+def _expected(model: type[BaseModel], problem: Any) -> str:
+    """What would be right, in the words of the field."""
+    if problem["type"] == "extra_forbidden":
+        return "no such key; known keys: " + ", ".join(_section(model, problem["loc"][:-1]))
+    field = model.model_fields.get(str(problem["loc"][-1]))
+    described = f" ({field.description})" if field is not None and field.description else ""
+    return str(problem["msg"]).removeprefix("Value error, ") + described
+
+
+def _section(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
+    for part in location:
+        annotation = model.model_fields[str(part)].annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            model = annotation
+    return sorted(model.model_fields)
