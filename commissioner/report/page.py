@@ -1,0 +1,117 @@
+"""One self-contained HTML page: headline, sections, tables, figures. No script, no font, no image from elsewhere."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from jinja2 import Environment
+from markupsafe import Markup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Tone = Literal["good", "warn", "bad", "plain"]
+
+INK, MUTED, RULE = "#1b2330", "#667085", "#d8dde5"
+BLUE, ORANGE, GREEN, RED, PURPLE = "#1f5fa8", "#c8641b", "#2c7a4b", "#b3261e", "#6b4fa0"
+"""The figures' colours, apart in hue and in lightness (they survive grey printing and red-green blindness)."""
+
+PLOT_STYLE = {
+    "font.family": "DejaVu Sans", "font.size": 9.0, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.titlesize": 10.0,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": True, "grid.color": RULE, "grid.linewidth": 0.6, "xtick.color": MUTED, "ytick.color": MUTED,
+    "text.color": INK, "legend.frameon": False, "legend.fontsize": 8.0, "lines.linewidth": 1.2, "figure.dpi": 110,
+    "svg.fonttype": "none", "svg.hashsalt": "commissioner", "figure.constrained_layout.use": True,
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells; a cell is shown as it stands. `tones[i]` colours row i."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    tones: Sequence[Tone] = ()
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An inline SVG or PNG with the sentence that says what to see in it."""
+
+    markup: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    title: str
+    parts: Sequence[str | Table | Picture]
+
+
+@dataclass(frozen=True)
+class Page:
+    """`headline` is the one sentence that must be read; `facts` are the few numbers beside it."""
+
+    title: str
+    headline: str
+    tone: Tone
+    facts: Sequence[tuple[str, str]]
+    sections: Sequence[Section]
+    footer: str = ""
+
+
+def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
+    """The figure as inline SVG, or as an inline PNG where it holds more points than a browser likes."""
+    import base64  # noqa: PLC0415
+
+    buffer = io.BytesIO()
+    if raster:
+        figure.savefig(buffer, format="png", dpi=150)
+        data = base64.b64encode(buffer.getvalue()).decode()
+        return Picture(f'<img alt="" src="data:image/png;base64,{data}">', caption)
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue().decode()
+    return Picture(text[text.index("<svg") :], caption)
+
+
+def render(page: Page) -> str:
+    """The page as HTML. Text is escaped; only pictures made by `picture` pass as markup."""
+    return _TEMPLATE.render(page=page, kind=lambda part: type(part).__name__, markup=Markup)
+
+
+_TEMPLATE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string("""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{{ page.title }}</title><style>
+:root { --ink:#1b2330; --muted:#667085; --rule:#d8dde5; --good:#2c7a4b; --warn:#a15c07; --bad:#b3261e; --plain:#1f5fa8; }
+* { box-sizing:border-box } body { font:15px/1.5 system-ui,"DejaVu Sans",sans-serif; color:var(--ink); background:#f4f6f9; margin:0 }
+main { max-width:1020px; margin:0 auto; padding:28px 20px 60px }
+header,section { background:#fff; border:1px solid var(--rule); border-radius:10px; padding:20px 26px; margin:0 0 16px }
+header { border-top:6px solid var(--{{ page.tone }}) } h1 { font-size:15px; color:var(--muted); margin:0 0 6px; font-weight:600 }
+.headline { font-size:22px; line-height:1.3; font-weight:650; margin:0 0 14px } h2 { font-size:17px; margin:0 0 10px }
+dl { display:grid; grid-template-columns:repeat(auto-fit,minmax(170px,1fr)); gap:10px 22px; margin:0 }
+dt { color:var(--muted); font-size:12.5px } dd { margin:0; font-weight:600; font-variant-numeric:tabular-nums }
+table { border-collapse:collapse; width:100%; font-variant-numeric:tabular-nums; margin:6px 0 12px; font-size:14px }
+th { text-align:left; color:var(--muted); font-weight:600; border-bottom:2px solid var(--rule); padding:5px 10px 5px 0; vertical-align:bottom }
+td { border-bottom:1px solid var(--rule); padding:5px 10px 5px 0; vertical-align:top } caption { caption-side:bottom; text-align:left; color:var(--muted); font-size:13px; padding-top:4px }
+tr.good td:first-child { box-shadow:inset 3px 0 var(--good); padding-left:10px } tr.warn td:first-child { box-shadow:inset 3px 0 var(--warn); padding-left:10px }
+tr.bad td:first-child { box-shadow:inset 3px 0 var(--bad); padding-left:10px } figure { margin:8px 0 16px } figure svg,figure img { width:100%; height:auto }
+figcaption { color:var(--muted); font-size:13px } p { margin:0 0 10px; max-width:80ch } footer { color:var(--muted); font-size:12.5px }
+.wide { overflow-x:auto } @media print { body { background:#fff } header,section { break-inside:avoid; border-color:#bbb } }
+</style></head><body><main>
+<header><h1>{{ page.title }}</h1><p class="headline">{{ page.headline }}</p>
+<dl>{% for name, value in page.facts %}<div><dt>{{ name }}</dt><dd>{{ value }}</dd></div>{% endfor %}</dl></header>
+{% for section in page.sections %}<section><h2>{{ section.title }}</h2>
+{% for part in section.parts %}
+{% if kind(part) == "Table" %}<div class="wide"><table>{% if part.caption %}<caption>{{ part.caption }}</caption>{% endif %}
+<thead><tr>{% for cell in part.header %}<th>{{ cell }}</th>{% endfor %}</tr></thead><tbody>
+{% for row in part.rows %}<tr class="{{ part.tones[loop.index0] if part.tones else 'plain' }}">{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}</tbody></table></div>
+{% elif kind(part) == "Picture" %}<figure>{{ markup(part.markup) }}<figcaption>{{ part.caption }}</figcaption></figure>
+{% else %}<p>{{ part }}</p>
+{% endif %}{% endfor %}</section>
+{% endfor %}<footer>{{ page.footer }}</footer></main></body></html>
+""")
