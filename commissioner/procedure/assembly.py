@@ -1,0 +1,62 @@
+"""From the blocks of a run to one recording in the contract's format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from commissioner.records import SampleBlock, Signal, StandstillRecording
+
+
+def assemble(
+    blocks: Iterable[tuple[int, SampleBlock]], metadata: Mapping[str, float | str], source: str
+) -> StandstillRecording | None:
+    """The recording of (segment, block) pairs in order, or None where there is no sample.
+
+    Segments follow each other on the time axis; lost samples are missing rows, as the contract says.
+    """
+    times: list[Signal] = []
+    rows: list[tuple[int, SampleBlock]] = []
+    offset, end, current = 0.0, 0.0, None
+    for segment, block in blocks:
+        if block.count == 0:
+            continue
+        if segment != current:
+            offset, current = end, segment
+        times.append(offset + (block.first_index + np.arange(block.count)) * block.sample_period_s)
+        end = float(times[-1][-1]) + block.sample_period_s
+        rows.append((segment, block))
+    if not rows:
+        return None
+    third = [block.current_w_a for _, block in rows if block.current_w_a is not None]
+    return StandstillRecording(
+        time_s=np.concatenate(times),
+        segment=np.concatenate([np.full(block.count, segment, dtype=np.int64) for segment, block in rows]),
+        axis_deg=np.concatenate([np.full(block.count, block.axis_deg) for _, block in rows]),
+        voltage_axis_v=np.concatenate([block.voltage_axis_v for _, block in rows]),
+        current_u_a=np.concatenate([block.current_u_a for _, block in rows]),
+        current_v_a=np.concatenate([block.current_v_a for _, block in rows]),
+        current_w_a=np.concatenate(third) if len(third) == len(rows) else None,
+        dc_link_v=np.concatenate([np.full(block.count, block.dc_link_v) for _, block in rows]),
+        sample_period_s=rows[0][1].sample_period_s,
+        metadata=metadata,
+        source=source,
+    )
+
+
+def columns(recording: StandstillRecording) -> dict[str, Signal]:
+    """The recording as the contract's table."""
+    table: dict[str, Signal] = {
+        "time_s": recording.time_s,
+        "segment": recording.segment.astype(np.float64),
+        "axis_deg": recording.axis_deg,
+        "voltage_axis_v": recording.voltage_axis_v,
+        "current_u_a": recording.current_u_a,
+        "current_v_a": recording.current_v_a,
+    }
+    if recording.current_w_a is not None:
+        table["current_w_a"] = recording.current_w_a
+    if recording.dc_link_v is not None:
+        table["dc_link_v"] = recording.dc_link_v
+    return table

@@ -1,0 +1,120 @@
+"""The checks before anything is energised: each a value with what was seen, what was expected and the remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import DriveIdentity, DriveStatus
+
+NAMEPLATE_TOLERANCE = 0.05
+"""A drive whose own plate differs by more than this from the job's motor is set up for another motor."""
+DC_LINK_RIPPLE = 0.02
+"""Largest change of the link voltage between two readings that still counts as steady."""
+REST_SPEED_RAD_PER_S = 0.5
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    name: str
+    has_passed: bool
+    value: object
+    limit: object
+    remedy: str
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """What the drive's profile says about its own operating range."""
+
+    dc_link_min_v: float
+    dc_link_max_v: float
+    heatsink_max_degc: float
+    winding_max_degc: float
+
+
+def judge_drive(
+    identity: DriveIdentity,
+    statuses: Sequence[DriveStatus],
+    drive_nameplate: Mapping[str, float],
+    nameplate: Nameplate,
+    limits: DriveLimits,
+    test_current_a: float,
+) -> tuple[CheckResult, ...]:
+    """All checks that need no write. `statuses` are readings spread over the standstill dwell time, oldest first."""
+    last = statuses[-1]
+    return (
+        CheckResult(
+            "no fault", last.fault_code == 0, last.fault_text, "none", "remove the cause, then reset the fault at the drive"
+        ),
+        CheckResult(
+            "output off", not last.is_energised, last.state, "not enabled", "stop the drive: another master has enabled it"
+        ),
+        *_interlocks(last),
+        _at_rest(statuses),
+        *_dc_link(statuses, limits),
+        _below("heatsink temperature, degC", last.heatsink_degc, limits.heatsink_max_degc, "let the drive cool down"),
+        _below("winding temperature, degC", last.winding_degc, limits.winding_max_degc, "let the motor cool down"),
+        CheckResult(
+            "drive rated for the test current", identity.rated_drive_current_a * math.sqrt(2) >= test_current_a,
+            round(identity.rated_drive_current_a * math.sqrt(2), 3), f"at least {test_current_a:.3g} A peak",
+            "lower limits.current_fraction or use a larger drive",
+        ),
+        *_same_motor(drive_nameplate, nameplate),
+    )
+
+
+_INTERLOCKS = {
+    "sto_released": ("safe torque off is released", "close the STO circuit; make sure nobody is at the machine"),
+    "remote_control": ("control is remote and ours", "switch the drive to remote (bus) control"),
+    "shaft_at_rest": ("the drive sees the shaft at rest", "wait until the shaft stands still"),
+    "supply_ok": ("the supply is present", "switch the supply on"),
+    "no_other_master": ("no other master holds the drive", "disconnect the other master or PLC"),
+}
+
+
+def _interlocks(status: DriveStatus) -> Iterator[CheckResult]:
+    for bit, is_set in status.interlocks.items():
+        name, remedy = _INTERLOCKS.get(bit, (bit.replace("_", " "), f"close the interlock {bit}"))
+        yield CheckResult(name, is_set, "yes" if is_set else "no", "yes", remedy)
+
+
+def _at_rest(statuses: Sequence[DriveStatus]) -> CheckResult:
+    fastest = max(abs(status.shaft_speed_rad_per_s) for status in statuses)
+    return CheckResult(
+        "shaft at rest over the dwell time", fastest <= REST_SPEED_RAD_PER_S, round(fastest, 3),
+        f"at most {REST_SPEED_RAD_PER_S} rad/s", "stop whatever turns the shaft",
+    )
+
+
+def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[CheckResult]:
+    volts = [status.dc_link_v for status in statuses]
+    in_range = all(limits.dc_link_min_v <= v <= limits.dc_link_max_v for v in volts)
+    yield CheckResult(
+        "DC link in range", in_range, round(volts[-1], 1), f"{limits.dc_link_min_v:g} ... {limits.dc_link_max_v:g} V",
+        "check the supply voltage and the pre-charge",
+    )
+    change = (max(volts) - min(volts)) / max(abs(volts[-1]), 1.0)
+    yield CheckResult(
+        "DC link steady", change <= DC_LINK_RIPPLE, f"{change:.2%}", f"at most {DC_LINK_RIPPLE:.0%}",
+        "wait until the link has charged",
+    )
+
+
+def _below(name: str, value: float, limit: float, remedy: str) -> CheckResult:
+    """NaN means that no sensor is fitted, which is not a failure."""
+    return CheckResult(name, math.isnan(value) or value <= limit, "no sensor" if math.isnan(value) else round(value, 1), limit, remedy)
+
+
+def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> Iterator[CheckResult]:
+    """A drive without a plate (zeros) says nothing; one with another plate is set up for another motor."""
+    expected = asdict(nameplate)
+    seen = {key: value for key, value in drive_nameplate.items() if key in expected and value > 0}
+    for key, value in seen.items():
+        wanted = float(expected[key])
+        yield CheckResult(
+            f"{key} in the drive", abs(value - wanted) <= NAMEPLATE_TOLERANCE * wanted, round(value, 4), wanted,
+            f"check which motor is connected; correct --motor or the drive's {key}",
+        )

@@ -1,0 +1,96 @@
+"""What a run decides and learns, as records for the journal, the technician and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from commissioner.procedure.checks import CheckResult
+
+
+@dataclass(frozen=True)
+class StateEntered:
+    state: str
+    because: str
+    axis_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class ChecksJudged:
+    results: tuple[CheckResult, ...]
+
+
+@dataclass(frozen=True)
+class StaircaseFitted:
+    axis_deg: float
+    stator_resistance_ohm: float
+    stator_resistance_std_ohm: float
+    error_voltage_v: float
+    energised_s: float
+
+
+@dataclass(frozen=True)
+class ExcitationChosen:
+    """Amplitudes in volts along the axis at scale 1; `predicted` in per cent relative standard error."""
+
+    axis_deg: float
+    tones: tuple[tuple[float, float, float], ...]
+    seconds: float
+    peak_flux_wb: float
+    peak_current_a: float
+    predicted_std_percent: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class EstimateUpdated:
+    """The observer's estimate at a time of the test; written about ten times a second of motor time."""
+
+    axis_deg: float
+    time_s: float
+    parameters: tuple[float, float, float, float]
+    std: tuple[float, float, float, float]
+    scale: float
+    flux_fraction: float
+    observer_flux_wb: float
+    model_free_flux_wb: float
+    residual_rms_a: float
+
+
+@dataclass(frozen=True)
+class GuardActed:
+    axis_deg: float
+    time_s: float
+    advice: str
+    flux_fraction: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class AxisFinished:
+    axis_deg: float
+    energised_s: float
+    has_settled: bool
+    why: str
+    peak_flux_fraction: float
+    lost_samples: int
+
+
+@dataclass(frozen=True)
+class VerdictReached:
+    """`decision` is write back | keep | reject; the facts are the numbers that led to it."""
+
+    decision: str
+    reason: str
+    value: object
+    limit: object
+    remedy: str
+
+
+@dataclass(frozen=True)
+class RunEnded:
+    """`outcome` is commissioned | rejected | aborted | faulted; `error` holds step, value, limit and remedy of a failure."""
+
+    outcome: str
+    reason: str
+    energised_s: float
+    error: Mapping[str, object] | None = None

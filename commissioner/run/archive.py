@@ -1,0 +1,175 @@
+"""The run folder: every sample, every decision, nothing torn.
+
+    <runs>/<run id>/                 0700
+        journal.jsonl                one record a line; flushed and synced before anything energises or writes
+        blocks.bin                   the samples as they came, each block with its length and check sum
+        recording.parquet            the same samples in the contract's format, made when the run ends
+        snapshot.json                the drive's parameters as they were found (what `restore` writes back)
+        result.json  report.html     what the technician gets
+        drive.toml motor.json plan.json   what the run was asked to do
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime as dt
+import json
+import math
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from commissioner.errors import UsageError
+from commissioner.procedure.assembly import assemble, columns
+from commissioner.records import SampleBlock
+from commissioner.recordings.table import write_table
+
+_RECORD = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
+_HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
+_MARK = b"BLK1"
+_CLIPPED, _HAS_W = 1, 2
+
+
+class RunFolder:
+    """One run's folder, open for writing. Close it with `close`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._journal = (path / "journal.jsonl").open("a", encoding="utf-8")
+        self._blocks: BinaryIO = (path / "blocks.bin").open("ab", buffering=0)
+        self._records = 0
+
+    @classmethod
+    def create(cls, root: Path, label: str) -> RunFolder:
+        """A new folder named by the UTC time and `label`; never one that exists."""
+        root.mkdir(parents=True, exist_ok=True)
+        stamp = dt.datetime.now(dt.UTC).strftime("%Y%m%d-%H%M%S")
+        for number in range(1000):
+            path = root / (f"{stamp}-{label}" if number == 0 else f"{stamp}-{label}-{number + 1}")
+            try:
+                path.mkdir(mode=0o700)
+            except FileExistsError:
+                continue
+            return cls(path)
+        raise UsageError(
+            f"no new run folder can be made in {root}", step="archive", value=str(root), limit="a writable folder",
+            remedy="give another folder with --runs",
+        )
+
+    def journal(self, kind: str, record: object, *, durable: bool = False) -> None:
+        """Append one record; `durable` returns only when it is on the disk."""
+        line = {"n": self._records, "utc": dt.datetime.now(dt.UTC).isoformat(), "kind": kind, "record": plain(record)}
+        self._records += 1
+        self._journal.write(json.dumps(line, allow_nan=False) + "\n")
+        self._journal.flush()
+        if durable:
+            os.fsync(self._journal.fileno())
+
+    def append(self, block: SampleBlock, segment: int) -> None:
+        """Append the block in one write, so that a kill leaves it whole or recognisably torn."""
+        payload = _encode(block, segment)
+        self._blocks.write(_RECORD.pack(_MARK, len(payload), zlib.crc32(payload)) + payload)
+
+    def save(self, name: str, document: object) -> Path:
+        """Write a JSON document whole or not at all."""
+        return self.save_text(name, json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
+
+    def save_text(self, name: str, text: str) -> Path:
+        target = self.path / name
+        temporary = target.with_name(name + ".part")
+        with temporary.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(target)
+        return target
+
+    def close(self) -> None:
+        self._journal.close()
+        self._blocks.close()
+
+
+def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path | None:
+    """`recording.parquet` from the blocks that are whole; None where no sample was taken."""
+    recording = assemble(read_blocks(folder / "blocks.bin"), metadata, folder.name)
+    if recording is None:
+        return None
+    target = folder / "recording.parquet"
+    write_table(target, columns(recording), metadata)
+    return target
+
+
+def read_blocks(path: Path) -> Iterator[tuple[int, SampleBlock]]:
+    """(segment, block) in order, up to the first torn record."""
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        while len(head := file.read(_RECORD.size)) == _RECORD.size:
+            mark, size, check = _RECORD.unpack(head)
+            payload = file.read(size)
+            if mark != _MARK or len(payload) != size or zlib.crc32(payload) != check:
+                return
+            yield _decode(payload)
+
+
+def read_journal(path: Path) -> list[dict[str, Any]]:
+    """The journal's records, up to the first line that is not whole."""
+    records: list[dict[str, Any]] = []
+    if not path.is_file():
+        return records
+    for line in path.read_text("utf-8", errors="replace").splitlines():
+        try:
+            records.append(json.loads(line))
+        except json.JSONDecodeError:
+            break
+    return records
+
+
+def plain(value: Any) -> Any:
+    """A record as JSON types; arrays become lists, NaN and infinity become null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def _encode(block: SampleBlock, segment: int) -> bytes:
+    flags = (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
+    header = _HEADER.pack(
+        segment, block.session, block.first_index, block.count, block.lost_before,
+        block.sample_period_s, block.axis_deg, block.dc_link_v, flags,
+    )
+    signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
+    if block.current_w_a is not None:
+        signals.append(block.current_w_a)
+    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals)
+
+
+def _decode(payload: bytes) -> tuple[int, SampleBlock]:
+    segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
+    signals = np.frombuffer(payload, "<f8", offset=_HEADER.size).reshape(-1, count).astype(np.float64)
+    return segment, SampleBlock(
+        session=session, first_index=first, sample_period_s=period, axis_deg=axis,
+        voltage_axis_v=signals[0], current_u_a=signals[1], current_v_a=signals[2],
+        current_w_a=signals[3] if flags & _HAS_W else None,
+        dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
+    )

@@ -1,0 +1,241 @@
+"""Carries a procedure out on a real drive. This file holds the only `finally` that de-energises.
+
+Each command passes `safety.limits` before the wire; each block and status passes `safety.watch` after it. What energises
+or writes is in the journal, on the disk, before it goes out.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from types import FrameType
+from typing import Any
+
+from commissioner.errors import Aborted, CommissionerError, DriveFault
+from commissioner.link.inverter import Inverter
+from commissioner.procedure.findings import EstimateUpdated, RunEnded, VerdictReached
+from commissioner.records import SampleBlock
+from commissioner.run.archive import RunFolder
+from commissioner.safety import commands as ask
+from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
+from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
+
+STATUS_EVERY_S = 0.25
+"""Motor time between two readings of the drive's status while energised."""
+EMPTY_FETCH_PAUSE_S = 0.002
+"""Wait after a window without new samples: a drive in real time needs a moment."""
+STALL_S = 2.0
+"""Wall time without any new sample after which the stream counts as dead."""
+
+Course = Generator[ask.Command, Any, RunEnded]
+Present = Callable[[object], None]
+
+
+@dataclass
+class _Progress:
+    """What the runner keeps while it goes."""
+
+    facts: SafetyFacts = SafetyFacts()
+    segment: int = -1
+    session_s: float = 0.0
+    flux_fraction: float = 0.0
+    next_status_s: float = 0.0
+
+
+class Runner:
+    """Carries one course out: `perform` returns how the run ended, whatever happens on the way."""
+
+    def __init__(
+        self, inverter: Inverter, folder: RunFolder, bounds: Bounds, watch: WatchLimits, present: Present
+    ) -> None:
+        self._inverter = inverter
+        self._folder = folder
+        self._bounds = bounds
+        self._watch = watch
+        self._present = present
+        self._progress = _Progress()
+        self._stop = OperatorStop()
+
+    @property
+    def energised_s(self) -> float:
+        """Motor time under voltage so far."""
+        return self._progress.facts.energised_s
+
+    def perform(self, course: Course) -> RunEnded:
+        """Run the course to its end. Faults, guards and the operator end it as a value; the drive is always disarmed."""
+        error: CommissionerError | None = None
+        ended: RunEnded | None = None
+        with self._stop:
+            try:
+                ended = self._drive(course)
+            except CommissionerError as failure:
+                error = failure
+            except Exception as defect:  # a defect must not leave a motor energised or a run without an end
+                self._folder.journal("defect", traceback.format_exc())
+                error = CommissionerError(
+                    f"a defect in commissioner: {type(defect).__name__}: {defect}", step="run",
+                    remedy="please report it with the run folder",
+                )
+            finally:
+                self._disarm(error.what if error is not None else "the run has ended")
+        ended = ended or self._failed(error)
+        self._folder.journal("run_ended", ended, durable=True)
+        self._present(ended)
+        return ended
+
+    def _drive(self, course: Course) -> RunEnded:
+        reply: object = None
+        while True:
+            if self._stop.asked:
+                raise Aborted(
+                    "stopped by the operator", step="run", value=self._stop.asked, limit="no stop",
+                    remedy="start again when ready",
+                )
+            try:
+                command = course.send(reply)
+            except StopIteration as stop:
+                ended = stop.value
+                assert isinstance(ended, RunEnded)
+                return replace(ended, energised_s=self.energised_s)
+            reply = self._carry_out(command)
+
+    def _carry_out(self, command: ask.Command) -> object:
+        refusal = permit(command, self._progress.facts, self._bounds)
+        if refusal is not None:
+            raise Aborted(
+                f"not sent: {refusal.what}", step=type(command).__name__, value=refusal.value, limit=refusal.limit,
+                remedy=refusal.remedy,
+            )
+        if command.energises or command.writes:
+            self._folder.journal("about_to", {"command": type(command).__name__, "with": command}, durable=True)
+        reply = self._send(command)
+        self._progress.facts = after(command, reply, self._progress.facts)
+        return reply
+
+    def _send(self, command: ask.Command) -> object:
+        inverter = self._inverter
+        match command:
+            case ask.Fetch():
+                return self._fetch()
+            case ask.Tell(record=record):
+                return self._tell(record)
+            case ask.SetScale(scale=scale):
+                return inverter.set_scale(scale)
+            case ask.SetBias(bias_v=bias):
+                return inverter.set_bias(bias)
+            case ask.Identify():
+                return inverter.identify()
+            case ask.ReadNameplate():
+                return inverter.read_nameplate()
+            case ask.ReadStatus():
+                return inverter.read_status()
+            case ask.TakeSnapshot():
+                snapshot = inverter.snapshot()
+                self._folder.save("snapshot.json", snapshot)
+                return snapshot
+            case ask.Wait(seconds=seconds):
+                return time.sleep(seconds)
+            case ask.ArmWatchdog(timeout_s=timeout):
+                return inverter.set_watchdog(round(timeout * 1000)) / 1000
+            case ask.SetDriveLimits(current_a=current, voltage_v=voltage, time_s=limit):
+                return inverter.set_limits(current, voltage, limit)
+            case ask.LoadExcitation():
+                return inverter.load_excitation(
+                    command.axis_deg, command.tones, command.bias_ramp_v_per_s, command.scale_ramp_per_s, command.duration_s
+                )
+            case ask.Enable():
+                return self._enable()
+            case ask.Disarm(reason=reason):
+                return self._disarm(reason)
+            case ask.WriteParameters(values=values):
+                return inverter.write_parameters(values)
+            case _:
+                raise TypeError(f"no such command: {command!r}")
+
+    def _enable(self) -> object:
+        progress = self._progress
+        progress.segment += 1
+        progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
+        return self._inverter.enable()
+
+    def _fetch(self) -> SampleBlock | None:
+        """The next block, archived and judged; None once the drive has ended the session."""
+        deadline = time.monotonic() + STALL_S
+        while (block := self._inverter.fetch()) is not None and block.count == 0:
+            if time.monotonic() > deadline:
+                raise DriveFault(
+                    "the drive sends no samples", step="stream", value=f"nothing for {STALL_S:g} s", limit="a running stream",
+                    remedy="check the drive's status; the output has been switched off",
+                )
+            time.sleep(EMPTY_FETCH_PAUSE_S)
+        if block is None:
+            return None
+        progress = self._progress
+        self._folder.append(block, progress.segment)
+        seconds = (block.count + block.lost_before) * block.sample_period_s
+        progress.session_s += seconds
+        progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
+        self._stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
+        if progress.session_s >= progress.next_status_s:
+            progress.next_status_s = progress.session_s + STATUS_EVERY_S
+            self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+        return block
+
+    def _tell(self, record: object) -> None:
+        if isinstance(record, EstimateUpdated):
+            self._progress.flux_fraction = record.flux_fraction
+        if isinstance(record, VerdictReached):
+            self._progress.facts = replace(self._progress.facts, writing_allowed=record.decision == "write back")
+        self._folder.journal(_kind(record), record)
+        self._present(record)
+
+    def _stop_if(self, reason: StopReason | None) -> None:
+        if reason is None:
+            return
+        kind = DriveFault if reason.is_fault else Aborted
+        raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
+
+    def _disarm(self, reason: str) -> object:
+        """The one place that de-energises. It tries every path and says what it verified."""
+        verified = self._inverter.disarm()
+        self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
+        self._folder.journal("disarmed", {"because": reason, "verified": verified}, durable=True)
+        return verified
+
+    def _failed(self, error: CommissionerError | None) -> RunEnded:
+        assert error is not None
+        self._folder.journal("error", error.as_dict(), durable=True)
+        return RunEnded(error.outcome, error.what, self.energised_s, error.as_dict())
+
+
+def _kind(record: object) -> str:
+    """`EstimateUpdated` -> `estimate_updated`"""
+    name = type(record).__name__
+    return "".join("_" + c.lower() if c.isupper() else c for c in name).lstrip("_")
+
+
+class OperatorStop:
+    """Ctrl-C and SIGTERM, taken as a wish that the runner grants between two commands; never in the middle of one.
+
+    So a second Ctrl-C cannot interrupt the de-energising that the first one asked for.
+    """
+
+    def __init__(self) -> None:
+        self.asked = ""
+        self._before: list[tuple[int, Any]] = []
+
+    def __enter__(self) -> OperatorStop:
+        if threading.current_thread() is threading.main_thread():
+            self._before = [(number, signal.signal(number, self._ask)) for number in (signal.SIGINT, signal.SIGTERM)]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before:
+            signal.signal(number, handler)
+
+    def _ask(self, number: int, _frame: FrameType | None) -> None:
+        self.asked = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name

@@ -1,0 +1,90 @@
+"""Must we stop? Judged on every block and every status, independent of the procedure's own flux guard."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.records import DriveStatus, SampleBlock
+
+
+@dataclass(frozen=True)
+class StopReason:
+    """Why the test must end now. `is_fault`: the drive or the data failed; otherwise a guard acted."""
+
+    what: str
+    value: float | str
+    limit: float | str
+    remedy: str
+    is_fault: bool = False
+
+
+@dataclass(frozen=True)
+class WatchLimits:
+    """Peak values; `flux_fraction` is of the rated stator flux and lies above the procedure's guard."""
+
+    current_a: float
+    flux_fraction: float
+    axis_time_s: float
+    lost_samples: int
+    dc_link_v: tuple[float, float]
+    heatsink_degc: float
+    winding_degc: float
+
+
+def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, limits: WatchLimits) -> StopReason | None:
+    """The first reason to stop that the newest block gives, most dangerous first."""
+    current = _peak(block)
+    if not math.isfinite(current) or current > limits.current_a:
+        return StopReason(
+            "the current passed its limit", current, limits.current_a,
+            "check the motor's rated current and its connection; a shorted winding does this too",
+        )
+    if not math.isfinite(flux_fraction) or flux_fraction > limits.flux_fraction:
+        return StopReason(
+            "the flux came too close to its rated value", flux_fraction, limits.flux_fraction,
+            "lower limits.flux_fraction, and check rated voltage and frequency of the plate",
+        )
+    if block.clipped:
+        return StopReason(
+            "a current sensor reached the end of its range", current, "inside the range",
+            "lower limits.current_fraction or fit a drive of higher rated current", is_fault=True,
+        )
+    if energised_s > limits.axis_time_s:
+        return StopReason(
+            "the axis was energised too long", energised_s, limits.axis_time_s, "raise limits.axis_time_s",
+        )
+    if block.lost_before > limits.lost_samples:
+        return StopReason(
+            "the stream lost samples", float(block.lost_before), float(limits.lost_samples),
+            "use a faster link, or a decimation the link can carry", is_fault=True,
+        )
+    return _outside("the DC link left its range", block.dc_link_v, *limits.dc_link_v, "check the supply")
+
+
+def judge_status(status: DriveStatus, limits: WatchLimits) -> StopReason | None:
+    """The first reason to stop that the drive's status gives."""
+    if status.fault_code:
+        return StopReason(
+            f"the drive tripped: {status.fault_text}", status.trip_value, status.trip_limit,
+            "remove the cause, reset the fault at the drive, start again", is_fault=True,
+        )
+    if status.heatsink_degc > limits.heatsink_degc:
+        return StopReason("the heatsink is too hot", status.heatsink_degc, limits.heatsink_degc, "let the drive cool down")
+    if status.winding_degc > limits.winding_degc:
+        return StopReason("the winding is too hot", status.winding_degc, limits.winding_degc, "let the motor cool down")
+    return _outside("the DC link left its range", status.dc_link_v, *limits.dc_link_v, "check the supply")
+
+
+def _outside(what: str, value: float, low: float, high: float, remedy: str) -> StopReason | None:
+    if low <= value <= high:
+        return None
+    return StopReason(what, value, f"{low:g} ... {high:g} V", remedy, is_fault=True)
+
+
+def _peak(block: SampleBlock) -> float:
+    """Largest phase current magnitude; with two sensors the third phase follows from the sum."""
+    w = block.current_w_a if block.current_w_a is not None else -(block.current_u_a + block.current_v_a)
+    return max(float(np.max(np.abs(phase))) for phase in (block.current_u_a, block.current_v_a, w))
