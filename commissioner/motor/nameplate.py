@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import cmath
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+from commissioner.motor.circuit import InverseGamma
 
 
 @dataclass(frozen=True)
@@ -18,3 +23,131 @@ class Nameplate:
     pole_pairs: int
     connection: str  # "star" | "delta"
     inertia_kg_m2: float | None = None
+
+    @property
+    def rated_frequency_rad_per_s(self) -> float:
+        return 2.0 * math.pi * self.rated_frequency_hz
+
+    @property
+    def rated_slip(self) -> float:
+        """1 - n p / (60 f), the fraction of synchronous speed lost at rated load."""
+        return 1.0 - self.rated_speed_rpm * self.pole_pairs / (60.0 * self.rated_frequency_hz)
+
+    @property
+    def rated_current_peak_a(self) -> float:
+        return math.sqrt(2.0) * self.rated_current_a
+
+    @property
+    def impedance_base_ohm(self) -> float:
+        """U_N / (sqrt(3) I_N): per phase of the star equivalent, for star and delta windings alike."""
+        return self.rated_voltage_v / (math.sqrt(3.0) * self.rated_current_a)
+
+
+@dataclass(frozen=True)
+class RatedFlux:
+    """Rated stator-flux linkage per phase of the star equivalent; `peak` = sqrt(2) x `rms` is the space vector's length."""
+
+    stator_rms_wb: float
+    stator_peak_wb: float
+
+
+@dataclass(frozen=True)
+class ParameterBox:
+    """Where the inverse-Gamma parameters of a motor with this plate can lie, and its most typical member."""
+
+    lower: InverseGamma
+    typical: InverseGamma
+    upper: InverseGamma
+
+    def contains(self, parameters: InverseGamma) -> bool:
+        corners = zip(self.lower.as_tuple(), parameters.as_tuple(), self.upper.as_tuple(), strict=True)
+        return all(low <= value <= high for low, value, high in corners)
+
+
+@dataclass(frozen=True)
+class PlateProblem:
+    """A value no induction motor can carry on its plate: which, and what would be right."""
+
+    key: str
+    value: object
+    expected: str
+
+
+def rated_flux(nameplate: Nameplate, stator_resistance_ohm: float) -> RatedFlux:
+    """|U - R_s I e^{-j phi}| / omega_N with phase values of the star equivalent (Castaldi & Tilli 2005, eq. (2)).
+
+    `stator_resistance_ohm` is per phase of the star equivalent (half the resistance between two terminals), so the
+    connection does not enter: a delta winding seen from its terminals is a star with U_N / sqrt(3) and I_N per phase.
+    """
+    voltage_v = nameplate.rated_voltage_v / math.sqrt(3.0)
+    phase_rad = math.acos(min(1.0, nameplate.power_factor))
+    back_emf_v = abs(voltage_v - stator_resistance_ohm * cmath.rect(nameplate.rated_current_a, -phase_rad))
+    rms_wb = back_emf_v / nameplate.rated_frequency_rad_per_s
+    return RatedFlux(rms_wb, math.sqrt(2.0) * rms_wb)
+
+
+# Per-unit ranges (base U_N / (sqrt(3) I_N)); they cover with margin the 35 machines of 0.18 kW ... 1.7 MW in
+# tests/data/motors: R_R / slip 0.57 ... 1.50, X_M sin(phi) 0.72 ... 1.49, X_sigma 0.068 ... 0.245, R_s / slip 0.29 ... 3.2.
+_STATOR_OVER_SLIP = (0.15, 1.25, 5.0)
+_ROTOR_OVER_SLIP = (0.35, 0.95, 2.2)
+_LEAKAGE_PU = (0.03, 0.14, 0.45)
+_MAGNETIZING_TIMES_SIN_PHI = (0.45, 1.12, 2.2)
+
+
+def prior(nameplate: Nameplate) -> ParameterBox:
+    """The box of inverse-Gamma parameters that the plate allows.
+
+    Rotor resistance follows the rated slip, magnetizing reactance the reactive current I_N sin(phi), leakage the
+    pull-out torque, stator resistance the losses. Ranges: 39 published machines.
+    """
+    base = nameplate.impedance_base_ohm
+    slip = min(max(nameplate.rated_slip, 0.004), 0.15)
+    sin_phi = math.sqrt(1.0 - min(nameplate.power_factor, 0.95) ** 2)
+    omega = nameplate.rated_frequency_rad_per_s
+    return ParameterBox(*(
+        InverseGamma(
+            stator_resistance_ohm=_STATOR_OVER_SLIP[k] * slip * base,
+            rotor_resistance_ohm=_ROTOR_OVER_SLIP[k] * slip * base,
+            leakage_inductance_h=_LEAKAGE_PU[k] * base / omega,
+            magnetizing_inductance_h=_MAGNETIZING_TIMES_SIN_PHI[k] / sin_phi * base / omega,
+        )
+        for k in range(3)
+    ))
+
+
+def check(nameplate: Nameplate) -> tuple[PlateProblem, ...]:
+    """What on this plate contradicts physics, most telling first; empty where nothing does."""
+    return tuple(_problems(nameplate))
+
+
+def _problems(plate: Nameplate) -> Iterator[PlateProblem]:
+    positive = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm")
+    broken = [key for key in positive if not (math.isfinite(getattr(plate, key)) and getattr(plate, key) > 0)]
+    for key in broken:
+        yield PlateProblem(key, getattr(plate, key), "a finite number above 0")
+    if plate.connection not in ("star", "delta"):
+        yield PlateProblem("connection", plate.connection, '"star" or "delta"')
+    if plate.pole_pairs < 1:
+        yield PlateProblem("pole_pairs", plate.pole_pairs, "1, 2, 3, ... (half the number of poles)")
+        return
+    if not 0.2 < plate.power_factor <= 1.0:
+        yield PlateProblem("power_factor", plate.power_factor, "cos phi at rated load, 0.2 ... 1")
+        return
+    if not broken:
+        yield from _contradictions(plate)
+
+
+def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
+    synchronous_rpm = 60.0 * plate.rated_frequency_hz / plate.pole_pairs
+    if not 0.0 < plate.rated_slip < 0.25:
+        yield PlateProblem(
+            "rated_speed_rpm", plate.rated_speed_rpm,
+            f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs by at most a quarter",
+        )
+    input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
+    efficiency = plate.rated_power_w / input_w
+    if not 0.25 < efficiency < 1.0:
+        yield PlateProblem(
+            "rated_power_w", plate.rated_power_w,
+            f"0.25 ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate",
+        )

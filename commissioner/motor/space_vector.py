@@ -1,0 +1,41 @@
+"""Conventions of space vectors, stated once.
+
+Amplitude-invariant: a symmetric sinusoidal phase quantity of peak A gives a vector of length A. The axis angle is
+counted from phase u towards phase v. Signals are `(n,)`, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from commissioner.records import Signal
+
+
+def clarke(u: Signal, v: Signal, w: Signal | None) -> tuple[Signal, Signal]:
+    """(alpha, beta) of three phase quantities; without the third, the sum is taken as zero."""
+    third = -u - v if w is None else w
+    return (2.0 * u - v - third) / 3.0, (v - third) / math.sqrt(3.0)
+
+
+def axis_current_a(current_u_a: Signal, current_v_a: Signal, current_w_a: Signal | None, axis_deg: float) -> Signal:
+    """The current vector's component along the axis."""
+    alpha, beta = clarke(current_u_a, current_v_a, current_w_a)
+    angle = math.radians(axis_deg)
+    return np.asarray(alpha * math.cos(angle) + beta * math.sin(angle), dtype=np.float64)
+
+
+def orthogonal_current_a(
+    current_u_a: Signal, current_v_a: Signal, current_w_a: Signal | None, axis_deg: float
+) -> Signal:
+    """The component 90 degrees ahead of the axis: zero in a symmetric machine excited along the axis."""
+    return axis_current_a(current_u_a, current_v_a, current_w_a, axis_deg + 90.0)
+
+
+def phase_cosines(axis_deg: float) -> tuple[float, float, float]:
+    """What of an axis current flows in each phase: cos(theta), cos(theta - 120 deg), cos(theta + 120 deg).
+
+    The same numbers times 2/3 weight phase voltages into the axis voltage.
+    """
+    return tuple(math.cos(math.radians(axis_deg - shift)) for shift in (0.0, 120.0, 240.0))  # type: ignore[return-value]
