@@ -99,7 +99,9 @@ class IdentityMismatch(DriveError):
 
 
 class WriteBackFailed(DriveError):
-    pass
+    """`was_restored`: the snapshot was seen in the drive again; False says it was not, or could not be, verified."""
+
+    was_restored: bool = False
 
 
 class SamplesLost(DriveError):

@@ -103,6 +103,13 @@ class DriveStatus:
     current_magnitude_a: float
     heartbeat_echo: int
     session: int
+    trip_cause: int = 0
+    trip_text: str = ""
+    present_scale: float = 0.0
+    present_bias_v: float = 0.0
+    test_time_left_s: float = 0.0
+    samples_produced: int = 0
+    overruns: int = 0
 
 
 @dataclass(frozen=True)
