@@ -1,0 +1,463 @@
+"""A drive behind a port: who it is, how it is, set up, energise, steer, fetch, de-energise.
+
+One owner, no threads: the loop that fetches samples is the loop that feeds the drive's watchdog. Whoever holds an
+`Inverter` keeps the only `finally` that calls `disarm`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from commissioner.errors import (
+    CheckFailed,
+    CommissionerError,
+    DriveFault,
+    IdentityMismatch,
+    ReplyMismatch,
+    ReplyTimeout,
+    RequestRefused,
+    UsageError,
+)
+from commissioner.link.facts import Action, Attempt, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
+from commissioner.link.items import Items, number
+from commissioner.link.port import Port
+from commissioner.link.write_back import WriteBack
+from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
+from commissioner.registers.codec import Value
+from commissioner.registers.profile import DriveProfile, WindowLayout
+from commissioner.registers.status import DriveState, decode_bits, decode_state
+from commissioner.registers.window import (
+    StreamCursor,
+    StreamFormat,
+    Window,
+    WindowRefusal,
+    channel_mask,
+    decode_window,
+    encode_request,
+)
+
+DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE, RESET_FAULT = 0x00, 0x02, 0x06, 0x07, 0x0F, 0x80
+NO_MODE, SINGLE_AXIS_TEST = 0, 1
+STATE_DEADLINE_S = 1.0
+POLL_S = 0.002
+FETCH_ATTEMPTS = 2
+AFTER_WATCHDOG_S = 0.1
+
+IDENTITY_ITEMS = (
+    "magic", "map_version", "firmware_version", "serial_number", "drive_type", "rated_drive_current_a",
+    "control_period_s", "switching_frequency_hz",
+)
+STATUS_ITEMS = (
+    "status_word", "fault_code", "trip_cause", "trip_value", "trip_limit", "heartbeat_echo", "session_id",
+    "interlocks", "dc_link_v", "heatsink_degc", "winding_degc", "shaft_speed_rad_per_s", "current_magnitude_a",
+    "present_scale", "samples_produced", "overruns", "test_time_left_s", "present_bias_v",
+)
+NAMEPLATE_ITEMS = (
+    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
+    "pole_pairs", "pole_count",
+)
+
+
+class Inverter:
+    """The drive. Every method ends within the port's deadlines; a drive that does not obey is a DriveFault."""
+
+    def __init__(
+        self,
+        port: Port,
+        profile: DriveProfile,
+        journal: Journal = keep_no_journal,
+        *,
+        sleep: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.port = port
+        self.profile = profile
+        self.journal = journal
+        self._items = Items(port, profile)
+        self._sleep, self._clock = sleep, clock
+        self._heartbeat = 0
+        self._watchdog_ms = 0.0
+        self._supervision: dict[str, Value] = {}
+        self._signal: dict[str, Value] = {}
+        self._read_retries = port.read_retries
+
+    # --- who and how -------------------------------------------------------------------------------------------
+    def identify(self) -> DriveIdentity:
+        """Who answers. IdentityMismatch: not the drive, map or firmware of the drive file."""
+        seen = self._items.read(IDENTITY_ITEMS)
+        self._check_identity(seen)
+        return DriveIdentity(
+            drive_type=str(seen.get("drive_type", self.profile.name)),
+            serial_number=int(number(seen.get("serial_number", 0))),
+            firmware_version=_version(int(number(seen.get("firmware_version", 0)))),
+            map_version=int(number(seen.get("map_version", 0))),
+            rated_drive_current_a=number(seen.get("rated_drive_current_a", math.nan)),
+            control_period_s=number(seen.get("control_period_s", math.nan)),
+            switching_frequency_hz=number(seen.get("switching_frequency_hz", math.nan)),
+        )
+
+    def read_status(self) -> DriveStatus:
+        """The drive's state now. What the drive file does not describe is NaN, 0 or empty."""
+        seen = self._items.read(STATUS_ITEMS)
+        state = self._decode_state(int(number(seen.get("status_word", 0))))
+        fault, trip = (int(number(seen.get(name, 0))) for name in ("fault_code", "trip_cause"))
+        return DriveStatus(
+            state=state.value,
+            is_energised=state.may_be_energised,
+            fault_code=fault,
+            fault_text=self.profile.fault_text(fault),
+            trip_value=_real(seen, "trip_value"),
+            trip_limit=_real(seen, "trip_limit"),
+            interlocks=decode_bits(int(number(seen.get("interlocks", 0))), self.profile.interlock_bits),
+            dc_link_v=_real(seen, "dc_link_v"),
+            heatsink_degc=_real(seen, "heatsink_degc"),
+            winding_degc=_real(seen, "winding_degc"),
+            shaft_speed_rad_per_s=_real(seen, "shaft_speed_rad_per_s"),
+            current_magnitude_a=_real(seen, "current_magnitude_a"),
+            heartbeat_echo=int(number(seen.get("heartbeat_echo", 0))),
+            session=int(number(seen.get("session_id", 0))),
+            trip_cause=trip,
+            trip_text=self.profile.fault_text(trip),
+            present_scale=_real(seen, "present_scale"),
+            present_bias_v=_real(seen, "present_bias_v"),
+            test_time_left_s=_real(seen, "test_time_left_s"),
+            samples_produced=int(number(seen.get("samples_produced", 0))),
+            overruns=int(number(seen.get("overruns", 0))),
+        )
+
+    def read_nameplate(self) -> dict[str, float]:
+        """The nameplate the drive holds, by the contract's keys; what its file does not describe is left out."""
+        seen = {name: number(value) for name, value in self._items.read(NAMEPLATE_ITEMS).items()}
+        if "pole_count" in seen:
+            seen["pole_pairs"] = seen.pop("pole_count") / 2
+        return seen
+
+    def snapshot(self) -> ParameterSnapshot:
+        """The motor parameters in use and stored, with the identity of the drive that holds them."""
+        return self._write_back().snapshot()
+
+    # --- set up -------------------------------------------------------------------------------------------------
+    def set_watchdog(self, time_ms: float) -> None:
+        """Arm the drive's own supervision. CheckFailed: the drive cannot; DriveFault: it says so and does not."""
+        watchdog = self.profile.watchdog
+        if watchdog is None:
+            raise self._no_watchdog(self.profile.unknown.get("watchdog", "the drive file describes none"), time_ms)
+        if not watchdog.min_ms <= time_ms <= watchdog.max_ms:
+            raise self._no_watchdog(f"{watchdog.min_ms:g} ... {watchdog.max_ms:g} ms", time_ms)
+        unit_ms = 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
+        values: dict[str, Value] = {watchdog.register: time_ms / unit_ms}
+        self.journal(Intent(Action.PREPARE, values))
+        try:
+            self._items.write_verified(values, "arm the watchdog")
+        except RequestRefused as refused:
+            raise self._no_watchdog(refused.what, time_ms) from refused
+        self._watchdog_ms = time_ms
+        self._supervision |= values
+
+    def set_limits(self, *, current_a: float, voltage_v: float, time_s: float) -> None:
+        """Limits the drive enforces by itself: peak phase current (trips), axis voltage (clamps), energised time."""
+        values: dict[str, Value] = {
+            "current_limit_a": current_a, "test_time_limit_s": time_s, "voltage_limit_v": voltage_v
+        }
+        self._prepare(values, "set the drive's limits")
+        self._supervision |= values
+
+    def load_excitation(
+        self,
+        *,
+        axis_deg: float,
+        tones: Sequence[tuple[float, float, float]],
+        bias_v: float,
+        bias_ramp_v_per_s: float,
+        scale: float,
+        scale_ramp_per_s: float,
+        duration_s: float,
+        channels: Sequence[str] = ("voltage_axis_v", "current_u_a", "current_v_a"),
+        decimation: int = 1,
+    ) -> None:
+        """The test signal of the next enable; tones are (amplitude_v, frequency_hz, phase_rad). Read back."""
+        self.profile.require("excite")
+        _check_scale(scale)
+        self._signal = {
+            "axis_deg": axis_deg,
+            "dc_bias_v": bias_v,
+            "bias_ramp_v_per_s": bias_ramp_v_per_s,
+            "amplitude_scale": scale,
+            "scale_ramp_per_s": scale_ramp_per_s,
+            "duration_s": duration_s,
+            "tone_count": len(tones),
+            "tones": tuple(float(part) for tone in tones for part in tone),
+            "channel_mask": channel_mask(channels),
+            "decimation": decimation,
+        }
+        self.journal(Intent(Action.PREPARE, self._signal))
+        self._items.write_verified(self._signal, "load the excitation")
+
+    def reset_fault(self) -> DriveStatus:
+        """A fault reset edge; the status after it, which says whether the fault is gone."""
+        self.journal(Intent(Action.PREPARE, {"control_word": RESET_FAULT}))
+        self._items.write({"control_word": DISABLE_VOLTAGE})
+        self._items.write({"control_word": RESET_FAULT})
+        self._items.write({"control_word": DISABLE_VOLTAGE})
+        return self.read_status()
+
+    # --- energised ----------------------------------------------------------------------------------------------
+    def enable(self) -> StreamCursor:
+        """Energise the loaded excitation through the CiA 402 states; the cursor at the first sample of its session.
+
+        CheckFailed: a condition does not hold and nothing was energised. DriveFault: the drive does not follow.
+        """
+        self.profile.require("excite")
+        before = self._check_ready()
+        self._prepare({"mode": SINGLE_AXIS_TEST}, "choose the single-axis test")
+        stream = self._stream_format()
+        self.port.read_retries = 0
+        self._go(SHUTDOWN, DriveState.READY_TO_SWITCH_ON)
+        self._go(SWITCH_ON, DriveState.SWITCHED_ON)
+        self.journal(Intent(Action.ENERGISE, {"control_word": ENABLE, **self._signal}))
+        self._go(ENABLE, DriveState.OPERATION_ENABLED)
+        session = int(self._items.read_number("session_id"))
+        if session == before.session:
+            raise DriveFault(
+                "the drive enabled without opening a session", step="enable", value=session,
+                limit="a session number that differs from the one before", remedy="check the drive's firmware",
+            )
+        return StreamCursor(stream(session))
+
+    def fetch(self, cursor: StreamCursor) -> Window:
+        """The next samples, and the watchdog fed, in one transaction. `block` is None where none is ready yet.
+
+        Asked again, once, with a new heartbeat, where the answer was lost or was not its own: the window is
+        idempotent. Raises ReplyTimeout or ReplyMismatch after that.
+        """
+        failure: ReplyTimeout | ReplyMismatch
+        for _ in range(FETCH_ATTEMPTS):
+            try:
+                return self._fetch_once(cursor)
+            except (ReplyTimeout, ReplyMismatch) as error:
+                failure = error
+        raise failure
+
+    def beat(self) -> int:
+        """Feed the watchdog without fetching; the echo the drive gave back."""
+        self._heartbeat = (self._heartbeat + 1) & 0xFFFF
+        heartbeat, echo = self.profile.item("heartbeat"), self.profile.item("heartbeat_echo")
+        return self.port.exchange(heartbeat.address, [self._heartbeat], echo.address, 1)[0]
+
+    def set_scale(self, scale: float) -> None:
+        """Steer the amplitude scale (0 ... 1); the drive ramps to it. Read back in the same transaction."""
+        _check_scale(scale)
+        self._steer({"amplitude_scale": scale})
+
+    def set_bias(self, bias_v: float) -> None:
+        """Steer the DC bias in volts along the axis; the drive ramps to it. Read back in the same transaction."""
+        self._steer({"dc_bias_v": bias_v})
+
+    def disarm(self) -> DisarmReport:
+        """De-energise by every path until the drive's status confirms it, else by its watchdog. Never raises a
+        CommissionerError; idempotent; legal in every state."""
+        if "control_word" not in self.profile.items:
+            return DisarmReport(True, "this service cannot energise this drive", (), False)
+        attempts: list[Attempt] = []
+        paths: tuple[tuple[str, dict[str, Value]], ...] = (
+            ("disable voltage", {"control_word": DISABLE_VOLTAGE}),
+            ("quick stop", {"control_word": QUICK_STOP}),
+            ("shut down", {"control_word": SHUTDOWN}),
+            ("leave the test mode", {"mode": NO_MODE}),
+        )
+        for path, values in paths:
+            attempts.append(self._attempt(path, values))
+            state = self._blocked_state(attempts)
+            if state is not None:
+                attempts.append(self._attempt("leave the test mode", {"mode": NO_MODE}))
+                return self._disarmed(state, attempts, waited=False)
+        self._sleep(self._watchdog_ms / 1000 + AFTER_WATCHDOG_S)
+        return self._disarmed(self._blocked_state(attempts), attempts, waited=True)
+
+    # --- parameters ---------------------------------------------------------------------------------------------
+    def write_parameters(
+        self, values: Mapping[str, float], snapshot: ParameterSnapshot, *, store: bool = True
+    ) -> WriteReport:
+        """Stage, verify, commit, verify, store, verify; only what differs. `values` by the drive file's names.
+
+        IdentityMismatch: the drive or its present values are not the snapshot's, nothing was written.
+        WriteBackFailed: says whether the snapshot was restored.
+        """
+        self.profile.require("write_back")
+        return self._write_back().write(values, snapshot, store=store)
+
+    def restore(
+        self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None
+    ) -> WriteReport:
+        """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`."""
+        self.profile.require("restore")
+        return self._write_back().restore(snapshot, expected_present)
+
+    def _write_back(self) -> WriteBack:
+        return WriteBack(
+            self._items, self.journal, self.identify, self.read_status, sleep=self._sleep, clock=self._clock
+        )
+
+    # --- steps --------------------------------------------------------------------------------------------------
+    def _prepare(self, values: Mapping[str, Value], step: str) -> None:
+        self.journal(Intent(Action.PREPARE, values))
+        self._items.write_verified(values, step)
+
+    def _steer(self, values: dict[str, Value]) -> None:
+        self.journal(Intent(Action.STEER, values))
+        self._items.exchange_verified(values, "steer the excitation")
+
+    def _check_ready(self) -> DriveStatus:
+        """The status before enabling. CheckFailed where energising would not be supervised or not be obeyed."""
+        self._check_supervision()
+        status = self.read_status()
+        if status.is_energised:
+            raise _not_ready("the drive is energised already", status.state, "a blocked output", "disarm it first")
+        if status.fault_code or status.state == DriveState.FAULT.value:
+            raise _not_ready(f"the drive reports: {status.fault_text}", status.fault_code, "no fault", "remove it")
+        for name, holds in status.interlocks.items():
+            if not holds:
+                raise _not_ready(f"interlock {name} is open", name, "all interlocks closed", "see the drive's manual")
+        return status
+
+    def _check_supervision(self) -> None:
+        if not (self._watchdog_ms and self._signal and "current_limit_a" in self._supervision):
+            raise _not_ready("the drive was not set up", None, "watchdog, limits and excitation set", "set them first")
+        if self.port.reply_timeout_s >= self._watchdog_ms / 1000:
+            raise _not_ready(
+                "a lost answer would outlast the watchdog", self.port.reply_timeout_s,
+                f"less than the watchdog's {self._watchdog_ms / 1000:g} s", "use a faster link or a longer watchdog",
+            )
+        held = self._items.read(self._supervision)
+        for name, wanted in self._supervision.items():
+            if not self._items.same_words(name, held[name], wanted):
+                raise _not_ready(f"{name} has changed since it was set", held[name], wanted, "keep other masters off")
+
+    def _stream_format(self) -> Callable[[int], StreamFormat]:
+        scales = self._items.read(
+            ["control_period_s", "voltage_scale_v", "current_scale_a", "dc_link_scale_v"]
+        )
+        decimation, mask = int(number(self._signal["decimation"])), int(number(self._signal["channel_mask"]))
+        return lambda session: StreamFormat(
+            layout=self._window(),
+            session=session,
+            axis_deg=number(self._signal["axis_deg"]),
+            channel_mask=mask,
+            sample_period_s=number(scales["control_period_s"]) * decimation,
+            voltage_scale_v=number(scales["voltage_scale_v"]),
+            current_scale_a=number(scales["current_scale_a"]),
+            dc_link_scale_v=number(scales["dc_link_scale_v"]),
+        )
+
+    def _go(self, command: int, wanted: DriveState) -> None:
+        """Give the command and watch the status, feeding the watchdog, until the state is there."""
+        self._items.write({"control_word": command})
+        end = self._clock() + STATE_DEADLINE_S
+        while True:
+            self.beat()
+            status = self.read_status()
+            if status.state == wanted.value:
+                return
+            if status.state == DriveState.FAULT.value:
+                raise DriveFault(
+                    f"the drive tripped: {status.trip_text}", step="enable", value=status.trip_value,
+                    limit=status.trip_limit, remedy=f"remove the cause of: {status.fault_text}",
+                )
+            if self._clock() > end:
+                raise DriveFault(
+                    f"the drive does not reach '{wanted.value}'", step="enable", value=status.state,
+                    limit=f"within {STATE_DEADLINE_S:g} s", remedy="check enable inputs and remote control",
+                )
+            self._sleep(POLL_S)
+
+    def _fetch_once(self, cursor: StreamCursor) -> Window:
+        self._heartbeat = (self._heartbeat + 1) & 0xFFFF
+        layout = cursor.stream.layout
+        request = encode_request(self._heartbeat, cursor.next_index)
+        address = self.profile.items["heartbeat"].address
+        decoded = decode_window(self.port.exchange(address, request, layout.address, layout.words), cursor)
+        if isinstance(decoded, WindowRefusal):
+            raise ReplyMismatch(
+                decoded.reason.value, step="fetch samples", value=decoded.seen, limit=decoded.expected,
+                remedy="check the link; a drive that restarted must be commissioned again",
+            )
+        return decoded
+
+    def _attempt(self, path: str, values: Mapping[str, Value]) -> Attempt:
+        try:
+            self._items.write(values)
+        except CommissionerError as error:
+            return Attempt(path, error.what)
+        return Attempt(path, "acknowledged")
+
+    def _blocked_state(self, attempts: list[Attempt]) -> DriveState | None:
+        """The state, where the drive's own status says that the output is blocked."""
+        try:
+            state = self._decode_state(int(self._items.read_number("status_word")))
+        except CommissionerError as error:
+            attempts.append(Attempt("read the status", error.what))
+            return None
+        attempts.append(Attempt("read the status", state.value))
+        return None if state.may_be_energised else state
+
+    def _disarmed(self, state: DriveState | None, attempts: list[Attempt], *, waited: bool) -> DisarmReport:
+        if state is not None:
+            self.port.read_retries = self._read_retries
+        described = state.value if state else "not confirmed by the drive"
+        return DisarmReport(state is not None, described, tuple(attempts), waited)
+
+    def _check_identity(self, seen: Mapping[str, Value]) -> None:
+        wanted = self.profile.identity
+        exact = {"magic": wanted.magic, "map_version": wanted.map_version, "drive_type": wanted.drive_type}
+        for name, value in exact.items():
+            if value is not None and seen.get(name) != value:
+                raise _stranger(name, seen.get(name), value, self.profile)
+        firmware = int(number(seen.get("firmware_version", 0)))
+        low, high = wanted.firmware_min or 0, wanted.firmware_max
+        if firmware < low or (high is not None and firmware > high):
+            span = f"{_version(low)} ... {_version(high) if high is not None else 'any'}"
+            raise _stranger("firmware_version", _version(firmware), span, self.profile)
+
+    def _decode_state(self, word: int) -> DriveState:
+        return decode_state(self.profile.status_decoder, word, self.profile.status_bits)
+
+    def _window(self) -> WindowLayout:
+        self.profile.require("stream")
+        assert self.profile.window is not None
+        return self.profile.window
+
+    def _no_watchdog(self, limit: str, time_ms: float) -> CheckFailed:
+        return CheckFailed(
+            "the drive's watchdog cannot be set", step="arm the watchdog", value=time_ms, limit=limit,
+            remedy="nothing is energised without it; choose a time the drive allows or another drive",
+        )
+
+
+def _check_scale(scale: float) -> None:
+    if not 0.0 <= scale <= 1.0:
+        raise UsageError(
+            "the amplitude scale is not a fraction", step="steer the excitation", value=scale, limit="0 ... 1",
+            remedy="ask for a scale between 0 and 1",
+        )
+
+
+def _real(seen: Mapping[str, Value], name: str) -> float:
+    return number(seen.get(name, math.nan))
+
+
+def _version(word: int) -> str:
+    """major.minor.patch, one byte each below the top byte."""
+    return f"{word >> 16 & 0xFF}.{word >> 8 & 0xFF}.{word & 0xFF}"
+
+
+def _not_ready(what: str, value: object, limit: object, remedy: str) -> CheckFailed:
+    return CheckFailed(what, step="check before energising", value=value, limit=limit, remedy=remedy)
+
+
+def _stranger(name: str, seen: object, wanted: object, profile: DriveProfile) -> IdentityMismatch:
+    return IdentityMismatch(
+        f"this is not {profile.name}: {name} differs", step="identify", value=seen, limit=wanted,
+        remedy="check the URL, or name the drive file that fits this drive and firmware",
+    )

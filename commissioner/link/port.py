@@ -1,0 +1,71 @@
+"""The one seam to the wire: what the inverter asks of a port, and what a port remembers about itself."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+Words = tuple[int, ...]
+
+
+@dataclass
+class LinkStats:
+    """Counts since the port was opened, and the latency of the last answered requests.
+
+    `latency_s(0.99)` is what a guard must predict across: the time from sending a request to holding its answer.
+    """
+
+    requests: int = 0
+    timeouts: int = 0
+    mismatches: int = 0
+    refusals: int = 0
+    resynchronisations: int = 0
+    connections: int = 0
+    latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=2048))
+
+    def latency_s(self, quantile: float) -> float:
+        """The quantile (0 ... 1) of the latest 2048 latencies; NaN before the first answer."""
+        return float(np.quantile(np.array(self.latencies_s), quantile)) if self.latencies_s else float("nan")
+
+    def as_dict(self) -> dict[str, float]:
+        """Counts and latency quantiles, for the journal and the report."""
+        counts = ("requests", "timeouts", "mismatches", "refusals", "resynchronisations", "connections")
+        quantiles = {"latency_p50_s": 0.5, "latency_p99_s": 0.99, "latency_max_s": 1.0}
+        return {name: float(getattr(self, name)) for name in counts} | {
+            name: self.latency_s(q) for name, q in quantiles.items()
+        }
+
+
+class Port(Protocol):
+    """Registers over some wire. One owner, no threads; every call ends within the deadline or raises a LinkError.
+
+    No call is ever repeated, except a read, at most `read_retries` times; a write or an exchange never.
+    """
+
+    stats: LinkStats
+    read_retries: int
+    reply_timeout_s: float
+
+    def read(self, address: int, count: int) -> Words:
+        """`count` holding registers from `address` (FC03)."""
+        ...
+
+    def write(self, address: int, values: Sequence[int]) -> None:
+        """Write the registers in one transaction (FC16)."""
+        ...
+
+    def exchange(self, write_address: int, values: Sequence[int], read_address: int, count: int) -> Words:
+        """Write, then read, in one transaction (FC23), or FC16 and FC03 where the drive has no FC23."""
+        ...
+
+    def write_coil(self, address: int, value: bool) -> None:
+        """Set one coil (FC05)."""
+        ...
+
+    def close(self) -> None:
+        """Give the wire back. Idempotent."""
+        ...
