@@ -1,0 +1,271 @@
+"""Shaft speed and load periods from the currents alone.
+
+A load that turns modulates the current: in the supply's frame it is a comb of line pairs at +-h f. The spectrum is
+whitened by its own local floor; the shaft comb is looked for in the slip range that the operating point allows, other
+combs anywhere. A refined comb is judged by the power it captures, and by whether it follows the mains or the clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.ndimage import median_filter
+
+from commissioner.monitor.supply import TurningFrame, Vector
+from commissioner.records import Signal
+
+SIGNIFICANT = 18.0
+"""Whitened pair power (mean 1 on noise): P = (1 + 2q) e^{-2q} = 9e-15 for one cell, below 1e-9 over a whole spectrum."""
+VISIBLE = 9.0
+"""Enough where the frequency is already known to a cell: P = 3e-7."""
+CAP = 40.0
+"""One line cannot outvote the operating point by more than this."""
+DEMODULATION_BLOCKS = 64
+LOWEST_LOAD_HZ = 0.8
+HIGHEST_LOAD_HZ = 220.0
+MOST_LOADS = 3
+
+
+@dataclass(frozen=True)
+class PairSpectrum:
+    """Whitened power of the line pairs +-f, `(m,)`, on the grid `frequency_hz`; `cell_hz` is the resolution."""
+
+    frequency_hz: Signal
+    power: Signal
+    floor_a2: Signal
+    upper: Vector
+    lower: Vector
+    cell_hz: float
+
+    def at(self, frequency_hz: NDArray[np.float64] | float, cells: float = 0.6) -> Signal:
+        """The largest whitened power within `cells` resolution cells of each frequency; 0 outside the spectrum."""
+        step = self.frequency_hz[1]
+        reach = max(1, int(round(cells * self.cell_hz / step)))
+        place = np.round(np.atleast_1d(frequency_hz) / step).astype(np.int64)
+        offsets = np.arange(-reach, reach + 1)
+        index = np.clip(place[:, None] + offsets, 0, self.power.size - 1)
+        best = self.power[index].max(axis=1)
+        return np.where((place >= 0) & (place < self.power.size), best, 0.0)
+
+
+@dataclass(frozen=True)
+class Periodicity:
+    """A comb that was found (or given): frequency over the segment, its standard error, and what speaks for it."""
+
+    name: str
+    frequency_hz: float
+    frequency_std_hz: float
+    follows: str
+    evidence: float
+    harmonics_seen: tuple[int, ...]
+    rejected: tuple[str, ...] = field(default=())
+
+
+def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float) -> PairSpectrum:
+    """Hann-windowed, four times zero-padded spectrum of the pairs, over a running median as floor."""
+    count = vector.size
+    window = np.hanning(count + 2)[1:-1]
+    padded = fft.next_fast_len(4 * count)
+    spectrum = fft.fft((vector - np.average(vector, weights=window)) * window, padded) / np.sum(window)
+    step = 1 / (padded * sample_period_s)
+    points = min(int(highest_hz / step), padded // 2 - 1)
+    upper = spectrum[: points + 1]
+    lower = np.conj(spectrum[-np.arange(points + 1)])
+    raw = np.abs(upper) ** 2 + np.abs(lower) ** 2
+    cell = 1.5 / (count * sample_period_s)
+    floor = _floor(raw, cell / step)
+    return PairSpectrum(np.arange(points + 1) * step, raw / floor, floor, upper, lower, cell)
+
+
+def _floor(raw: Signal, points_per_cell: float) -> Signal:
+    """Running median over about 20 cells (1.19 = mean over median of a two-pair power), thinned for speed."""
+    thin = max(1, int(points_per_cell))
+    width = max(5, int(20 * points_per_cell / thin)) | 1
+    coarse = raw[::thin]
+    smooth = 1.19 * median_filter(coarse, size=width, mode="nearest")
+    return np.asarray(np.interp(np.arange(raw.size), np.arange(coarse.size) * thin, smooth) + 1e-300)
+
+
+@dataclass(frozen=True)
+class Demodulated:
+    """Block sums of x e^{-j h phi} for the harmonics used: the comb's power for any small change of phase is a sum of 64."""
+
+    harmonic: NDArray[np.int64]
+    sums: Vector
+    time_s: Signal
+    noise_variance: Signal
+
+
+def demodulate(
+    vector: Vector, time_s: Signal, phase_rad: Signal, harmonics: list[int], blocks: int = DEMODULATION_BLOCKS
+) -> Demodulated:
+    """Sums per block for each +-h of `harmonics`; blocks of equal length, the rest of the record is dropped."""
+    length = vector.size // blocks
+    used = length * blocks
+    orders, sums = [], []
+    for h in harmonics:
+        turn = np.exp(-1j * h * phase_rad[:used])
+        for signed, factor in ((h, turn), (-h, np.conj(turn))):
+            orders.append(signed)
+            sums.append((vector[:used] * factor).reshape(blocks, length).sum(axis=1))
+    stacked = np.array(sums)
+    steps = np.diff(stacked, axis=1)
+    noise = 0.5 * np.median(np.abs(steps - np.median(steps, axis=1, keepdims=True)) ** 2, axis=1) / np.log(2)
+    centre = time_s[:used].reshape(blocks, length).mean(axis=1)
+    return Demodulated(np.array(orders), stacked, centre, noise)
+
+
+def captured(demodulated: Demodulated, phase_change_rad: Signal) -> float:
+    """Comb power over noise after the fundamental's phase moved by `phase_change_rad` `(blocks,)`."""
+    turn = np.exp(-1j * demodulated.harmonic[:, None] * phase_change_rad[None, :])
+    total = np.abs((demodulated.sums * turn).sum(axis=1)) ** 2
+    return float(np.sum(total / (demodulated.noise_variance + 1e-300)) / demodulated.time_s.size)
+
+
+def refine(demodulated: Demodulated, half_range_hz: float) -> tuple[float, float, float]:
+    """(frequency correction in Hz, its standard error, captured power): the peak of `captured` over a pure frequency."""
+    centre = demodulated.time_s - demodulated.time_s.mean()
+    highest = np.abs(demodulated.harmonic).max()
+    resolution = 1 / (np.ptp(demodulated.time_s) * highest)
+    grid = np.arange(-half_range_hz, half_range_hz + resolution / 8, resolution / 8)
+    power = np.array([captured(demodulated, 2 * np.pi * shift * centre) for shift in grid])
+    best = int(np.argmax(power))
+    low, high = max(best - 1, 0), min(best + 1, grid.size - 1)
+    shift = _parabola_peak(demodulated, centre, grid[low], grid[high])
+    return shift, _frequency_std(demodulated, centre, shift), captured(demodulated, 2 * np.pi * shift * centre)
+
+
+def _parabola_peak(demodulated: Demodulated, centre: Signal, low: float, high: float) -> float:
+    """Three golden-section-like shrinkings, then a parabola: the peak is smooth on this scale."""
+    for _ in range(4):
+        grid = np.linspace(low, high, 7)
+        power = [captured(demodulated, 2 * np.pi * shift * centre) for shift in grid]
+        k = int(np.clip(np.argmax(power), 1, 5))
+        low, high = grid[k - 1], grid[k + 1]
+    left, mid, right = power[k - 1], power[k], power[k + 1]
+    bend = left - 2 * mid + right
+    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return float(grid[k] + np.clip(shift, -1, 1) * (grid[1] - grid[0]))
+
+
+def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> float:
+    """Cramer-Rao bound of a comb in white noise: 1 / var = 2 sum_h (2 pi h)^2 |c_h|^2 sum_b t_b^2 / noise_b."""
+    turn = np.exp(-2j * np.pi * demodulated.harmonic[:, None] * shift * centre[None, :])
+    mean = np.abs((demodulated.sums * turn).mean(axis=1)) ** 2
+    known = np.maximum(mean - demodulated.noise_variance / centre.size, 0.0)
+    information = 2 * np.sum(
+        (2 * np.pi * demodulated.harmonic) ** 2 * known / (demodulated.noise_variance + 1e-300)
+    ) * np.sum(centre**2)
+    return float(1 / np.sqrt(information)) if information > 0 else float("inf")
+
+
+def find_peaks_above(spectrum: PairSpectrum, threshold: float, low_hz: float, high_hz: float) -> list[tuple[float, float]]:
+    """(frequency, whitened power) of local peaks, strongest first, at least 1.5 cells apart."""
+    inside = (spectrum.frequency_hz >= low_hz) & (spectrum.frequency_hz <= high_hz) & (spectrum.power > threshold)
+    found: list[tuple[float, float]] = []
+    for k in np.flatnonzero(inside)[np.argsort(-spectrum.power[inside])]:
+        f = float(spectrum.frequency_hz[k])
+        if all(abs(f - other) > 1.5 * spectrum.cell_hz for other, _ in found):
+            found.append((f, float(spectrum.power[k])))
+        if len(found) >= 60:
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class ShaftSearch:
+    """Where the shaft line can be: pole pairs, supply frequency, and the slip that the operating point suggests."""
+
+    pole_pairs: int
+    supply_hz: float
+    slip: float
+    slip_std: float
+
+    @property
+    def synchronous_hz(self) -> float:
+        return self.supply_hz / self.pole_pairs
+
+    def log_prior(self, frequency_hz: float) -> float:
+        """Gaussian in slip, cut at synchronous speed."""
+        slip = 1 - frequency_hz / self.synchronous_hz
+        return -0.5 * ((slip - self.slip) / self.slip_std) ** 2
+
+
+def shaft_candidates(spectrum: PairSpectrum, search: ShaftSearch, harmonics: int) -> list[tuple[float, float, tuple[int, ...]]]:
+    """(frequency, score, harmonics seen) of combs in the slip range, best first.
+
+    Score: capped whitened power over the lines seen, minus the operating point's misfit; a comb without its first or
+    second line pays, since every shaft has some imbalance.
+    """
+    reach = 4.0 * search.slip_std
+    low = search.synchronous_hz * (1 - min(search.slip + reach, 0.5))
+    high = search.synchronous_hz * (1 - max(search.slip - reach, 0.0))
+    step = spectrum.frequency_hz[1]
+    grid = np.arange(low, high + step, 0.5 * step / min(harmonics, 4))
+    if grid.size == 0:
+        return []
+    orders = np.arange(1, harmonics + 1)
+    values = np.array([_line_at(spectrum, grid * h) for h in orders])
+    weight = np.where(orders <= 2, 1.0, 0.7)[:, None]
+    gain = np.where(values > VISIBLE, np.minimum(values, CAP) - 0.5 * VISIBLE, 0.0) * weight
+    prior = np.array([search.log_prior(f) for f in grid])
+    score = gain.sum(axis=0) + 2 * prior + 1e-3 * np.log1p(values).sum(axis=0)
+    best: list[tuple[float, float, tuple[int, ...]]] = []
+    for k in np.argsort(-score):
+        f = float(grid[k])
+        if all(abs(f - other) > 0.7 * spectrum.cell_hz for other, _, _ in best):
+            seen = tuple(int(h) for h in orders[values[:, k] > VISIBLE])
+            best.append((f, float(score[k]), seen))
+        if len(best) >= 5:
+            break
+    return best
+
+
+def _line_at(spectrum: PairSpectrum, frequency_hz: Signal) -> Signal:
+    place = np.clip(np.round(frequency_hz / spectrum.frequency_hz[1]).astype(np.int64), 0, spectrum.power.size - 1)
+    return np.asarray(spectrum.power[place])
+
+
+def lowest_fundamental(spectrum: PairSpectrum, line_hz: float, known_hz: list[float]) -> tuple[float, tuple[int, ...]]:
+    """The fundamental whose harmonic `line_hz` is: line_hz / m with the largest gain of lines for its price.
+
+    Each further line below threshold costs; lines that belong to a comb already known do not count.
+    """
+    best, best_gain, best_seen = line_hz, -np.inf, (1,)
+    for m in range(1, 7):
+        fundamental = line_hz / m
+        if fundamental < LOWEST_LOAD_HZ:
+            break
+        orders = np.arange(1, max(4 * m, 8) + 1)
+        orders = orders[orders * fundamental <= spectrum.frequency_hz[-1]]
+        values = spectrum.at(orders * fundamental, 0.4)
+        foreign = np.array([any(_is_multiple(h * fundamental, f, spectrum.cell_hz) for f in known_hz) for h in orders])
+        seen = (values > VISIBLE) & ~foreign
+        gain = np.sum(np.where(seen, np.minimum(values, CAP), 0.0)) - 6.0 * m
+        if gain > best_gain + 1e-9:
+            best, best_gain, best_seen = fundamental, gain, tuple(int(h) for h in orders[seen])
+    return best, best_seen
+
+
+def _is_multiple(frequency_hz: float, fundamental_hz: float, tolerance_hz: float) -> bool:
+    order = max(round(frequency_hz / fundamental_hz), 1)
+    return bool(abs(frequency_hz - order * fundamental_hz) < 1.5 * tolerance_hz)
+
+
+def is_product(frequency_hz: float, combs_hz: list[float], supply_hz: float, tolerance_hz: float) -> bool:
+    """True where the line is a sum or difference of known combs and even mains harmonics: mixing, not a load."""
+    multiples = [np.arange(-12, 13) * f if k == 0 else np.arange(-6, 7) * f for k, f in enumerate(combs_hz)]
+    mains = np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 6.0, -6.0]) * supply_hz
+    sums = mains
+    for group in multiples:
+        sums = (sums[:, None] + group[None, :]).ravel()
+    return bool(np.any(np.abs(sums - frequency_hz) < tolerance_hz))
+
+
+def speed_frame(frame: TurningFrame, part: slice) -> tuple[Vector, Signal]:
+    """The segment's current and its times from zero at the middle."""
+    time = frame.time_s[part]
+    return frame.current_a[part], time - 0.5 * (time[0] + time[-1])
