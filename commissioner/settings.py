@@ -60,6 +60,7 @@ class _Limits(_File):
 
 class _Excitation(_File):
     seconds: Annotated[float, Field(ge=2, le=600)]
+    staircase_seconds: Annotated[float, Field(ge=1, le=120)]
     first_scale: Annotated[float, Field(gt=0, le=0.5)]
     scale_ramp_per_s: Annotated[float, Field(gt=0, le=10)]
 
@@ -91,23 +92,23 @@ def load_motor(name_or_path: str) -> Nameplate:
     model = _load(path, MotorFile)
     nameplate = Nameplate(**model.model_dump(exclude={"name"}))
     for problem in check(nameplate):
-        raise ConfigurationError(
-            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
-        )
+        raise ConfigurationError(file=str(path), key=problem.key, value=problem.value, expected=problem.expected)
     return nameplate
 
 
-def load_procedure(path: Path | None = None) -> ProcedurePlan:
-    """The procedure's plan from `path` or from the file that ships with the product."""
+def load_procedure(path: Path | None = None, axes_deg: tuple[float, ...] | None = None) -> ProcedurePlan:
+    """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     model = _load(source, ProcedureFile)
     if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
         raise ConfigurationError(
-            file=str(source), key="supervision.watchdog_s", value=model.supervision.watchdog_s,
+            file=str(source),
+            key="supervision.watchdog_s",
+            value=model.supervision.watchdog_s,
             expected=f"at most supervision.max_watchdog_s = {model.supervision.max_watchdog_s} s",
         )
     return ProcedurePlan(
-        axes_deg=tuple(model.axes.orientations_deg),
+        axes_deg=axes_deg or tuple(model.axes.orientations_deg),
         repeat_first=model.axes.repeat_first,
         supervision=Supervision(**model.supervision.model_dump()),
         limits=Limits(**model.limits.model_dump()),
@@ -120,11 +121,16 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file of bounded size."""
     if not path.is_file():
         raise UsageError(
-            f"there is no file {path}", step="read configuration", value=str(path), limit="an existing TOML file",
+            f"there is no file {path}",
+            step="read configuration",
+            value=str(path),
+            limit="an existing TOML file",
             remedy="check the path",
         )
     if path.stat().st_size > MAX_BYTES:
-        raise ConfigurationError(file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected="at most 1 MB")
+        raise ConfigurationError(
+            file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected="at most 1 MB"
+        )
     try:
         return tomllib.loads(path.read_text("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -141,8 +147,11 @@ def _resolve(name_or_path: str, folder: str) -> Path:
     if not shipped.is_file():
         known = ", ".join(sorted(p.stem for p in (CONFIG_FOLDER / folder).glob("*.toml")))
         raise UsageError(
-            f"there is no {folder[:-1]} named {name_or_path!r}", step="read configuration", value=name_or_path,
-            limit=f"one of: {known}", remedy="give one of these names or the path of a .toml file",
+            f"there is no {folder[:-1]} named {name_or_path!r}",
+            step="read configuration",
+            value=name_or_path,
+            limit=f"one of: {known}",
+            remedy="give one of these names or the path of a .toml file",
         )
     return shipped
 
@@ -151,7 +160,9 @@ def _load(path: Path, model: type[Model]) -> Model:
     try:
         return model.model_validate(read_toml(path))
     except ValidationError as error:
-        first = error.errors()[0]
+        first = min(
+            error.errors(), key=lambda problem: problem["type"] != "extra_forbidden"
+        )  # a misspelt key explains a missing one
         key = ".".join(str(part) for part in first["loc"])
         raise ConfigurationError(
             file=str(path), key=key, value=_shown(first), expected=_expected(model, first)

@@ -17,7 +17,11 @@ from typer.exceptions import TyperException
 from commissioner.errors import CommissionerError
 
 app = typer.Typer(
-    name="commissioner", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+    name="commissioner",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
     help="Commission an induction motor at standstill: identify it through its drive, judge the result, write it back.",
 )
 runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
@@ -26,9 +30,16 @@ app.add_typer(runs_app, name="runs")
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
 Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
-Drive = Annotated[str, typer.Option("--drive", help="tcp://host:port?device=1, tls://host:802?..., rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1")]
+Drive = Annotated[
+    str,
+    typer.Option(
+        "--drive", help="tcp://host:port?device=1, tls://host:802?..., rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1"
+    ),
+]
 Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in config/drives or a .toml file.")]
-Procedure = Annotated[Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")]
+Procedure = Annotated[
+    Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
+]
 RUNS = Path("runs")
 
 
@@ -36,22 +47,30 @@ RUNS = Path("runs")
 def demo(
     json: Json = False,
     runs: Runs = RUNS,
-    scenario: Annotated[str, typer.Option(help="Scenario of the simulated inverter: a name or a .toml file.")] = "default",
+    scenario: Annotated[
+        str, typer.Option(help="Scenario of the simulated inverter: a name or a .toml file.")
+    ] = "default",
     speed: Annotated[str, typer.Option(help="Pace of the simulated inverter: 1, N or max.")] = "max",
     seed: Annotated[int, typer.Option(help="Seed of the simulated noise.")] = 1,
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
 ) -> None:
     """The whole job against the simulated inverter, started as its own process on loopback."""
-    from commissioner.cli.demo import demo as verb  # noqa: PLC0415
+    from commissioner.cli.demo import demo as verb
 
     verb(scenario=scenario, speed=speed, seed=seed, axes=axes, write_back=write_back, runs=runs, as_json=json)
 
 
 @app.command()
-def check(drive: Drive, profile: Profile = "simulated", motor: Motor = "motor_2kw2", procedure: Procedure = None, json: Json = False) -> None:
+def check(
+    drive: Drive,
+    profile: Profile = "simulated",
+    motor: Motor = "motor_2kw2",
+    procedure: Procedure = None,
+    json: Json = False,
+) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
-    from commissioner.cli.check import check as verb  # noqa: PLC0415
+    from commissioner.cli.check import check as verb
 
     verb(drive=drive, profile=profile, motor=motor, procedure=procedure, as_json=json)
 
@@ -69,11 +88,18 @@ def run(
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
-    from commissioner.cli.run import run as verb  # noqa: PLC0415
+    from commissioner.cli.run import run as verb
 
     verb(
-        drive=drive, profile=profile, motor=motor, axes=axes, write_back=write_back, yes=yes, procedure=procedure,
-        runs=runs, as_json=json,
+        drive=drive,
+        profile=profile,
+        motor=motor,
+        axes=axes,
+        write_back=write_back,
+        yes=yes,
+        procedure=procedure,
+        runs=runs,
+        as_json=json,
     )
 
 
@@ -85,7 +111,7 @@ def identify(
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline."""
-    from commissioner.cli.identify import identify as verb  # noqa: PLC0415
+    from commissioner.cli.identify import identify as verb
 
     verb(files, motor=motor, estimator=estimator, as_json=json)
 
@@ -93,15 +119,19 @@ def identify(
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.runs import list_runs  # noqa: PLC0415
+    from commissioner.cli.runs import list_runs
 
     list_runs(runs, as_json=json)
 
 
 @runs_app.command("show")
-def runs_show(run: Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")], runs: Runs = RUNS, json: Json = False) -> None:
+def runs_show(
+    run: Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")],
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
     """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.runs import show_run  # noqa: PLC0415
+    from commissioner.cli.runs import show_run
 
     show_run(runs, run, as_json=json)
 
@@ -135,7 +165,7 @@ def main() -> None:
 
 
 def _say(error: CommissionerError, as_json: bool) -> None:
-    from commissioner.cli import screen  # noqa: PLC0415
+    from commissioner.cli import screen
 
     if as_json:
         screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
@@ -144,17 +174,24 @@ def _say(error: CommissionerError, as_json: bool) -> None:
 
 
 def _usage(error: Exception) -> CommissionerError:
-    from commissioner.errors import UsageError  # noqa: PLC0415
+    from commissioner.errors import UsageError
 
     text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return UsageError(text, step="command line", value=" ".join(sys.argv[1:]), limit="see --help", remedy="correct the call")
+    return UsageError(
+        text, step="command line", value=" ".join(sys.argv[1:]), limit="see --help", remedy="correct the call"
+    )
 
 
 def _internal(surprise: Exception) -> CommissionerError:
     """A defect of ours: the traceback goes to a file, the person gets a sentence."""
-    with tempfile.NamedTemporaryFile("w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8") as file:
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
         traceback.print_exception(surprise, file=file)
     return CommissionerError(
-        f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step=" ".join(sys.argv[1:2]) or "start",
-        value=type(surprise).__name__, limit="no such error", remedy=f"please report it with the file {file.name}",
+        f"a defect in commissioner: {type(surprise).__name__}: {surprise}",
+        step=" ".join(sys.argv[1:2]) or "start",
+        value=type(surprise).__name__,
+        limit="no such error",
+        remedy=f"please report it with the file {file.name}",
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -33,7 +35,9 @@ def failure(error: CommissionerError) -> None:
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:
     """A rich table; `right` lists the columns that hold numbers."""
-    made = Table(title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False)
+    made = Table(
+        title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
+    )
     for index, name in enumerate(header):
         made.add_column(name, justify="right" if index in set(right) else "left", no_wrap=index == 0)
     for row in rows:
@@ -48,9 +52,69 @@ def shown(value: object) -> str:
 
 def quantity(value: float, std: float, unit: str) -> str:
     """`3.702 +- 0.011 ohm`, rounded to two digits of the standard error."""
-    import math  # noqa: PLC0415
-
     if not (math.isfinite(std) and std > 0):
         return f"{value:.4g} {unit}"
     digits = max(0, 1 - math.floor(math.log10(std)))
     return f"{value:.{digits}f} ± {std:.{digits}f} {unit}"
+
+
+_MARKS = {
+    "commissioned": "[green]✓ commissioned[/]",
+    "rejected": "[yellow]✗ rejected[/]",
+    "aborted": "[yellow]■ aborted[/]",
+    "faulted": "[red]✗ faulted[/]",
+}
+ROWS = (
+    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
+    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
+    ("leakage_inductance_h", "leakage inductance L_σ", 1e3, "mH"),
+    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
+    ("rotor_time_constant_s", "rotor time constant", 1e3, "ms"),
+)
+
+
+def outcome_mark(outcome: str) -> str:
+    """The outcome in its colour; a run that was cut off is red."""
+    return _MARKS.get(outcome, f"[red]? {outcome}[/]")
+
+
+def result(document: Mapping[str, Any]) -> None:
+    """A run's result as the technician reads it."""
+    out.print()
+    out.print(f"[bold]{outcome_mark(document['outcome'])}[/]  {escape(str(document['reason']))}")
+    error = document.get("error")
+    if error:
+        for name in ("step", "value", "limit", "remedy"):
+            if error.get(name) not in (None, ""):
+                out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name]))}")
+    if document.get("parameters"):
+        out.print(
+            table(
+                "",
+                ("", "value", "std error", "in the drive before", "change", "written"),
+                _rows(document),
+                right=(1, 2, 3, 4),
+            )
+        )
+        for remark in document.get("remarks", ()):
+            out.print(f"  [dim]•[/] {escape(remark)}")
+    out.print(f"  energised {document['energised_s']:.1f} s in all")
+
+
+def _rows(document: Mapping[str, Any]) -> Iterable[Sequence[str]]:
+    before = document.get("before") or {}
+    written = {row["field"] for row in document.get("written", ())}
+    for name, words, factor, unit in ROWS:
+        quantity_ = document["parameters"].get(name)
+        if quantity_ is None:
+            continue
+        value, std = quantity_["value"], quantity_["std"]
+        old = before.get(name)
+        yield (
+            words,
+            f"{factor * value:.4g} {unit}",
+            f"{100 * std / abs(value):.2f} %",
+            "" if old is None else f"{factor * old:.4g} {unit}",
+            "" if not old else f"{100 * (value / old - 1):+.1f} %",
+            "yes" if name in written else "",
+        )

@@ -47,10 +47,18 @@ def judge_drive(
     last = statuses[-1]
     return (
         CheckResult(
-            "no fault", last.fault_code == 0, last.fault_text, "none", "remove the cause, then reset the fault at the drive"
+            "no fault",
+            last.fault_code == 0,
+            last.fault_text,
+            "none",
+            "remove the cause, then reset the fault at the drive",
         ),
         CheckResult(
-            "output off", not last.is_energised, last.state, "not enabled", "stop the drive: another master has enabled it"
+            "output off",
+            not last.is_energised,
+            last.state,
+            "not enabled",
+            "stop the drive: another master has enabled it",
         ),
         *_interlocks(last),
         _at_rest(statuses),
@@ -58,8 +66,10 @@ def judge_drive(
         _below("heatsink temperature, degC", last.heatsink_degc, limits.heatsink_max_degc, "let the drive cool down"),
         _below("winding temperature, degC", last.winding_degc, limits.winding_max_degc, "let the motor cool down"),
         CheckResult(
-            "drive rated for the test current", identity.rated_drive_current_a * math.sqrt(2) >= test_current_a,
-            round(identity.rated_drive_current_a * math.sqrt(2), 3), f"at least {test_current_a:.3g} A peak",
+            "drive rated for the test current",
+            identity.rated_drive_current_a * math.sqrt(2) >= test_current_a,
+            round(identity.rated_drive_current_a * math.sqrt(2), 3),
+            f"at least {test_current_a:.3g} A peak",
             "lower limits.current_fraction or use a larger drive",
         ),
         *_same_motor(drive_nameplate, nameplate),
@@ -84,8 +94,11 @@ def _interlocks(status: DriveStatus) -> Iterator[CheckResult]:
 def _at_rest(statuses: Sequence[DriveStatus]) -> CheckResult:
     fastest = max(abs(status.shaft_speed_rad_per_s) for status in statuses)
     return CheckResult(
-        "shaft at rest over the dwell time", fastest <= REST_SPEED_RAD_PER_S, round(fastest, 3),
-        f"at most {REST_SPEED_RAD_PER_S} rad/s", "stop whatever turns the shaft",
+        "shaft at rest over the dwell time",
+        fastest <= REST_SPEED_RAD_PER_S,
+        round(fastest, 3),
+        f"at most {REST_SPEED_RAD_PER_S} rad/s",
+        "stop whatever turns the shaft",
     )
 
 
@@ -93,19 +106,27 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
     volts = [status.dc_link_v for status in statuses]
     in_range = all(limits.dc_link_min_v <= v <= limits.dc_link_max_v for v in volts)
     yield CheckResult(
-        "DC link in range", in_range, round(volts[-1], 1), f"{limits.dc_link_min_v:g} ... {limits.dc_link_max_v:g} V",
+        "DC link in range",
+        in_range,
+        round(volts[-1], 1),
+        f"{limits.dc_link_min_v:g} ... {limits.dc_link_max_v:g} V",
         "check the supply voltage and the pre-charge",
     )
     change = (max(volts) - min(volts)) / max(abs(volts[-1]), 1.0)
     yield CheckResult(
-        "DC link steady", change <= DC_LINK_RIPPLE, f"{change:.2%}", f"at most {DC_LINK_RIPPLE:.0%}",
+        "DC link steady",
+        change <= DC_LINK_RIPPLE,
+        f"{change:.2%}",
+        f"at most {DC_LINK_RIPPLE:.0%}",
         "wait until the link has charged",
     )
 
 
 def _below(name: str, value: float, limit: float, remedy: str) -> CheckResult:
     """NaN means that no sensor is fitted, which is not a failure."""
-    return CheckResult(name, math.isnan(value) or value <= limit, "no sensor" if math.isnan(value) else round(value, 1), limit, remedy)
+    return CheckResult(
+        name, math.isnan(value) or value <= limit, "no sensor" if math.isnan(value) else round(value, 1), limit, remedy
+    )
 
 
 def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> Iterator[CheckResult]:
@@ -115,6 +136,9 @@ def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> I
     for key, value in seen.items():
         wanted = float(expected[key])
         yield CheckResult(
-            f"{key} in the drive", abs(value - wanted) <= NAMEPLATE_TOLERANCE * wanted, round(value, 4), wanted,
+            f"{key} in the drive",
+            abs(value - wanted) <= NAMEPLATE_TOLERANCE * wanted,
+            round(value, 4),
+            wanted,
             f"check which motor is connected; correct --motor or the drive's {key}",
         )

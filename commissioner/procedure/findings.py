@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from commissioner.procedure.checks import CheckResult
+from commissioner.records import DriveIdentity, WrittenParameter
 
 
 @dataclass(frozen=True)
@@ -13,6 +14,11 @@ class StateEntered:
     state: str
     because: str
     axis_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class DriveIdentified(DriveIdentity):
+    """Who answered."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,7 @@ class EstimateUpdated:
 
     axis_deg: float
     time_s: float
+    planned_s: float
     parameters: tuple[float, float, float, float]
     std: tuple[float, float, float, float]
     scale: float
@@ -94,3 +101,21 @@ class RunEnded:
     reason: str
     energised_s: float
     error: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True)
+class ParametersWritten:
+    """Staged, verified, committed, stored, verified."""
+
+    written: tuple[WrittenParameter, ...]
+    store_count: int
+    wear_fraction: float | None
+
+
+@dataclass(frozen=True)
+class StepProgress:
+    """How far an energised step without an estimate is; shown, not judged."""
+
+    axis_deg: float
+    fraction: float
+    numbers: str

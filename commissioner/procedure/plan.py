@@ -27,6 +27,7 @@ class Limits:
 @dataclass(frozen=True)
 class ExcitationPlan:
     seconds: float
+    staircase_seconds: float
     first_scale: float
     scale_ramp_per_s: float
 
@@ -55,3 +56,8 @@ class ProcedurePlan:
     def tests_deg(self) -> tuple[float, ...]:
         """The orientations in the order they are tested."""
         return (*self.axes_deg, self.axes_deg[0]) if self.repeat_first and len(self.axes_deg) > 1 else self.axes_deg
+
+    @property
+    def total_seconds(self) -> float:
+        """About how long the motor will be energised, without the stretch of slow rotors."""
+        return len(self.tests_deg) * (self.excitation.seconds + self.excitation.staircase_seconds)

@@ -69,7 +69,7 @@ TRANSITIONS = MappingProxyType(
 )
 
 
-class IllegalTransition(Exception):  # noqa: N818 - a programming error, not part of the user's error tree
+class IllegalTransition(Exception):
     """An event came in a state that has no row for it."""
 
 

@@ -6,47 +6,29 @@ Nothing here knows a socket, a file or a clock; a scripted drive tests every pat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Generator
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from commissioner.errors import Aborted, CheckFailed, SamplesLost
-from commissioner.identify import convergence, excitation, resistance
+from commissioner.errors import CheckFailed
 from commissioner.identify.analysis import Identification, identify
-from commissioner.identify.excitation import Excitation, ExcitationLimits
-from commissioner.identify.flux import FluxAdvice, FluxGuard
-from commissioner.identify.observer import BlockEstimate, ParallelObserver
 from commissioner.identify.resistance import Staircase
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
+from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble
-from commissioner.procedure.checks import DriveLimits, judge_drive
-from commissioner.procedure.findings import (
-    AxisFinished,
-    ChecksJudged,
-    EstimateUpdated,
-    ExcitationChosen,
-    GuardActed,
-    StaircaseFitted,
-    VerdictReached,
-)
+from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
+from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
-from commissioner.procedure.verdict import Verdict, decide
-from commissioner.records import DriveIdentity, ParameterSnapshot, SampleBlock
+from commissioner.procedure.verdict import Decision, Evidence, Verdict, as_inverse_gamma, decide
+from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
     ArmWatchdog,
     Command,
-    Disarm,
-    Enable,
-    Fetch,
     Identify,
-    LoadExcitation,
     ReadNameplate,
     ReadStatus,
-    SetBias,
     SetDriveLimits,
-    SetScale,
     TakeSnapshot,
     Tell,
     Wait,
@@ -55,3 +37,145 @@ from commissioner.safety.commands import (
 
 Step = Generator[Command, Any, Event]
 """What a state's generator is: yields commands, is sent replies, returns an event."""
+
+DWELL_READINGS = 4
+"""Status readings spread over the standstill dwell time."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the run was asked to do, and on what."""
+
+    plan: ProcedurePlan
+    nameplate: Nameplate
+    drive_limits: DriveLimits
+    parameter_names: dict[str, str]
+    """The drive's name of each written parameter -> the inverse-Gamma field it takes."""
+    write_back: bool
+    link_latency_s: float
+
+    @property
+    def rated_current_peak_a(self) -> float:
+        return math.sqrt(2) * self.nameplate.rated_current_a
+
+    @property
+    def test_current_a(self) -> float:
+        """The largest phase current that any test aims at, peak."""
+        return self.plan.limits.current_fraction * self.rated_current_peak_a
+
+    @property
+    def trip_current_a(self) -> float:
+        return self.plan.limits.trip_fraction * self.rated_current_peak_a
+
+    @property
+    def test_voltage_v(self) -> float:
+        """No test needs more along the axis: 30 % of the rated phase voltage's peak."""
+        return 0.3 * math.sqrt(2 / 3) * self.nameplate.rated_voltage_v
+
+    @property
+    def stretch(self) -> float:
+        """All test times hold for rotor time constants up to 0.5 s and are stretched in proportion beyond."""
+        return max(1.0, prior(self.nameplate).typical.rotor_time_constant_s / 0.5)
+
+    @property
+    def axis_time_s(self) -> float:
+        """Longest energised time of one session."""
+        return self.plan.limits.axis_time_s * self.stretch
+
+    @property
+    def total_time_s(self) -> float:
+        """Longest energised time of the run."""
+        return self.plan.limits.total_time_s * self.stretch
+
+    def flux_limit_wb(self, stator_resistance_ohm: float) -> float:
+        """The stator-flux peak at which the guard acts."""
+        return self.plan.limits.flux_fraction * rated_flux(self.nameplate, stator_resistance_ohm).stator_peak_wb
+
+
+@dataclass
+class Findings:
+    """What one run has learnt so far; the report is made from it however the run ends."""
+
+    identity: DriveIdentity | None = None
+    snapshot: ParameterSnapshot | None = None
+    checks: tuple[CheckResult, ...] = ()
+    tests_done: int = 0
+    staircases: list[Staircase] = field(default_factory=list)
+    estimate: InverseGamma | None = None
+    blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)
+    segment: int = -1
+    peak_flux_fraction: float = 0.0
+    guard_acted: bool = False
+    identification: Identification | None = None
+    verdict: Verdict | None = None
+    written: tuple[WrittenParameter, ...] = ()
+
+
+def connect(job: Job, findings: Findings) -> Step:
+    """Who is at the other end."""
+    identity: DriveIdentity = yield Identify()
+    findings.identity = identity
+    yield Tell(DriveIdentified(**asdict(identity)))
+    return Event.IDENTIFIED
+
+
+def check(job: Job, findings: Findings) -> Step:
+    """Everything that must hold before the first volt; arms the watchdog and sets the drive's own limits."""
+    assert findings.identity is not None
+    plate = yield ReadNameplate()
+    statuses: list[DriveStatus] = [(yield ReadStatus())]
+    for _ in range(DWELL_READINGS - 1):
+        yield Wait(job.plan.supervision.standstill_dwell_s / (DWELL_READINGS - 1))
+        statuses.append((yield ReadStatus()))
+    results = judge_drive(findings.identity, statuses, plate, job.nameplate, job.drive_limits, job.test_current_a)
+    findings.checks = results
+    yield Tell(ChecksJudged(results))
+    failed = next((result for result in results if not result.has_passed), None)
+    if failed is not None:
+        raise CheckFailed(
+            f"check failed: {failed.name}", step="check", value=failed.value, limit=failed.limit, remedy=failed.remedy
+        )
+    findings.snapshot = yield TakeSnapshot()
+    yield ArmWatchdog(job.plan.supervision.watchdog_s)
+    yield SetDriveLimits(
+        min(job.trip_current_a, findings.identity.rated_drive_current_a * math.sqrt(2)),
+        job.test_voltage_v,
+        job.axis_time_s,
+    )
+    return Event.CHECKS_PASSED
+
+
+def judge(job: Job, findings: Findings) -> Step:
+    """All segments together, by the same code as `identify` uses offline; then the verdict."""
+    recording = assemble(findings.blocks, {}, "live run")
+    assert recording is not None
+    identification = identify(recording, job.nameplate)
+    findings.identification = identification
+    evidence = Evidence(
+        combined=identification.parameters,
+        axes=tuple((axis.axis_deg, axis.parameters) for axis in identification.axes),
+        disagreements=tuple(identification.disagreements),
+    )
+    verdict = decide(evidence, prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
+    findings.verdict = verdict
+    first = verdict.objections[0] if verdict.objections else None
+    yield Tell(
+        VerdictReached(
+            verdict.decision.value,
+            verdict.reason,
+            first.value if first else None,
+            first.limit if first else None,
+            first.remedy if first else "",
+        )
+    )
+    return {Decision.WRITE_BACK: Event.WRITE_BACK, Decision.KEEP: Event.KEEP, Decision.REJECT: Event.REJECT}[
+        verdict.decision
+    ]
+
+
+def write(job: Job, findings: Findings) -> Step:
+    """The accepted values into the drive, verified; the runner restores the snapshot where that fails."""
+    assert findings.identification is not None
+    values = asdict(as_inverse_gamma(findings.identification.parameters))
+    findings.written = yield WriteParameters({name: values[part] for name, part in job.parameter_names.items()})
+    return Event.VERIFIED

@@ -44,7 +44,10 @@ def read_table(path: Path) -> Table:
     """The table in `path`. Raises UsageError where there is no such file, DataRefused where it is not a table."""
     if not path.is_file():
         raise UsageError(
-            f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
+            f"there is no file {path}",
+            step="read recording",
+            value=str(path),
+            limit="an existing file",
             remedy="check the path",
         )
     if path.stat().st_size > MAX_BYTES:
@@ -53,10 +56,20 @@ def read_table(path: Path) -> Table:
         if path.suffix == ".parquet":
             return _read_parquet(path)
         return _read_csv(path)
-    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OSError, UnicodeDecodeError, EOFError) as error:
+    except (
+        pa.ArrowInvalid,
+        pa.ArrowTypeError,
+        pa.ArrowNotImplementedError,
+        OSError,
+        UnicodeDecodeError,
+        EOFError,
+    ) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise _refuse(
-            path, "the file is not a readable table", reason, "CSV with one header line, or Parquet",
+            path,
+            "the file is not a readable table",
+            reason,
+            "CSV with one header line, or Parquet",
             "export the recording again in the documented format",
         ) from error
 
@@ -133,8 +146,11 @@ def sample_period(table: Table, segment: Signal) -> float:
     steps = np.diff(time)[np.diff(segment) == 0]
     if steps.size == 0 or np.any(steps <= 0):
         raise _refuse(
-            table.source, "time does not run forward inside a segment", float(steps.min()) if steps.size else None,
-            "steps above 0 s", "sort the rows by time and number the segments",
+            table.source,
+            "time does not run forward inside a segment",
+            float(steps.min()) if steps.size else None,
+            "steps above 0 s",
+            "sort the rows by time and number the segments",
         )
     named = table.metadata.get("sample_period_s")
     period = float(named) if named not in (None, "") else float(np.median(steps))  # type: ignore[arg-type]
@@ -143,7 +159,9 @@ def sample_period(table: Table, segment: Signal) -> float:
     worst = int(np.argmax(deviation))
     if deviation[worst] > STEP_TOLERANCE:
         raise _refuse(
-            table.source, "the time steps are not equal", float(steps[worst]),
+            table.source,
+            "the time steps are not equal",
+            float(steps[worst]),
             f"multiples of {period:.6g} s within {STEP_TOLERANCE:.0%}",
             "record at a fixed rate, or resample with known time stamps",
         )
@@ -195,13 +213,14 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
             values = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
         elif name in _KNOWN:
-            raise _refuse(path, f"column {name} is not numeric", str(column[0]), "numbers in SI units", "decimal points, no units")
+            raise _refuse(
+                path, f"column {name} is not numeric", str(column[0]), "numbers in SI units", "decimal points, no units"
+            )
     return Table(columns, metadata, str(path))
 
 
 _KNOWN = frozenset(
-    "time_s segment axis_deg voltage_axis_v current_u_a current_v_a current_w_a dc_link_v voltage_u_v voltage_v_v "
-    "voltage_w_v voltage_uv_v voltage_vw_v voltage_wu_v speed_rad_per_s".split()
+    ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v", "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s"]
 )
 
 
@@ -218,7 +237,9 @@ def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
         elif math.isfinite(number):
             typed[key] = number
         elif key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}:
-            raise _refuse(path, f"metadata {key} is not a number", value, "a finite number in SI units", f"correct {key}")
+            raise _refuse(
+                path, f"metadata {key} is not a number", value, "a finite number in SI units", f"correct {key}"
+            )
         else:
             typed[key] = value
     return typed
@@ -228,7 +249,10 @@ def _require(table: Table, names: Sequence[str], what: str) -> None:
     missing = [name for name in names if name not in table.columns]
     if missing:
         raise _refuse(
-            table.source, f"{what} needs the column {missing[0]}", ", ".join(table.columns), ", ".join(names),
+            table.source,
+            f"{what} needs the column {missing[0]}",
+            ", ".join(table.columns),
+            ", ".join(names),
             "rename or add the columns: " + ", ".join(missing),
         )
 
@@ -239,8 +263,11 @@ def _require_finite(table: Table, names: Sequence[str]) -> None:
         if bad.any():
             row = int(np.argmax(bad))
             raise _refuse(
-                table.source, f"column {name} holds {int(bad.sum())} values that are not numbers", f"row {row}",
-                "finite numbers", "leave lost samples out as missing rows: gaps are honoured, filled values are not",
+                table.source,
+                f"column {name} holds {int(bad.sum())} values that are not numbers",
+                f"row {row}",
+                "finite numbers",
+                "leave lost samples out as missing rows: gaps are honoured, filled values are not",
             )
 
 

@@ -20,11 +20,28 @@ BLUE, ORANGE, GREEN, RED, PURPLE = "#1f5fa8", "#c8641b", "#2c7a4b", "#b3261e", "
 """The figures' colours, apart in hue and in lightness (they survive grey printing and red-green blindness)."""
 
 PLOT_STYLE = {
-    "font.family": "DejaVu Sans", "font.size": 9.0, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.titlesize": 10.0,
-    "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.spines.top": False, "axes.spines.right": False,
-    "axes.grid": True, "grid.color": RULE, "grid.linewidth": 0.6, "xtick.color": MUTED, "ytick.color": MUTED,
-    "text.color": INK, "legend.frameon": False, "legend.fontsize": 8.0, "lines.linewidth": 1.2, "figure.dpi": 110,
-    "svg.fonttype": "none", "svg.hashsalt": "commissioner", "figure.constrained_layout.use": True,
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": RULE,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.2,
+    "figure.dpi": 110,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "commissioner",
+    "figure.constrained_layout.use": True,
 }
 
 
@@ -66,7 +83,7 @@ class Page:
 
 def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
     """The figure as inline SVG, or as an inline PNG where it holds more points than a browser likes."""
-    import base64  # noqa: PLC0415
+    import base64
 
     buffer = io.BytesIO()
     if raster:

@@ -1,12 +1,12 @@
 """The run folder: every sample, every decision, nothing torn.
 
-    <runs>/<run id>/                 0700
-        journal.jsonl                one record a line; flushed and synced before anything energises or writes
-        blocks.bin                   the samples as they came, each block with its length and check sum
-        recording.parquet            the same samples in the contract's format, made when the run ends
-        snapshot.json                the drive's parameters as they were found (what `restore` writes back)
-        result.json  report.html     what the technician gets
-        drive.toml motor.json plan.json   what the run was asked to do
+<runs>/<run id>/                 0700
+    journal.jsonl                one record a line; flushed and synced before anything energises or writes
+    blocks.bin                   the samples as they came, each block with its length and check sum
+    recording.parquet            the same samples in the contract's format, made when the run ends
+    snapshot.json                the drive's parameters as they were found (what `restore` writes back)
+    result.json  report.html     what the technician gets
+    drive.toml motor.json plan.json   what the run was asked to do
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ import numpy as np
 
 from commissioner.errors import UsageError
 from commissioner.procedure.assembly import assemble, columns
-from commissioner.records import SampleBlock
 from commissioner.recordings.table import write_table
+from commissioner.records import SampleBlock
 
 _RECORD = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
 _HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
@@ -58,7 +58,10 @@ class RunFolder:
                 continue
             return cls(path)
         raise UsageError(
-            f"no new run folder can be made in {root}", step="archive", value=str(root), limit="a writable folder",
+            f"no new run folder can be made in {root}",
+            step="archive",
+            value=str(root),
+            limit="a writable folder",
             remedy="give another folder with --runs",
         )
 
@@ -155,8 +158,15 @@ def plain(value: Any) -> Any:
 def _encode(block: SampleBlock, segment: int) -> bytes:
     flags = (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
     header = _HEADER.pack(
-        segment, block.session, block.first_index, block.count, block.lost_before,
-        block.sample_period_s, block.axis_deg, block.dc_link_v, flags,
+        segment,
+        block.session,
+        block.first_index,
+        block.count,
+        block.lost_before,
+        block.sample_period_s,
+        block.axis_deg,
+        block.dc_link_v,
+        flags,
     )
     signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
     if block.current_w_a is not None:
@@ -168,8 +178,15 @@ def _decode(payload: bytes) -> tuple[int, SampleBlock]:
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
     signals = np.frombuffer(payload, "<f8", offset=_HEADER.size).reshape(-1, count).astype(np.float64)
     return segment, SampleBlock(
-        session=session, first_index=first, sample_period_s=period, axis_deg=axis,
-        voltage_axis_v=signals[0], current_u_a=signals[1], current_v_a=signals[2],
+        session=session,
+        first_index=first,
+        sample_period_s=period,
+        axis_deg=axis,
+        voltage_axis_v=signals[0],
+        current_u_a=signals[1],
+        current_v_a=signals[2],
         current_w_a=signals[3] if flags & _HAS_W else None,
-        dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
+        dc_link_v=link,
+        lost_before=lost,
+        clipped=bool(flags & _CLIPPED),
     )

@@ -1,7 +1,7 @@
 """Carries a procedure out on a real drive. This file holds the only `finally` that de-energises.
 
-Each command passes `safety.limits` before the wire; each block and status passes `safety.watch` after it. What energises
-or writes is in the journal, on the disk, before it goes out.
+Each command passes `safety.limits` before the wire; each block and status passes `safety.watch` after it. The inverter
+journals, on the disk, what energises or writes before it goes out.
 """
 
 from __future__ import annotations
@@ -10,15 +10,16 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
 from types import FrameType
 from typing import Any
 
 from commissioner.errors import Aborted, CommissionerError, DriveFault
 from commissioner.link.inverter import Inverter
-from commissioner.procedure.findings import EstimateUpdated, RunEnded, VerdictReached
-from commissioner.records import SampleBlock
+from commissioner.procedure.findings import EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
+from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
+from commissioner.registers.window import StreamCursor
 from commissioner.run.archive import RunFolder
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -30,6 +31,8 @@ EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
 STALL_S = 2.0
 """Wall time without any new sample after which the stream counts as dead."""
+
+CHANNELS = ("voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
 
 Course = Generator[ask.Command, Any, RunEnded]
 Present = Callable[[object], None]
@@ -59,6 +62,8 @@ class Runner:
         self._present = present
         self._progress = _Progress()
         self._stop = OperatorStop()
+        self._cursor: StreamCursor | None = None
+        self._snapshot: ParameterSnapshot | None = None
 
     @property
     def energised_s(self) -> float:
@@ -77,7 +82,8 @@ class Runner:
             except Exception as defect:  # a defect must not leave a motor energised or a run without an end
                 self._folder.journal("defect", traceback.format_exc())
                 error = CommissionerError(
-                    f"a defect in commissioner: {type(defect).__name__}: {defect}", step="run",
+                    f"a defect in commissioner: {type(defect).__name__}: {defect}",
+                    step="run",
                     remedy="please report it with the run folder",
                 )
             finally:
@@ -92,7 +98,10 @@ class Runner:
         while True:
             if self._stop.asked:
                 raise Aborted(
-                    "stopped by the operator", step="run", value=self._stop.asked, limit="no stop",
+                    "stopped by the operator",
+                    step="run",
+                    value=self._stop.asked,
+                    limit="no stop",
                     remedy="start again when ready",
                 )
             try:
@@ -107,13 +116,14 @@ class Runner:
         refusal = permit(command, self._progress.facts, self._bounds)
         if refusal is not None:
             raise Aborted(
-                f"not sent: {refusal.what}", step=type(command).__name__, value=refusal.value, limit=refusal.limit,
+                f"not sent: {refusal.what}",
+                step=type(command).__name__,
+                value=refusal.value,
+                limit=refusal.limit,
                 remedy=refusal.remedy,
             )
-        if command.energises or command.writes:
-            self._folder.journal("about_to", {"command": type(command).__name__, "with": command}, durable=True)
         reply = self._send(command)
-        self._progress.facts = after(command, reply, self._progress.facts)
+        self._progress.facts = after(command, self._progress.facts)
         return reply
 
     def _send(self, command: ask.Command) -> object:
@@ -134,44 +144,54 @@ class Runner:
             case ask.ReadStatus():
                 return inverter.read_status()
             case ask.TakeSnapshot():
-                snapshot = inverter.snapshot()
-                self._folder.save("snapshot.json", snapshot)
-                return snapshot
+                return self._take_snapshot()
             case ask.Wait(seconds=seconds):
                 return time.sleep(seconds)
             case ask.ArmWatchdog(timeout_s=timeout):
-                return inverter.set_watchdog(round(timeout * 1000)) / 1000
+                return inverter.set_watchdog(1000 * timeout)
             case ask.SetDriveLimits(current_a=current, voltage_v=voltage, time_s=limit):
-                return inverter.set_limits(current, voltage, limit)
+                return inverter.set_limits(current_a=current, voltage_v=voltage, time_s=limit)
             case ask.LoadExcitation():
                 return inverter.load_excitation(
-                    command.axis_deg, command.tones, command.bias_ramp_v_per_s, command.scale_ramp_per_s, command.duration_s
+                    axis_deg=command.axis_deg,
+                    tones=command.tones,
+                    bias_v=0.0,
+                    bias_ramp_v_per_s=command.bias_ramp_v_per_s,
+                    scale=0.0,
+                    scale_ramp_per_s=command.scale_ramp_per_s,
+                    duration_s=command.duration_s,
+                    channels=CHANNELS,
                 )
             case ask.Enable():
                 return self._enable()
             case ask.Disarm(reason=reason):
                 return self._disarm(reason)
             case ask.WriteParameters(values=values):
-                return inverter.write_parameters(values)
+                return self._write(values)
             case _:
                 raise TypeError(f"no such command: {command!r}")
 
-    def _enable(self) -> object:
+    def _take_snapshot(self) -> ParameterSnapshot:
+        self._snapshot = self._inverter.snapshot()
+        self._folder.save("snapshot.json", self._snapshot)
+        return self._snapshot
+
+    def _write(self, values: Mapping[str, float]) -> tuple[WrittenParameter, ...]:
+        assert self._snapshot is not None
+        report = self._inverter.write_parameters(values, self._snapshot)
+        self._folder.journal("parameters_written", report, durable=True)
+        self._present(ParametersWritten(report.written, report.store_count_after, report.wear_fraction))
+        return report.written
+
+    def _enable(self) -> None:
         progress = self._progress
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
-        return self._inverter.enable()
+        self._cursor = self._inverter.enable()
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""
-        deadline = time.monotonic() + STALL_S
-        while (block := self._inverter.fetch()) is not None and block.count == 0:
-            if time.monotonic() > deadline:
-                raise DriveFault(
-                    "the drive sends no samples", step="stream", value=f"nothing for {STALL_S:g} s", limit="a running stream",
-                    remedy="check the drive's status; the output has been switched off",
-                )
-            time.sleep(EMPTY_FETCH_PAUSE_S)
+        block = self._next_block()
         if block is None:
             return None
         progress = self._progress
@@ -184,6 +204,26 @@ class Runner:
             progress.next_status_s = progress.session_s + STATUS_EVERY_S
             self._stop_if(judge_status(self._inverter.read_status(), self._watch))
         return block
+
+    def _next_block(self) -> SampleBlock | None:
+        assert self._cursor is not None
+        deadline = time.monotonic() + STALL_S
+        while time.monotonic() < deadline:
+            window = self._inverter.fetch(self._cursor)
+            self._cursor = window.cursor
+            if window.block is not None:
+                return window.block
+            if window.has_ended:
+                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+                return None
+            time.sleep(EMPTY_FETCH_PAUSE_S)
+        raise DriveFault(
+            "the drive sends no samples",
+            step="stream",
+            value=f"nothing for {STALL_S:g} s",
+            limit="a running stream",
+            remedy="check the drive's status; the output has been switched off",
+        )
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
-
-from commissioner.identify.excitation import Tone
 
 
 @dataclass(frozen=True)
 class Command:
-    """`energises` and `writes` commands are journalled, and the journal flushed, before they go out."""
-
-    energises: ClassVar[bool] = False
-    writes: ClassVar[bool] = False
+    """One thing to ask; what the drive answers stands behind the arrow in each docstring."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +40,9 @@ class Wait(Command):
 
 @dataclass(frozen=True)
 class ArmWatchdog(Command):
-    """-> the time-out read back from the drive, in seconds"""
+    """-> None once read back"""
 
     timeout_s: float
-    writes: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -59,27 +52,27 @@ class SetDriveLimits(Command):
     current_a: float
     voltage_v: float
     time_s: float
-    writes: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
 class LoadExcitation(Command):
-    """What the drive will generate once enabled; it starts with bias 0 and scale 0."""
+    """What the drive will generate once enabled; it starts with bias 0 and scale 0.
+
+    Tones are (amplitude in volts along the axis, frequency in Hz, phase in rad).
+    """
 
     axis_deg: float
-    tones: tuple[Tone, ...]
+    tones: tuple[tuple[float, float, float], ...]
     bias_ramp_v_per_s: float
     scale_ramp_per_s: float
     duration_s: float
-    writes: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
 class Enable(Command):
-    """Energise. -> session id"""
+    """Energise the loaded excitation."""
 
     purpose: str
-    energises: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -89,14 +82,16 @@ class Fetch(Command):
 
 @dataclass(frozen=True)
 class SetScale(Command):
+    """Steer the amplitude scale, 0 ... 1."""
+
     scale: float
-    energises: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
 class SetBias(Command):
+    """Steer the DC bias in volts along the axis."""
+
     bias_v: float
-    energises: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -108,10 +103,9 @@ class Disarm(Command):
 
 @dataclass(frozen=True)
 class WriteParameters(Command):
-    """Stage, verify, commit, store, verify. -> tuple of WrittenParameter"""
+    """Stage, verify, commit, store, verify; by the drive's names. -> tuple of WrittenParameter"""
 
     values: Mapping[str, float]
-    writes: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)

@@ -72,10 +72,10 @@ def permit(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusal | No
     return judge(command, facts, bounds) if judge is not None else None
 
 
-def after(command: Command, reply: object, facts: SafetyFacts) -> SafetyFacts:
-    """The facts once the drive has answered `command` with `reply`."""
-    if isinstance(command, ArmWatchdog) and isinstance(reply, float):
-        return replace(facts, watchdog_s=reply)
+def after(command: Command, facts: SafetyFacts) -> SafetyFacts:
+    """The facts once the drive has carried out `command` and the link has verified it."""
+    if isinstance(command, ArmWatchdog):
+        return replace(facts, watchdog_s=command.timeout_s)
     if isinstance(command, SetDriveLimits):
         return replace(facts, drive_limits=command)
     if isinstance(command, LoadExcitation):
@@ -119,7 +119,7 @@ def _judge_excitation(command: Command, facts: SafetyFacts, bounds: Bounds) -> R
     assert isinstance(command, LoadExcitation)
     if facts.energised:
         return Refusal("the excitation is not exchanged while energised", command.axis_deg, "de-energised")
-    peak = sum(abs(tone.amplitude_v) for tone in command.tones)
+    peak = sum(abs(amplitude_v) for amplitude_v, _, _ in command.tones)
     return (
         _within("sum of tone amplitudes", peak, 0.0, bounds.test_voltage_v)
         or _within("duration", command.duration_s, 0.0, bounds.axis_time_s)

@@ -28,7 +28,7 @@ class WatchLimits:
     current_a: float
     flux_fraction: float
     axis_time_s: float
-    lost_samples: int
+    lost_samples_s: float
     dc_link_v: tuple[float, float]
     heatsink_degc: float
     winding_degc: float
@@ -39,27 +39,41 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
     current = _peak(block)
     if not math.isfinite(current) or current > limits.current_a:
         return StopReason(
-            "the current passed its limit", current, limits.current_a,
+            "the current passed its limit",
+            current,
+            limits.current_a,
             "check the motor's rated current and its connection; a shorted winding does this too",
         )
     if not math.isfinite(flux_fraction) or flux_fraction > limits.flux_fraction:
         return StopReason(
-            "the flux came too close to its rated value", flux_fraction, limits.flux_fraction,
+            "the flux came too close to its rated value",
+            flux_fraction,
+            limits.flux_fraction,
             "lower limits.flux_fraction, and check rated voltage and frequency of the plate",
         )
     if block.clipped:
         return StopReason(
-            "a current sensor reached the end of its range", current, "inside the range",
-            "lower limits.current_fraction or fit a drive of higher rated current", is_fault=True,
+            "a current sensor reached the end of its range",
+            current,
+            "inside the range",
+            "lower limits.current_fraction or fit a drive of higher rated current",
+            is_fault=True,
         )
     if energised_s > limits.axis_time_s:
         return StopReason(
-            "the axis was energised too long", energised_s, limits.axis_time_s, "raise limits.axis_time_s",
+            "the axis was energised too long",
+            energised_s,
+            limits.axis_time_s,
+            "raise limits.axis_time_s",
         )
-    if block.lost_before > limits.lost_samples:
+    lost_s = block.lost_before * block.sample_period_s
+    if lost_s > limits.lost_samples_s:
         return StopReason(
-            "the stream lost samples", float(block.lost_before), float(limits.lost_samples),
-            "use a faster link, or a decimation the link can carry", is_fault=True,
+            "the stream lost samples",
+            lost_s,
+            limits.lost_samples_s,
+            "use a faster link, or a decimation the link can carry",
+            is_fault=True,
         )
     return _outside("the DC link left its range", block.dc_link_v, *limits.dc_link_v, "check the supply")
 
@@ -68,11 +82,16 @@ def judge_status(status: DriveStatus, limits: WatchLimits) -> StopReason | None:
     """The first reason to stop that the drive's status gives."""
     if status.fault_code:
         return StopReason(
-            f"the drive tripped: {status.fault_text}", status.trip_value, status.trip_limit,
-            "remove the cause, reset the fault at the drive, start again", is_fault=True,
+            f"the drive tripped: {status.fault_text}",
+            status.trip_value,
+            status.trip_limit,
+            "remove the cause, reset the fault at the drive, start again",
+            is_fault=True,
         )
     if status.heatsink_degc > limits.heatsink_degc:
-        return StopReason("the heatsink is too hot", status.heatsink_degc, limits.heatsink_degc, "let the drive cool down")
+        return StopReason(
+            "the heatsink is too hot", status.heatsink_degc, limits.heatsink_degc, "let the drive cool down"
+        )
     if status.winding_degc > limits.winding_degc:
         return StopReason("the winding is too hot", status.winding_degc, limits.winding_degc, "let the motor cool down")
     return _outside("the DC link left its range", status.dc_link_v, *limits.dc_link_v, "check the supply")

@@ -7,14 +7,39 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LAYERS = [
-    {"errors", "records"}, {"motor"}, {"identify", "registers"}, {"diagnose", "monitor"}, {"safety"}, {"procedure"},
-    {"report"}, {"link", "recordings", "settings"}, {"run"}, {"study"}, {"service", "cli"},
+    {"errors", "records"},
+    {"motor"},
+    {"identify", "registers"},
+    {"diagnose", "monitor"},
+    {"safety"},
+    {"procedure"},
+    {"report"},
+    {"link", "recordings", "settings"},
+    {"run"},
+    {"study"},
+    {"service", "cli"},
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 PURE = {"errors", "records", "motor", "identify", "registers", "diagnose", "monitor", "safety", "procedure", "report"}
 IMPURE = {
-    "asyncio", "socket", "pathlib", "os", "logging", "time", "datetime", "pymodbus", "pydantic", "serial", "subprocess",
-    "random", "threading", "secrets", "tempfile", "shutil", "typer", "rich",
+    "asyncio",
+    "socket",
+    "pathlib",
+    "os",
+    "logging",
+    "time",
+    "datetime",
+    "pymodbus",
+    "pydantic",
+    "serial",
+    "subprocess",
+    "random",
+    "threading",
+    "secrets",
+    "tempfile",
+    "shutil",
+    "typer",
+    "rich",
 }
 
 
@@ -63,6 +88,17 @@ def test_pure_packages_touch_no_file_clock_or_wire(package):
 
 
 def test_top_level_holds_nothing_but_the_house():
-    allowed = {"pyproject.toml", "commissioner", "config", "sim", "tests", "README.md", "LICENSE", "runs", "build", "dist"}
+    allowed = {
+        "pyproject.toml",
+        "commissioner",
+        "config",
+        "sim",
+        "tests",
+        "README.md",
+        "LICENSE",
+        "runs",
+        "build",
+        "dist",
+    }
     seen = {path.name for path in ROOT.iterdir() if not path.name.startswith(".")}
     assert seen <= allowed

@@ -6,16 +6,24 @@ import stat
 import numpy as np
 import pytest
 
-from commissioner.records import SampleBlock
 from commissioner.recordings.table import read_table, to_standstill
+from commissioner.records import SampleBlock
 from commissioner.run.archive import RunFolder, plain, read_blocks, read_journal, write_recording
 
 
 def _block(first: int, count: int = 29, *, lost: int = 0, with_w: bool = True) -> SampleBlock:
     k = first + np.arange(count, dtype=float)
     return SampleBlock(
-        session=3, first_index=first, sample_period_s=2e-4, axis_deg=60.0, voltage_axis_v=np.sin(k), current_u_a=np.cos(k),
-        current_v_a=-np.cos(k) / 2, current_w_a=-np.cos(k) / 2 if with_w else None, dc_link_v=540.0, lost_before=lost,
+        session=3,
+        first_index=first,
+        sample_period_s=2e-4,
+        axis_deg=60.0,
+        voltage_axis_v=np.sin(k),
+        current_u_a=np.cos(k),
+        current_v_a=-np.cos(k) / 2,
+        current_w_a=-np.cos(k) / 2 if with_w else None,
+        dc_link_v=540.0,
+        lost_before=lost,
     )
 
 
@@ -87,4 +95,7 @@ def test_journal_survives_a_torn_line(folder):
 
 
 def test_json_never_holds_nan_or_arrays():
-    assert json.dumps(plain({"a": np.array([1.0, np.inf]), "b": np.float64(2)}), allow_nan=False) == '{"a": [1.0, null], "b": 2.0}'
+    assert (
+        json.dumps(plain({"a": np.array([1.0, np.inf]), "b": np.float64(2)}), allow_nan=False)
+        == '{"a": [1.0, null], "b": 2.0}'
+    )

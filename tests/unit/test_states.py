@@ -13,7 +13,9 @@ EXPECTED = {
     State.CHECKING: {Event.CHECKS_PASSED: State.RESISTANCE, Event.CHECK_FAILED: State.REJECTED},
     State.RESISTANCE: {Event.RESISTANCE_KNOWN: State.EXCITING, Event.REJECT: State.REJECTED},
     State.EXCITING: {
-        Event.AXIS_DONE: State.RESISTANCE, Event.AXES_DONE: State.JUDGING, Event.REJECT: State.REJECTED,
+        Event.AXIS_DONE: State.RESISTANCE,
+        Event.AXES_DONE: State.JUDGING,
+        Event.REJECT: State.REJECTED,
     },
     State.JUDGING: {Event.WRITE_BACK: State.WRITING, Event.KEEP: State.COMMISSIONED, Event.REJECT: State.REJECTED},
     State.WRITING: {Event.VERIFIED: State.COMMISSIONED},

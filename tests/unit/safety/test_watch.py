@@ -10,20 +10,43 @@ from commissioner.records import DriveStatus, SampleBlock
 from commissioner.safety.watch import WatchLimits, judge_block, judge_status
 
 LIMITS = WatchLimits(
-    current_a=5.0, flux_fraction=1.0, axis_time_s=20.0, lost_samples=50, dc_link_v=(480.0, 640.0), heatsink_degc=85.0,
+    current_a=5.0,
+    flux_fraction=1.0,
+    axis_time_s=20.0,
+    lost_samples_s=0.01,
+    dc_link_v=(480.0, 640.0),
+    heatsink_degc=85.0,
     winding_degc=120.0,
 )
 STATUS = DriveStatus(
-    state="operation_enabled", is_energised=True, fault_code=0, fault_text="none", trip_value=0.0, trip_limit=0.0, interlocks={},
-    dc_link_v=540.0, heatsink_degc=40.0, winding_degc=math.nan, shaft_speed_rad_per_s=0.0, current_magnitude_a=1.0,
-    heartbeat_echo=0, session=1,
+    state="operation_enabled",
+    is_energised=True,
+    fault_code=0,
+    fault_text="none",
+    trip_value=0.0,
+    trip_limit=0.0,
+    interlocks={},
+    dc_link_v=540.0,
+    heatsink_degc=40.0,
+    winding_degc=math.nan,
+    shaft_speed_rad_per_s=0.0,
+    current_magnitude_a=1.0,
+    heartbeat_echo=0,
+    session=1,
 )
 
 
 def _block(u=(0.0, 1.0), v=(0.0, -0.5), w=(0.0, -0.5), **changes):
     block = SampleBlock(
-        session=1, first_index=0, sample_period_s=2e-4, axis_deg=0.0, voltage_axis_v=np.zeros(2), current_u_a=np.array(u),
-        current_v_a=np.array(v), current_w_a=None if w is None else np.array(w), dc_link_v=540.0,
+        session=1,
+        first_index=0,
+        sample_period_s=2e-4,
+        axis_deg=0.0,
+        voltage_axis_v=np.zeros(2),
+        current_u_a=np.array(u),
+        current_v_a=np.array(v),
+        current_w_a=None if w is None else np.array(w),
+        dc_link_v=540.0,
     )
     return replace(block, **changes)
 
@@ -71,7 +94,13 @@ def test_each_reason_is_named_with_its_remedy(changes, seconds, flux, says, is_f
 
 @pytest.mark.parametrize(
     ("changes", "seconds", "flux"),
-    [({}, 20.0, 0.5), ({}, 1.0, 1.0), ({"lost_before": 50}, 1.0, 0.5), ({"dc_link_v": 480.0}, 1.0, 0.5), ({"dc_link_v": 640.0}, 1.0, 0.5)],
+    [
+        ({}, 20.0, 0.5),
+        ({}, 1.0, 1.0),
+        ({"lost_before": 50}, 1.0, 0.5),
+        ({"dc_link_v": 480.0}, 1.0, 0.5),
+        ({"dc_link_v": 640.0}, 1.0, 0.5),
+    ],
 )
 def test_the_limit_itself_is_still_allowed(changes, seconds, flux):
     assert judge_block(_block(**changes), seconds, flux, LIMITS) is None

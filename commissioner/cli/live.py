@@ -1,0 +1,99 @@
+"""What the technician sees while a run goes: states as lines, one progress bar while the motor is energised."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+
+from commissioner.procedure import findings as told
+
+
+class LiveView:
+    """Call it with every record of a run; use it as a context so that the bar is closed."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._bar = Progress(
+            TextColumn("    {task.description}"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.fields[numbers]}"),
+            console=console,
+            transient=True,
+        )
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> LiveView:
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
+    def __call__(self, record: object) -> None:
+        match record:
+            case told.StateEntered(state=state, axis_deg=axis):
+                self._line(f"[bold]{state}[/]" + (f"  [dim]axis {axis:g}°[/]" if axis is not None else ""))
+            case told.DriveIdentified():
+                self._line(
+                    f"    {escape(record.drive_type)} #{record.serial_number}, firmware {record.firmware_version}, "
+                    f"{record.rated_drive_current_a:g} A, {1e6 * record.control_period_s:g} µs"
+                )
+            case told.ChecksJudged(results=results):
+                self._checks(record)
+            case told.StaircaseFitted():
+                self._close()
+                self._line(
+                    f"    R_s {record.stator_resistance_ohm:.4g} ± {record.stator_resistance_std_ohm:.2g} Ω, "
+                    f"inverter loses {record.error_voltage_v:.3g} V on the axis"
+                )
+            case told.ExcitationChosen():
+                tones = ", ".join(f"{f:g} Hz {a:.3g} V" for a, f, _ in record.tones)
+                self._line(f"    {record.seconds:g} s of {tones}")
+            case told.EstimateUpdated():
+                self._progress(record)
+            case told.GuardActed(advice=advice, flux_fraction=fraction):
+                self._line(f"    [yellow]flux guard: {advice} at {fraction:.0%} of the limit[/]")
+            case told.AxisFinished():
+                self._close()
+                self._line(
+                    f"    {record.why}; energised {record.energised_s:.1f} s, flux to {record.peak_flux_fraction:.0%} of the limit"
+                )
+            case told.VerdictReached():
+                self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")
+            case told.ParametersWritten(written=written):
+                self._line(f"    {len(written)} parameters written, read back and stored")
+            case told.StepProgress():
+                self._show(f"axis {record.axis_deg:g}°", record.fraction, record.numbers)
+
+    def _checks(self, record: told.ChecksJudged) -> None:
+        failed = [result for result in record.results if not result.has_passed]
+        self._line(f"    {len(record.results) - len(failed)} of {len(record.results)} checks passed")
+        for result in failed:
+            self._line(f"    [red]✗ {escape(result.name)}: {result.value}, wanted {result.limit}[/]")
+
+    def _progress(self, record: told.EstimateUpdated) -> None:
+        r_s, r_r, l_sigma, l_m = record.parameters
+        self._show(
+            f"axis {record.axis_deg:g}°",
+            record.time_s / max(record.planned_s, record.time_s, 1e-9),
+            f"{record.time_s:4.1f} s  flux {record.flux_fraction:4.0%} of limit  "
+            f"R_s {r_s:.3g} R_R {r_r:.3g} Ω  L_σ {1e3 * l_sigma:.3g} L_M {1e3 * l_m:.3g} mH",
+        )
+
+    def _show(self, what: str, fraction: float, numbers: str) -> None:
+        if self._task is None:
+            self._task = self._bar.add_task(what, total=1.0, numbers="")
+        self._bar.update(self._task, completed=fraction, description=what, numbers=numbers)
+
+    def _close(self) -> None:
+        if self._task is not None:
+            self._bar.remove_task(self._task)
+            self._task = None
+
+    def _line(self, text: str) -> None:
+        self._bar.console.print(text)

@@ -1,0 +1,115 @@
+"""`commissioner run`: commission a drive, after asking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commissioner.cli import screen
+from commissioner.cli.live import LiveView
+from commissioner.errors import UsageError
+from commissioner.run.commission import Commissioned, commission
+from commissioner.settings import load_motor, load_procedure
+
+EXIT_CODES = {"commissioned": 0, "rejected": 3, "aborted": 4, "faulted": 5}
+
+
+def run(
+    *,
+    drive: str,
+    profile: str,
+    motor: str,
+    axes: str | None,
+    write_back: bool,
+    yes: bool,
+    procedure: Path | None,
+    runs: Path,
+    as_json: bool,
+) -> None:
+    """Commission the drive; exits with the code of the outcome."""
+    commission_and_show(
+        url=drive,
+        profile=profile,
+        motor=motor,
+        axes=parse_axes(axes),
+        write_back=write_back,
+        yes=yes,
+        procedure=procedure,
+        runs=runs,
+        as_json=as_json,
+    )
+
+
+def commission_and_show(
+    *,
+    url: str,
+    profile: str,
+    motor: str,
+    axes: tuple[float, ...] | None,
+    write_back: bool,
+    yes: bool,
+    procedure: Path | None,
+    runs: Path,
+    as_json: bool,
+) -> None:
+    """The part that `run` and `demo` share."""
+    nameplate = load_motor(motor)
+    plan = load_procedure(procedure, axes_deg=axes)
+    if not yes:
+        _ask(url, plan.total_seconds, write_back, as_json=as_json)
+    with LiveView(screen.err if as_json else screen.out) as view:
+        done = commission(url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view)
+    _show(done, as_json=as_json)
+    code = EXIT_CODES[done.ended.outcome]
+    if code:
+        raise SystemExit(code)
+
+
+def parse_axes(text: str | None) -> tuple[float, ...] | None:
+    """`0,60,120` as numbers; None where the procedure's own are to be used."""
+    if text is None:
+        return None
+    try:
+        axes = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        axes = ()
+    if not axes or len(axes) > 12 or not all(-360 <= axis <= 360 for axis in axes):
+        raise UsageError(
+            f"--axes {text!r} is not a list of angles",
+            step="command line",
+            value=text,
+            limit="1 to 12 electrical degrees within -360 ... 360, separated by commas",
+            remedy="write --axes 0,60,120",
+        )
+    return axes
+
+
+def _ask(url: str, seconds: float, write_back: bool, *, as_json: bool) -> None:
+    """A person says yes, or nothing is energised."""
+    import typer
+
+    if as_json:
+        raise UsageError(
+            "nobody can be asked with --json",
+            step="confirm",
+            value="--json without --yes",
+            limit="--yes",
+            remedy="add --yes once you have made sure that the motor may be energised",
+        )
+    screen.out.print(
+        f"[bold yellow]The motor at {url} will be energised[/] at standstill on one axis at a time, for about {seconds:.0f} s in "
+        "all.\nNo torque is made on purpose, but the shaft may still move slightly. Guards on, people away, emergency stop tested?"
+    )
+    screen.out.print(
+        "Accepted parameters will be written into the drive."
+        if write_back
+        else "Nothing will be written into the drive."
+    )
+    typer.confirm("Energise?", abort=True)
+
+
+def _show(done: Commissioned, *, as_json: bool) -> None:
+    if as_json:
+        screen.emit(dict(done.result) | {"folder": str(done.folder)})
+        return
+    screen.result(dict(done.result))
+    screen.out.print(f"[dim]report    {done.folder / 'report.html'}\nsamples   {done.folder / 'recording.parquet'}[/]")

@@ -1,0 +1,39 @@
+"""The whole run: follow the transition table, one step generator per state, until a state that has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any
+
+from commissioner.procedure.excite import excite, measure_resistance
+from commissioner.procedure.findings import RunEnded, StateEntered
+from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
+from commissioner.procedure.steps import Findings, Job, Step, check, connect, judge, write
+from commissioner.safety.commands import Command, Tell
+
+__all__ = ["Findings", "Job", "course"]
+
+_STEPS: dict[State, Callable[[Job, Findings], Step]] = {
+    State.CONNECTING: connect,
+    State.CHECKING: check,
+    State.RESISTANCE: measure_resistance,
+    State.EXCITING: excite,
+    State.JUDGING: judge,
+    State.WRITING: write,
+}
+
+
+def course(job: Job, findings: Findings) -> Generator[Command, Any, RunEnded]:
+    """Yields every command of a run; what it learns is in `findings`, also when it is stopped half-way."""
+    state = follow(State.IDLE, Event.START)
+    because = Event.START
+    while state not in ENDED:
+        yield Tell(
+            StateEntered(
+                state.value, because.value, job.plan.tests_deg[findings.tests_done] if state in ENERGISED else None
+            )
+        )
+        because = yield from _STEPS[state](job, findings)
+        state = follow(state, because)
+    reason = findings.verdict.reason if findings.verdict else because.value
+    return RunEnded(state.value, reason, 0.0)

@@ -1,0 +1,123 @@
+"""Is the result good enough to be written into the drive? The verdict carries the numbers that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from commissioner.motor.circuit import InverseGamma, Quantity
+from commissioner.motor.nameplate import ParameterBox
+from commissioner.procedure.plan import Acceptance
+
+
+class Decision(Enum):
+    """The value is what the technician reads."""
+
+    WRITE_BACK = "write back"
+    KEEP = "keep"
+    REJECT = "reject"
+
+
+@dataclass(frozen=True)
+class Objection:
+    """One reason why the result is not good enough."""
+
+    what: str
+    value: object
+    limit: object
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    decision: Decision
+    objections: tuple[Objection, ...]
+
+    @property
+    def reason(self) -> str:
+        """One sentence."""
+        if self.objections:
+            return self.objections[0].what
+        return "every parameter is within its acceptance" + (
+            "" if self.decision is Decision.WRITE_BACK else "; writing was not asked for"
+        )
+
+
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+_LIMIT = {
+    "stator_resistance_ohm": "resistance_std_percent",
+    "rotor_resistance_ohm": "rotor_resistance_std_percent",
+    "leakage_inductance_h": "leakage_std_percent",
+    "magnetizing_inductance_h": "magnetizing_std_percent",
+}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the verdict is reached from: combined values, each axis's values, warnings that forbid writing."""
+
+    combined: Mapping[str, Quantity]
+    axes: tuple[tuple[float, Mapping[str, Quantity]], ...]
+    disagreements: tuple[str, ...] = ()
+
+
+def decide(evidence: Evidence, box: ParameterBox, acceptance: Acceptance, *, write_back: bool) -> Verdict:
+    """WRITE_BACK or KEEP where nothing objects, else REJECT with every objection, gravest first."""
+    objections = (
+        *_outside(evidence.combined, box),
+        *(
+            Objection(text, "disagreement", "agreement", "see the residual in the report; repeat the run")
+            for text in evidence.disagreements
+        ),
+        *_uncertain(evidence.combined, acceptance),
+        *_spread(evidence, acceptance),
+    )
+    if objections:
+        return Verdict(Decision.REJECT, objections)
+    return Verdict(Decision.WRITE_BACK if write_back else Decision.KEEP, ())
+
+
+def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Objection]:
+    for name in PARAMETERS:
+        low, high, value = getattr(box.lower, name), getattr(box.upper, name), combined[name].value
+        if not low <= value <= high:
+            yield Objection(
+                f"{name} is not physical for this nameplate",
+                value,
+                f"{low:.4g} ... {high:.4g}",
+                "check the motor's connection and that --motor is the motor at the drive",
+            )
+
+
+def _uncertain(combined: Mapping[str, Quantity], acceptance: Acceptance) -> Iterator[Objection]:
+    for name in PARAMETERS:
+        quantity, limit = combined[name], getattr(acceptance, _LIMIT[name])
+        percent = 100 * quantity.std / abs(quantity.value) if quantity.value else float("inf")
+        if not percent <= limit:
+            yield Objection(
+                f"{name} is too uncertain",
+                f"{percent:.2g} % standard error",
+                f"{limit:g} %",
+                "lengthen excitation.seconds, or look for noise on the current sensors",
+            )
+
+
+def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
+    for name in PARAMETERS:
+        values = [axis[name].value for _, axis in evidence.axes]
+        if len(values) < 2:
+            continue
+        spread = 100 * (max(values) - min(values)) / abs(evidence.combined[name].value)
+        if spread > acceptance.axis_spread_percent:
+            yield Objection(
+                f"{name} differs between the axes",
+                f"{spread:.2g} %",
+                f"{acceptance.axis_spread_percent:g} %",
+                "compare the current sensors' gains and the three phases' resistances",
+            )
+
+
+def as_inverse_gamma(combined: Mapping[str, Quantity]) -> InverseGamma:
+    """The combined values without their uncertainty."""
+    return InverseGamma(**{name: combined[name].value for name in PARAMETERS})

@@ -1,0 +1,60 @@
+"""The result document of a run: the contract's keys, from what the run found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.steps import Findings
+from commissioner.procedure.verdict import PARAMETERS
+
+
+def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Mapping[str, str]) -> dict[str, Any]:
+    """What `run --json` prints and `result.json` holds. `parameter_names`: the drive's name -> the contract's."""
+    identification = findings.identification
+    document: dict[str, Any] = {
+        "run": run,
+        "outcome": ended.outcome,
+        "reason": ended.reason,
+        "error": ended.error,
+        "energised_s": ended.energised_s,
+        "duration_s": ended.energised_s,
+        "drive": findings.identity,
+        "checks": findings.checks,
+        "before": _before(findings, parameter_names),
+        "written": _written(findings, parameter_names),
+        "objections": findings.verdict.objections if findings.verdict else (),
+        "parameters": {},
+        "remarks": (),
+    }
+    if identification is not None:
+        document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
+        document["duration_s"] = ended.energised_s
+    document["flux_guard"] = {"peak_fraction": findings.peak_flux_fraction, "acted": findings.guard_acted}
+    return document
+
+
+def _before(findings: Findings, names: Mapping[str, str]) -> Mapping[str, float] | None:
+    """The drive's values in use before the run, by the contract's names."""
+    if findings.snapshot is None:
+        return None
+    by_field = {names[name]: value for name, value in findings.snapshot.in_use.items() if name in names}
+    resistance, inductance = by_field.get(PARAMETERS[1]), by_field.get(PARAMETERS[3])
+    if resistance and inductance:
+        by_field["rotor_time_constant_s"] = inductance / resistance
+    return by_field
+
+
+def _written(findings: Findings, names: Mapping[str, str]) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": row.name,
+            "field": names.get(row.name),
+            "register": row.register,
+            "before": row.before,
+            "after": row.after,
+            "read_back": row.read_back,
+        }
+        for row in findings.written
+    ]

@@ -1,0 +1,83 @@
+"""Each pre-energise check fails for its own reason and says what to do."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.checks import DriveLimits, judge_drive
+from commissioner.records import DriveIdentity, DriveStatus
+
+PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
+IDENTITY = DriveIdentity("SIM", 1, "1.0.0", 1, 7.0, 2e-4, 5000.0)
+LIMITS = DriveLimits(480.0, 640.0, 85.0, 120.0)
+INTERLOCKS = {
+    "sto_released": True,
+    "remote_control": True,
+    "shaft_at_rest": True,
+    "supply_ok": True,
+    "no_other_master": True,
+}
+STATUS = DriveStatus(
+    state="switch_on_disabled",
+    is_energised=False,
+    fault_code=0,
+    fault_text="none",
+    trip_value=0.0,
+    trip_limit=0.0,
+    interlocks=INTERLOCKS,
+    dc_link_v=540.0,
+    heatsink_degc=40.0,
+    winding_degc=math.nan,
+    shaft_speed_rad_per_s=0.0,
+    current_magnitude_a=0.0,
+    heartbeat_echo=0,
+    session=0,
+)
+
+
+def _failed(statuses=(STATUS, STATUS), identity=IDENTITY, plate=None, test_current=6.4):
+    results = judge_drive(identity, statuses, plate or {}, PLATE, LIMITS, test_current)
+    assert all(result.remedy for result in results)
+    return [result.name for result in results if not result.has_passed]
+
+
+def test_a_healthy_drive_passes_every_check():
+    assert _failed() == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"fault_code": 3, "fault_text": "earth fault"}, "no fault"),
+        ({"is_energised": True}, "output off"),
+        ({"interlocks": INTERLOCKS | {"sto_released": False}}, "safe torque off is released"),
+        ({"interlocks": INTERLOCKS | {"remote_control": False}}, "control is remote and ours"),
+        ({"interlocks": INTERLOCKS | {"no_other_master": False}}, "no other master holds the drive"),
+        ({"shaft_speed_rad_per_s": -0.6}, "shaft at rest over the dwell time"),
+        ({"heatsink_degc": 86.0}, "heatsink temperature, degC"),
+        ({"winding_degc": 121.0}, "winding temperature, degC"),
+    ],
+)
+def test_one_wrong_reading_fails_one_check(changes, name):
+    assert _failed((STATUS, replace(STATUS, **changes))) == [name]
+
+
+def test_a_shaft_that_moved_during_the_dwell_fails_even_if_it_rests_now():
+    assert _failed((replace(STATUS, shaft_speed_rad_per_s=3.0), STATUS)) == ["shaft at rest over the dwell time"]
+
+
+def test_a_link_that_is_still_charging_is_not_steady():
+    assert _failed((replace(STATUS, dc_link_v=500.0), STATUS)) == ["DC link steady"]
+    assert _failed((replace(STATUS, dc_link_v=470.0), replace(STATUS, dc_link_v=470.0))) == ["DC link in range"]
+
+
+def test_a_drive_too_small_for_the_test_current_fails():
+    assert _failed(test_current=7.0 * math.sqrt(2) + 0.01) == ["drive rated for the test current"]
+    assert _failed(test_current=7.0 * math.sqrt(2) - 0.01) == []
+
+
+def test_a_drive_set_up_for_another_motor_fails_and_an_empty_plate_does_not():
+    assert _failed(plate={"rated_current_a": 5.2, "rated_voltage_v": 0.0}) == []
+    assert _failed(plate={"rated_current_a": 8.0}) == ["rated_current_a in the drive"]

@@ -1,0 +1,82 @@
+"""A configuration file that cannot be right is refused with file, key, value and what would be right."""
+
+import pytest
+
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
+
+PLATE = (CONFIG_FOLDER / "motors" / "motor_2kw2.toml").read_text()
+
+
+def _motor(tmp_path, text):
+    path = tmp_path / "motor.toml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_every_shipped_motor_and_the_procedure_load():
+    for path in (CONFIG_FOLDER / "motors").glob("*.toml"):
+        assert load_motor(path.stem).rated_power_w > 0
+    assert load_procedure().tests_deg == (0.0, 60.0, 120.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "hint"),
+    [
+        ("rated_power_w = 2200.0", "rated_power_w = 2.2", "rated_power_w", "watts"),
+        ("rated_power_w = 2200.0", "rated_power_kw = 2.2", "rated_power_kw", "rated_power_w"),
+        ("pole_pairs = 2", "pole_pairs = 2.5", "pole_pairs", "integer"),
+        ("pole_pairs = 2", "pole_pairs = 4", "rated_speed_rpm", "synchronous"),
+        ("power_factor = 0.80", "power_factor = 80", "power_factor", "cos phi"),
+        ('connection = "star"', 'connection = "wye"', "connection", "star"),
+        ("rated_current_a = 5.0", 'rated_current_a = "5 A"', "rated_current_a", "number"),
+        ("rated_current_a = 5.0", "rated_current_a = nan", "rated_current_a", "0.05"),
+        ("rated_voltage_v = 400.0", "", "rated_voltage_v", "volts"),
+        ("rated_current_a = 5.0", "rated_current_a = 2.0", "rated_power_w", ""),
+    ],
+)
+def test_an_impossible_plate_names_file_key_value_and_what_would_be_right(tmp_path, old, new, key, hint):
+    assert old in PLATE
+    path = _motor(tmp_path, PLATE.replace(old, new))
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(path)
+    error = caught.value
+    assert error.exit_code == 2
+    assert error.file == path
+    assert error.key == key
+    assert hint in str(error.limit)
+    assert key in error.remedy
+
+
+def test_broken_toml_and_missing_files_are_named(tmp_path):
+    with pytest.raises(ConfigurationError, match="syntax"):
+        load_motor(_motor(tmp_path, "rated_power_w = "))
+    with pytest.raises(UsageError, match="no file"):
+        load_motor(str(tmp_path / "nothing.toml"))
+    with pytest.raises(UsageError) as caught:
+        load_motor("no_such_motor")
+    assert "motor_2kw2" in str(caught.value.limit)
+
+
+def test_a_huge_file_is_not_read(tmp_path):
+    with pytest.raises(ConfigurationError, match="file"):
+        load_motor(_motor(tmp_path, "#" * 2_000_000))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("watchdog_s = 0.5", "watchdog_s = 1.5", "supervision.watchdog_s"),
+        ("flux_fraction = 0.9", "flux_fraction = 1.1", "limits.flux_fraction"),
+        ("first_scale = 0.1", "first_scales = 0.1", "excitation.first_scale"),
+        ("orientations_deg = [0.0, 60.0, 120.0]", "orientations_deg = []", "axes.orientations_deg"),
+    ],
+)
+def test_a_procedure_that_cannot_be_right_is_refused(tmp_path, old, new, key):
+    text = (CONFIG_FOLDER / "procedure.toml").read_text()
+    assert old in text
+    path = tmp_path / "procedure.toml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ConfigurationError) as caught:
+        load_procedure(path)
+    assert caught.value.key.startswith(key)
