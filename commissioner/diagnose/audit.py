@@ -1,0 +1,277 @@
+"""What is wrong with a recording before any model: clipping, converter steps, holes, one tone, foreign columns.
+
+Clipped samples are masked, holes are honoured (short ones bridged by interpolating the command, longer ones start a
+new stretch with a free state), nothing is filled in silently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from commissioner.diagnose.record import Facts, Record, Segment
+from commissioner.records import Signal, StandstillRecording
+
+BRIDGED_SAMPLES = 5
+CLIPPED_RATIO = 3.5
+SHORTEST_STRETCH = 200
+REST_SAMPLES = 1
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Findings as numbers; `sentences` in the order they should be read."""
+
+    sentences: tuple[str, ...]
+    clipped: dict[str, float] = field(default_factory=dict)
+    step_a: tuple[float, ...] = ()
+    holes: tuple[tuple[int, float, int], ...] = ()
+    excited_hz: tuple[float, ...] = ()
+    axes_deg: tuple[float, ...] = ()
+    refusal: str | None = None
+
+
+def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
+    """Segments without holes, masks for clipped samples, and what was found."""
+    facts = _facts(recordings)
+    sentences: list[str] = []
+    holes: list[tuple[int, float, int]] = []
+    segments: list[Segment] = []
+    steps = _converter_steps(recordings, facts)
+    limits = [_clip_limits(r, facts) for r in recordings]
+    for file, recording in enumerate(recordings):
+        currents = _currents(recording, facts.phases)
+        good = ~_clipped(currents, limits[file])
+        link = _link_ratio(recording, facts)
+        starts = np.flatnonzero(np.r_[True, np.diff(recording.segment) != 0])
+        stops = np.r_[starts[1:], recording.time_s.shape[0]]
+        for start, stop in zip(starts, stops, strict=True):
+            part = slice(int(start), int(stop))
+            pieces, lost = _pieces(recording, currents, good, link, part, file, facts)
+            holes.extend(lost)
+            segments.extend(pieces)
+    kept = [s for s in segments if s.count >= SHORTEST_STRETCH]
+    if len(kept) < len(segments):
+        sentences.append(f"{len(segments) - len(kept)} stretches shorter than {SHORTEST_STRETCH} samples are left out.")
+    kept = [
+        Segment(s.number, s.file, s.axis_deg, s.time_s, s.voltage_axis_v, s.currents_a, s.is_good, s.link_ratio,
+                s.starts_at_rest, k)
+        for k, s in enumerate(kept)
+    ]
+    record = Record(tuple(kept), facts)
+    clipped = _clip_report(recordings, limits, facts)
+    refusal, more = _judge(record, holes, clipped, steps)
+    sentences.extend(more)
+    return record, Audit(
+        tuple(sentences), clipped, steps, tuple(holes), tuple(excited_lines(record)),
+        tuple(sorted({s.axis_deg for s in kept})), refusal,
+    )
+
+
+def _facts(recordings: Sequence[StandstillRecording]) -> Facts:
+    first = recordings[0]
+    metadata = dict(first.metadata)
+    phases = 3 if all(r.current_w_a is not None for r in recordings) else 2
+    peak = max(float(np.abs(_currents(r, phases)).max()) for r in recordings)
+    rated = _number(metadata, "rated_current_a")
+    rated_peak = np.sqrt(2.0) * rated if rated else peak
+    voltage, frequency = _number(metadata, "rated_voltage_v"), _number(metadata, "rated_frequency_hz")
+    flux = np.sqrt(2.0 / 3.0) * voltage / (2.0 * np.pi * frequency) if voltage and frequency else 0.0
+    power = _number(metadata, "rated_power_w") or 1.5 * rated_peak * max(float(np.abs(first.voltage_axis_v).max()), 1.0)
+    link = None
+    if first.dc_link_v is not None:
+        link = float(np.median(first.dc_link_v))
+    return Facts(
+        first.sample_period_s, float(rated_peak), float(power), float(flux), peak,
+        _number(metadata, "switching_frequency_hz"), link or _number(metadata, "dc_link_v"), phases, metadata,
+    )
+
+
+def _number(metadata: dict[str, float | str], key: str) -> float | None:
+    value = metadata.get(key)
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) and value > 0 else None
+
+
+def _currents(recording: StandstillRecording, phases: int) -> NDArray[np.float64]:
+    rows = [recording.current_u_a, recording.current_v_a]
+    if phases == 3 and recording.current_w_a is not None:
+        rows.append(recording.current_w_a)
+    return np.stack(rows)
+
+
+def _link_ratio(recording: StandstillRecording, facts: Facts) -> Signal:
+    """Dead-time voltage scale: link voltage times switching frequency, relative to the first file's."""
+    n = recording.time_s.shape[0]
+    ratio = np.ones(n)
+    own = _number(dict(recording.metadata), "switching_frequency_hz")
+    if own and facts.switching_frequency_hz:
+        ratio = ratio * own / facts.switching_frequency_hz
+    if facts.dc_link_v:
+        if recording.dc_link_v is not None:
+            starts = np.r_[True, np.diff(recording.segment) != 0]
+            group = np.cumsum(starts) - 1
+            level = np.bincount(group, recording.dc_link_v) / np.bincount(group)
+            ratio = ratio * level[group] / facts.dc_link_v
+        elif (value := _number(dict(recording.metadata), "dc_link_v")) is not None:
+            ratio = ratio * value / facts.dc_link_v
+    return ratio
+
+
+def _converter_steps(recordings: Sequence[StandstillRecording], facts: Facts) -> tuple[float, ...]:
+    """Least significant step of each current channel, 0 where the values lie on no grid."""
+    return tuple(
+        max(_grid(_currents(r, facts.phases)[phase], facts.current_peak_a) for r in recordings)
+        for phase in range(facts.phases)
+    )
+
+
+def _grid(values: Signal, peak: float) -> float:
+    unique = np.unique(np.round(values[:50000] / peak, 9))
+    if unique.size < 4 or unique.size > 0.5 * min(values.size, 50000):
+        return 0.0
+    gaps = np.diff(unique)
+    step = float(np.quantile(gaps, 0.1))
+    near = gaps[np.abs(gaps - step) < 0.2 * step]
+    step = float(np.mean(near)) if near.size else step
+    multiples = gaps / step
+    return step * peak if np.all(np.abs(multiples - np.round(multiples)) < 0.15) else 0.0
+
+
+def _clip_limits(recording: StandstillRecording, facts: Facts) -> list[tuple[float, float]]:
+    return [_limits_of(row, facts.current_peak_a) for row in _currents(recording, facts.phases)]
+
+
+def _limits_of(values: Signal, peak: float) -> tuple[float, float]:
+    """Lower and upper limit at which samples pile up, infinite where none do."""
+    low, high = -np.inf, np.inf
+    tolerance = 1e-6 * peak
+    for sign in (-1.0, 1.0):
+        signed = sign * values
+        top = float(signed.max())
+        at_top = signed >= top - tolerance
+        runs = np.diff(np.flatnonzero(np.diff(np.r_[0, at_top.astype(int), 0]))[::1])[::2]
+        below = signed[~at_top]
+        width = max(2e-3 * peak, top - float(below.max()) if below.size else 0.0)
+        beside = int(((signed < top - tolerance) & (signed >= top - tolerance - 1.05 * width)).sum())
+        is_pile = at_top.sum() >= 10 and runs.size and runs.max() >= 3 and at_top.sum() > CLIPPED_RATIO * max(beside, 1)
+        if is_pile and abs(top) > 0.3 * peak:
+            low, high = (-top, high) if sign < 0 else (low, top)
+    return low, high
+
+
+def _clipped(currents: NDArray[np.float64], limits: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    out = np.zeros(currents.shape[1], dtype=bool)
+    for row, (low, high) in zip(currents, limits, strict=True):
+        margin = 1e-6 * max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0, 1e-9)
+        out |= (row >= high - margin) | (row <= low + margin)
+    return out
+
+
+def _clip_report(
+    recordings: Sequence[StandstillRecording], limits: Sequence[Sequence[tuple[float, float]]], facts: Facts
+) -> dict[str, float]:
+    finite = [abs(x) for rows in limits for pair in rows for x in pair if np.isfinite(x)]
+    if not finite:
+        return {}
+    count = sum(
+        int(_clipped(_currents(r, facts.phases), rows).sum()) for r, rows in zip(recordings, limits, strict=True)
+    )
+    return {"limit_a": float(np.median(finite)), "samples": float(count)}
+
+
+def _pieces(
+    recording: StandstillRecording, currents: NDArray[np.float64], good: NDArray[np.bool_], link: Signal,
+    part: slice, file: int, facts: Facts,
+) -> tuple[list[Segment], list[tuple[int, float, int]]]:
+    time, period = recording.time_s[part], recording.sample_period_s
+    number = int(recording.segment[part][0])
+    missing = np.round(np.diff(time) / period).astype(int) - 1
+    holes = [(number, float(time[k + 1]), int(missing[k])) for k in np.flatnonzero(missing > 0)]
+    cuts = np.flatnonzero(missing > BRIDGED_SAMPLES) + 1
+    axis = recording.axis_deg[part]
+    turns = np.flatnonzero(np.diff(axis) != 0) + 1
+    bounds = np.unique(np.r_[0, cuts, turns, time.shape[0]])
+    out = []
+    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+        inner = slice(part.start + int(begin), part.start + int(end))
+        out.append(_bridge(
+            Segment(
+                number, file, float(axis[begin]), recording.time_s[inner], recording.voltage_axis_v[inner],
+                currents[:, inner], good[inner], link[inner], bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
+            ),
+            period,
+        ))
+    return out, holes
+
+
+def _is_at_rest(currents: NDArray[np.float64], facts: Facts) -> bool:
+    return float(np.abs(currents[:, :REST_SAMPLES]).max()) < 0.05 * facts.current_peak_a
+
+
+def _bridge(segment: Segment, period: float) -> Segment:
+    """Missing rows put back as masked samples; the command there is the smooth curve through its neighbours."""
+    index = np.round((segment.time_s - segment.time_s[0]) / period).astype(int)
+    if index.size < 2 or index[-1] == index.size - 1:
+        return segment
+    every = np.arange(index[-1] + 1)
+    good = np.zeros(every.size, dtype=bool)
+    good[index] = segment.is_good
+    currents = np.zeros((segment.currents_a.shape[0], every.size))
+    currents[:, index] = segment.currents_a
+    command = CubicSpline(index, segment.voltage_axis_v)(every)
+    command[index] = segment.voltage_axis_v
+    return Segment(
+        segment.number, segment.file, segment.axis_deg, segment.time_s[0] + every * period, command, currents, good,
+        np.interp(every, index, segment.link_ratio), segment.starts_at_rest,
+    )
+
+
+def excited_lines(record: Record) -> list[float]:
+    """Frequencies the command excites, Hz: spectral peaks within 60 dB of the largest, merged over segments."""
+    found: list[float] = []
+    for segment in record.segments:
+        v = segment.voltage_axis_v - segment.voltage_axis_v.mean()
+        n = v.shape[0]
+        if np.std(v) == 0:
+            continue
+        window = np.hanning(n)
+        spectrum = np.abs(np.fft.rfft(v * window))
+        frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
+        peaks = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
+        strong = peaks[spectrum[peaks] > 1e-2 * spectrum.max()]
+        for f in frequency[strong]:
+            if all(abs(f - g) > 2.5 / (n * record.facts.sample_period_s) for g in found):
+                found.append(float(f))
+    return sorted(found)
+
+
+def _judge(
+    record: Record, holes: Sequence[tuple[int, float, int]], clipped: dict[str, float], steps: Sequence[float]
+) -> tuple[str | None, list[str]]:
+    out = []
+    if not record.segments:
+        return "no stretch of the recording is long enough to fit anything", out
+    if float(max(np.std(s.voltage_axis_v) for s in record.segments)) == 0.0:
+        return "the command is constant: nothing is excited", out
+    lost = sum(h[2] for h in holes)
+    if lost:
+        out.append(f"{lost} samples are missing in {len(holes)} holes; they were left out, not filled.")
+    if clipped:
+        out.append(f"{clipped['samples']:.0f} samples sit at a limit of {clipped['limit_a']:.4g} A; they are masked.")
+        total = record.samples
+        if clipped["samples"] > 0.3 * total:
+            return f"{clipped['samples'] / total:.0%} of the samples are clipped", out
+    if max(steps, default=0.0) > 0:
+        out.append(f"currents come in steps of {max(steps) * 1e3:.3g} mA.")
+    if len(excited_lines(record)) == 1:
+        out.append(
+            "a single tone is excited: it carries two numbers per axis, so linear causes cannot be told from the "
+            "machine's own parameters; only distortion can be named."
+        )
+    if any(not s.starts_at_rest for s in record.segments):
+        out.append("some stretches do not start at rest; their initial state is fitted.")
+    return None, out

@@ -1,0 +1,171 @@
+"""Output-error fits: normal equations gathered segment by segment, Gauss-Newton with bounds and damping.
+
+Only Gram matrices leave a segment, so memory does not grow with the recording and leave-one-segment-out estimates
+are a subtraction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import Layout, Model, Term, predict
+from commissioner.diagnose.record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Whitened normal equations per segment: `gram` (s, P, P), `slope` (s, P), `chi2` (s,), `count` (s,) samples."""
+
+    gram: Array
+    slope: Array
+    chi2: Array
+    count: Array
+
+    @property
+    def total_gram(self) -> Array:
+        total: Array = self.gram.sum(axis=0)
+        return total
+
+    @property
+    def total_slope(self) -> Array:
+        total: Array = self.slope.sum(axis=0)
+        return total
+
+    @property
+    def total_chi2(self) -> float:
+        return float(self.chi2.sum())
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model with the normal equations at (or one small step before) the optimum."""
+
+    model: Model
+    normal: Normal
+    has_converged: bool
+    rounds: int
+
+    @property
+    def chi2(self) -> float:
+        return self.normal.total_chi2
+
+
+def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:
+    """`(..., phases, n)` residual or sensitivities -> `(..., m)` with unit noise variance; masked samples drop out."""
+    if noise.is_white:
+        scaled = signal / noise.sigma_a[:, None]
+        if not is_good.all():
+            scaled = scaled[..., is_good]
+        return np.ascontiguousarray(scaled.reshape(*signal.shape[:-2], -1))
+    n = signal.shape[-1]
+    weights = noise.weights(n, period_s)
+    masked = np.where(is_good, signal, 0.0) if not is_good.all() else signal
+    spectrum = np.fft.rfft(masked, axis=-1) / weights
+    scale = np.full(weights.shape[1], np.sqrt(2.0 / n))
+    scale[0] = np.sqrt(1.0 / n)
+    if n % 2 == 0:
+        scale[-1] = np.sqrt(1.0 / n)
+    spectrum *= scale
+    flat = np.stack([spectrum.real, spectrum.imag], axis=-1)
+    return flat.reshape(*signal.shape[:-2], -1)
+
+
+def normal_equations(model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise) -> Normal:
+    """Gram matrix and slope of the whitened residual for the four and `wanted`, one block per segment."""
+    size = 4 + len(wanted)
+    grams, slopes, chi2, counts = [], [], [], []
+    for k, segment in enumerate(record.segments):
+        prediction = predict(model, record, k, layout, wanted)
+        residual = segment.currents_a - prediction.currents_a
+        stacked = np.concatenate([prediction.jacobian, residual[None]], axis=0)
+        white = whiten(stacked, segment.is_good, noise, record.facts.sample_period_s)
+        gram = white @ white.T
+        grams.append(gram[:size, :size])
+        slopes.append(gram[:size, size])
+        chi2.append(float(gram[size, size]))
+        counts.append(int(segment.is_good.sum()) * record.facts.phases)
+    return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
+
+
+def chi2_of(model: Model, record: Record, layout: Layout, noise: Noise) -> float:
+    return float(sum(segment_chi2(model, record, layout, noise)))
+
+
+def segment_chi2(model: Model, record: Record, layout: Layout, noise: Noise) -> list[float]:
+    """Whitened squared residual of each segment."""
+    out = []
+    for k, segment in enumerate(record.segments):
+        residual = segment.currents_a - predict(model, record, k, layout).currents_a
+        white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
+        out.append(float(white @ white))
+    return out
+
+
+def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:
+    """Minimise |r - J d|^2 + damping |diag J'J d|^2 within bounds, from the normal equations."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scaled = gram / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled + damping * np.eye(scale.shape[0]))
+    keep = values > 1e-11 * values[-1]
+    root = (np.sqrt(values[keep])[:, None]) * vectors[:, keep].T
+    target = (vectors[:, keep].T @ (slope / scale)) / np.sqrt(values[keep])
+    low, high = lower * scale, upper * scale
+    free = np.linalg.lstsq(root, target, rcond=None)[0]
+    if np.all(free >= low) and np.all(free <= high):
+        return np.asarray(free / scale)
+    low = np.minimum(low, 0.0)
+    high = np.maximum(high, 0.0)
+    pinned = high - low < 1e-12
+    high = np.where(pinned, low + 1e-9, high)
+    solution = lsq_linear(root, target, (low, high), method="bvls", max_iter=200).x
+    return np.asarray(solution / scale)
+
+
+def limits(model: Model) -> tuple[Array, Array]:
+    """Bounds of theta: the four within a factor 3 per step, the terms as physics says."""
+    low = np.array([*np.log(np.array(model.nominal) / 3.0), *(t.lower / t.step for t in model.terms)])
+    high = np.array([*np.log(np.array(model.nominal) * 3.0), *(t.upper / t.step for t in model.terms)])
+    return low, high
+
+
+def fit(
+    model: Model, record: Record, layout: Layout, noise: Noise, rounds: int = 12, tolerance: float = 0.3,
+    report: Callable[[str], None] | None = None,
+) -> Fit:
+    """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance."""
+    damping = 1e-9
+    normal = normal_equations(model, record, layout, model.terms, noise)
+    for done in range(rounds):
+        low, high = limits(model)
+        theta = model.theta
+        improved = False
+        for _ in range(8):
+            step = bounded_step(normal.total_gram, normal.total_slope, low - theta, high - theta, damping)
+            promised = 2.0 * step @ normal.total_slope - step @ normal.total_gram @ step
+            if promised < tolerance:
+                return Fit(model, normal, True, done)
+            trial = model.moved(theta + step)
+            there = normal_equations(trial, record, layout, trial.terms, noise)
+            if np.isfinite(there.total_chi2) and there.total_chi2 < normal.total_chi2:
+                improved = True
+                break
+            damping = max(10.0 * damping, 1e-4)
+        if not improved:
+            return Fit(model, normal, False, done)
+        gained = normal.total_chi2 - there.total_chi2
+        model, normal = trial, there
+        damping = damping * 0.1 if gained > 0.5 * promised else damping * 3.0
+        damping = max(damping, 1e-9)
+        if report:
+            report(f"round {done}: chi2 {normal.total_chi2:.1f}")
+        if gained < tolerance:
+            return Fit(model, normal, True, done)
+    return Fit(model, normal, False, rounds)

@@ -1,0 +1,226 @@
+"""Measurement noise, from data that hold no model: repeats, zero voltage, the sum of three currents, quiet frequencies.
+
+Spectrum: medians of the periodogram in bins of constant ratio (a median ignores the few lines a distortion leaves),
+so white, 1/f^g and autoregressive noise need no choice of order. Whitening weights the Fourier transform of residual
+and sensitivities alike (P. Whittle, 1953).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.record import Record, Segment
+
+Array = NDArray[np.float64]
+BINS_PER_DECADE = 10
+SHORTEST_RECORD = 400
+WHITE_WITHIN = 0.12
+"""A spectrum flat within this fraction everywhere is taken as white (whitening then costs nothing)."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """`sigma_a` (phases,) rms of one sample; `density` (phases, b) relative to white at `frequency_hz` (b,).
+
+    `uncertainty` is the relative standard error of the variance; `is_known` False where it had to be taken from quiet
+    frequencies of the same record, which counts broadband structure as noise.
+    """
+
+    sigma_a: Array
+    frequency_hz: Array
+    density: Array
+    source: str
+    is_known: bool
+    uncertainty: float
+    is_white: bool
+    by_source: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def floor_a(self) -> float:
+        """Root mean square over the phases."""
+        return float(np.sqrt(np.mean(self.sigma_a**2)))
+
+    def weights(self, samples: int, period_s: float) -> Array:
+        """(phases, samples//2 + 1): what a Fourier coefficient is divided by, white level included."""
+        frequency = np.fft.rfftfreq(samples, period_s)
+        log_f = np.log(np.maximum(frequency, frequency[1] if samples > 2 else 1.0))
+        shape = np.stack([np.exp(np.interp(log_f, np.log(self.frequency_hz), np.log(row))) for row in self.density])
+        weights: Array = self.sigma_a[:, None] * np.sqrt(shape)
+        return weights
+
+
+def repeats(record: Record) -> list[tuple[int, int]]:
+    """Pairs of segments with the same axis and the same command, sample by sample (common length)."""
+    pairs = []
+    for a in range(len(record.segments)):
+        for b in range(a + 1, len(record.segments)):
+            if _is_same_test(record.segments[a], record.segments[b]):
+                pairs.append((a, b))
+                break
+    return pairs
+
+
+def _is_same_test(a: Segment, b: Segment) -> bool:
+    n = min(a.count, b.count)
+    if n < SHORTEST_RECORD or a.file != b.file or a.axis_deg != b.axis_deg:
+        return False
+    scale = float(np.std(a.voltage_axis_v[:n]))
+    difference = a.voltage_axis_v[:n] - b.voltage_axis_v[:n]
+    return scale > 0 and float(np.abs(difference).max()) < 1e-3 * scale
+
+
+def command_period(segment: Segment) -> int | None:
+    """Samples after which the command repeats exactly (at least two periods in the segment), or None."""
+    v = segment.voltage_axis_v
+    n = v.shape[0]
+    scale = float(np.std(v))
+    if scale == 0 or n < 2 * SHORTEST_RECORD:
+        return None
+    tail = v[n // 4 :]
+    m = tail.shape[0]
+    spectrum = np.fft.rfft(tail - tail.mean(), 2 * m)
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2)[:m] / np.arange(m, 0, -1)
+    peaks = np.flatnonzero(correlation[: m // 2] > 0.999 * correlation[0])
+    for lag in peaks[peaks > 8]:
+        if float(np.abs(tail[lag:] - tail[:-lag]).max()) < 1e-3 * scale:
+            return int(lag)
+    return None
+
+
+def measure_noise(record: Record) -> Noise:
+    """The best available measurement, with every other one listed in `by_source`."""
+    found = {
+        "repeated segments": _from_repeated_segments(record),
+        "repeated periods": _from_repeated_periods(record),
+        "zero voltage": _from_zero_voltage(record),
+        "sum of the three currents": _from_zero_sequence(record),
+    }
+    listed = {name: _rms(values) for name, values in found.items() if values}
+    for name, values in found.items():
+        if values and sum(v.shape[1] for v in values) >= SHORTEST_RECORD:
+            return _noise(values, record, name, True, listed)
+    return _noise(_quiet(record), record, "quiet frequencies", False, listed)
+
+
+def _rms(values: Sequence[Array]) -> list[float]:
+    stacked = np.concatenate([v - v.mean(axis=1, keepdims=True) for v in values], axis=1)
+    return [float(x) for x in stacked.std(axis=1)]
+
+
+def _from_repeated_segments(record: Record) -> list[Array]:
+    out = []
+    for a, b in repeats(record):
+        first, second = record.segments[a], record.segments[b]
+        n = min(first.count, second.count)
+        good = first.is_good[:n] & second.is_good[:n]
+        if good.mean() > 0.9:
+            difference = (first.currents_a[:, :n] - second.currents_a[:, :n]) / np.sqrt(2.0)
+            out.append(np.where(good, difference, 0.0) / np.sqrt(good.mean()))
+    return out
+
+
+def _from_repeated_periods(record: Record) -> list[Array]:
+    out = []
+    for segment in record.segments:
+        lag = command_period(segment)
+        if lag is None or segment.count < 3 * lag:
+            continue
+        settled = segment.currents_a[:, lag:] if segment.count >= 4 * lag else segment.currents_a[:, lag:]
+        n = 2 * lag * ((settled.shape[1]) // (2 * lag))
+        blocks = settled[:, :n].reshape(settled.shape[0], -1, 2, lag)
+        difference = (blocks[:, :, 0] - blocks[:, :, 1]) / np.sqrt(2.0)
+        if lag >= 100 and difference.size:
+            out.extend(np.ascontiguousarray(difference[:, k]) for k in range(difference.shape[1]))
+    return out
+
+
+def _from_zero_voltage(record: Record) -> list[Array]:
+    """Stretches with zero command: at the start of a segment that starts at rest, or after the current has decayed."""
+    out = []
+    for segment in record.segments:
+        edges = np.flatnonzero(np.diff(np.r_[0, (segment.voltage_axis_v == 0).astype(int), 0]))
+        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+            begin = start if start == 0 and segment.starts_at_rest else start + (stop - start) * 3 // 4
+            if stop - begin >= SHORTEST_RECORD:
+                piece = segment.currents_a[:, begin:stop]
+                ramp = np.linspace(-1, 1, piece.shape[1])
+                slope = (piece @ ramp) / (ramp @ ramp)
+                out.append(piece - piece.mean(axis=1, keepdims=True) - slope[:, None] * ramp)
+    return out
+
+
+def _from_zero_sequence(record: Record) -> list[Array]:
+    """Sum of three independent sensors / sqrt(3): motor currents cancel. Not when the third was computed."""
+    if record.facts.phases < 3:
+        return []
+    sums = [s.currents_a.sum(axis=0) for s in record.segments]
+    scale = record.facts.current_peak_a
+    if max(float(np.std(x)) for x in sums) < 1e-6 * scale:
+        return []
+    return [np.repeat(x[None, :] / np.sqrt(3.0), 3, axis=0) for x in sums]
+
+
+def _quiet(record: Record) -> list[Array]:
+    """The currents themselves; only the quiet quantile of their spectrum is used."""
+    return [s.currents_a for s in record.segments]
+
+
+def _window(n: int) -> Array:
+    t = 2.0 * np.pi * np.arange(n) / n
+    return np.asarray(0.35875 - 0.48829 * np.cos(t) + 0.14128 * np.cos(2 * t) - 0.01168 * np.cos(3 * t))
+
+
+def _noise(
+    values: Sequence[Array], record: Record, source: str, is_known: bool, listed: dict[str, list[float]]
+) -> Noise:
+    period = record.facts.sample_period_s
+    quantile = 0.5 if is_known else 0.15
+    correction = -np.log(1.0 - quantile)
+    frequency, power, phase_count = [], [], values[0].shape[0]
+    for piece in values:
+        n = piece.shape[1]
+        window = _window(n)
+        centred = piece - piece.mean(axis=1, keepdims=True)
+        spectrum = np.abs(np.fft.rfft(centred * window, axis=1)) ** 2 / float(window @ window)
+        frequency.append(np.fft.rfftfreq(n, period)[2:])
+        power.append(spectrum[:, 2:])
+    f, p = np.concatenate(frequency), np.concatenate(power, axis=1)
+    top = 0.5 / period
+    edges = np.geomspace(max(float(f.min()), 1e-3), top * 1.0001, _bin_count(float(f.min()), top))
+    which = np.digitize(f, edges)
+    centres, density = [], []
+    for k in range(1, edges.shape[0]):
+        inside = which == k
+        if inside.sum() >= 12:
+            centres.append(float(np.sqrt(edges[k - 1] * edges[k])))
+            density.append(np.quantile(p[:, inside], quantile, axis=1) / correction)
+    level = np.array(density).T
+    white = np.array([_level(p[c], quantile) for c in range(phase_count)])
+    relative = level / white[:, None]
+    per_bin = np.array([(which == k).sum() for k in range(1, edges.shape[0])])
+    per_bin = per_bin[per_bin >= 12]
+    spread = 2.2 * 3.0 / np.sqrt(per_bin / 2.0)
+    is_white = bool(np.all(np.abs(np.log(relative)).max(axis=0) < np.maximum(WHITE_WITHIN, spread)))
+    if is_white:
+        relative = np.ones_like(relative)
+    total = f.shape[0]
+    return Noise(
+        np.sqrt(white), np.array(centres), relative, source, is_known, float(1.5 * np.sqrt(1.0 / max(total, 1))),
+        is_white, listed,
+    )
+
+
+def _level(power: Array, quantile: float) -> float:
+    """Mean of exponentially distributed powers, by quantile, then refined by the mean below five times that."""
+    rough = float(np.quantile(power, quantile)) / -np.log(1.0 - quantile)
+    below = power[power < 5.0 * rough]
+    expected = (1.0 - np.exp(-5.0) * 6.0) / (1.0 - np.exp(-5.0))
+    return float(below.mean()) / expected if quantile == 0.5 else rough
+
+
+def _bin_count(low: float, high: float) -> int:
+    return max(4, int(BINS_PER_DECADE * np.log10(high / max(low, 1e-3))) + 1)

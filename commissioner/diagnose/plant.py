@@ -1,0 +1,366 @@
+"""The extended model in engineering terms: which numbers it has, and the currents and sensitivities it predicts.
+
+A model is the four inverse-Gamma numbers plus `Term`s. Every term is zero in the nominal model and enters linearly
+where physics puts it (legs, iron, leakage, rotor, sensor), so shapes are dictionaries: spline coefficients, stop
+operators of fixed radius, rotor branches of fixed corner frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from commissioner.diagnose import kernel
+from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.resample import resample, resample_hermite
+
+Array = NDArray[np.float64]
+
+# Where a term acts behind the motor terminals (kinds below 100 act inside and are the kernel's).
+DELAY, LAG, CLOCK, SHIFT, OFFSET, DRIFT, GAIN, EVEN, ODD, TONE, CABLE, FIFTH = range(100, 112)
+NOMINAL_KINDS = (kernel.R_S, kernel.R_R, kernel.GAMMA_SIGMA, kernel.GAMMA_M)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One number of the extended model: `value = theta * step`, in `unit`, zero in the nominal model."""
+
+    effect: str
+    symbol: str
+    unit: str
+    kind: int
+    index: int
+    step: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    start: float = 0.0
+    segment: int = -1
+    """Position of the only segment it acts in; -1: everywhere."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The fixed dictionaries: spline ranges and vectors, stop radii, branch corner frequencies."""
+
+    legs_top: float
+    legs_knee_a: float
+    legs_vectors: Array
+    iron_top_wb: float
+    iron_vectors: Array
+    leak_top_wb: float
+    leak_vectors: Array
+    stop_radius_wb: Array
+    branch_time_s: Array
+    nonlinearity_scale_a: float
+    substeps: int = 1
+    crossing_substeps: int = 6
+    shift_times_s: tuple[tuple[int, float], ...] = ()
+
+    def finer(self) -> Layout:
+        """Half the step length, for the solver-error check."""
+        return replace(self, substeps=2 * self.substeps, crossing_substeps=2 * self.crossing_substeps)
+
+
+def odd_vectors(intervals: int) -> Array:
+    """Spline vectors with F(0) = F''(0) = 0 and a flat end: odd functions that saturate, (intervals, intervals+3)."""
+    vectors = np.zeros((intervals, intervals + 3))
+    vectors[0, 2], vectors[0, 0] = 1.0, -1.0
+    for k in range(1, intervals):
+        vectors[k, k + 2] = 1.0
+    vectors[intervals - 2, intervals] = 1.0
+    # flat end: c[K+2] = c[K]
+    vectors[:, intervals + 2] = vectors[:, intervals]
+    return vectors
+
+
+def even_vectors(intervals: int) -> Array:
+    """Spline vectors with G(0) = G'(0) = 0: extra slopes that are zero at zero size, (intervals+1, intervals+3)."""
+    vectors = np.zeros((intervals + 1, intervals + 3))
+    vectors[0, 0], vectors[0, 1], vectors[0, 2] = 1.0, -0.5, 1.0
+    for k in range(1, intervals + 1):
+        vectors[k, k + 2] = 1.0
+    return vectors
+
+
+@dataclass(frozen=True)
+class Model:
+    """`nominal` = (R_s, R_R, L_sigma, L_M); `values[k]` belongs to `terms[k]`, in the term's unit."""
+
+    nominal: tuple[float, float, float, float]
+    terms: tuple[Term, ...] = ()
+    values: tuple[float, ...] = ()
+
+    @cached_property
+    def theta(self) -> Array:
+        """Scaled parameters: logarithms of the four, then value / step."""
+        scaled = [v / t.step for v, t in zip(self.values, self.terms, strict=True)]
+        return np.array([*np.log(self.nominal), *scaled])
+
+    def moved(self, theta: Array) -> Model:
+        nominal = np.exp(theta[:4])
+        values = tuple(float(x) * t.step for x, t in zip(theta[4:], self.terms, strict=True))
+        return Model((float(nominal[0]), float(nominal[1]), float(nominal[2]), float(nominal[3])), self.terms, values)
+
+    def with_terms(self, terms: Sequence[Term]) -> Model:
+        return Model(self.nominal, self.terms + tuple(terms), self.values + tuple(t.start for t in terms))
+
+    def without(self, effect: str) -> Model:
+        keep = [k for k, t in enumerate(self.terms) if t.effect != effect]
+        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+
+    def only(self, effects: Sequence[str]) -> Model:
+        keep = [k for k, t in enumerate(self.terms) if t.effect in effects]
+        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+
+    def of(self, effect: str) -> dict[str, float]:
+        return {t.symbol: v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect}
+
+    def total(self, kind: int, index: int = 0) -> float:
+        pairs = zip(self.terms, self.values, strict=True)
+        return sum(v for t, v in pairs if t.kind == kind and t.index == index)
+
+    def sum_kind(self, kind: int, size: int) -> Array:
+        out = np.zeros(size)
+        for term, value in zip(self.terms, self.values, strict=True):
+            if term.kind == kind:
+                out[term.index] += value
+        return out
+
+    def has_kind(self, *kinds: int) -> bool:
+        return any(t.kind in kinds for t in self.terms)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Currents `(phases, n)`; `jacobian` (4 + terms, phases, n) in theta units; rotor current and iron flux (2, n)."""
+
+    currents_a: Array
+    jacobian: Array
+    rotor_current_a: Array
+    iron_flux_wb: Array
+    slope_before: Array = field(default_factory=lambda: np.zeros((2, 0)))
+
+
+def predict(
+    model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term] | None = None
+) -> Prediction:
+    """Segment `position` as the model sees it. `wanted` None: no jacobian; else derivatives for the four and `wanted`."""
+    segment = record.segments[position]
+    channels = record.channels[position] if record.channels else np.zeros((segment.count, 1))
+    listed = [] if wanted is None else list(wanted)
+    inside = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
+    kinds = np.array([*NOMINAL_KINDS, *(listed[k].kind for k in inside)], dtype=np.int64)
+    indices = np.array([0, 0, 0, 0, *(listed[k].index for k in inside)], dtype=np.int64)
+    current, after, before, tangent, rotor, iron = _propagate(
+        model, segment, channels, layout, kinds, indices, wanted is not None
+    )
+    jacobian = np.zeros((0, record.facts.phases, segment.count))
+    if wanted is not None:
+        jacobian = np.zeros((4 + len(listed), record.facts.phases, segment.count))
+        scale = np.array([
+            model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
+            *(listed[k].step for k in inside),
+        ])
+        _to_phases(tangent * scale[:, None, None], jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
+    measured = _sense(model, record, segment, channels, layout, (current, after, before), jacobian, listed)
+    return Prediction(measured, jacobian, rotor, iron, before)
+
+
+def _to_phases(tangent: Array, jacobian: Array, rows: list[int]) -> None:
+    for source, row in enumerate(rows):
+        for phase in range(jacobian.shape[1]):
+            np.multiply(tangent[source, 0], TO_PHASES[phase, 0], out=jacobian[row, phase])
+            if TO_PHASES[phase, 1] != 0.0:
+                jacobian[row, phase] += TO_PHASES[phase, 1] * tangent[source, 1]
+
+
+def _propagate(
+    model: Model, segment: Segment, channels: Array, layout: Layout, kinds: Array, indices: Array, with_tangent: bool
+) -> tuple[Array, Array, Array, Array, Array, Array]:
+    n = segment.count
+    voltage_factor, rotor_factor = np.ones(n), np.ones(n)
+    omega, phase_factor = np.zeros(n), np.ones((n, 3))
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == kernel.VOLTAGE_MOD:
+            voltage_factor += value * channels[:, term.index]
+        elif term.kind == kernel.ROTOR_MOD:
+            rotor_factor += value * channels[:, term.index]
+        elif term.kind == kernel.OMEGA:
+            omega += value * channels[:, term.index]
+        elif term.kind == kernel.PHASE_RESISTANCE:
+            phase_factor += value * channels[:, term.index : term.index + 3]
+    aniso = [model.sum_kind(k, 2) for k in (
+        kernel.ROTOR_ANISOTROPY, kernel.LEAKAGE_ANISOTROPY, kernel.MAGNETIZING_ANISOTROPY)]
+    r_s, r_r, l_sigma, l_m = model.nominal
+    nu = 0.5 + model.total(kernel.NU)
+    base = np.array([r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kernel.IRON_LOSS), *np.concatenate(aniso)])
+    every = set(kinds.tolist()) | {t.kind for t in model.terms}
+    uses_legs = bool(every & {kernel.LEGS, kernel.LEGS_LINK})
+    stops = layout.stop_radius_wb if kernel.STOP in every else np.zeros(0)
+    branches = layout.branch_time_s if kernel.BRANCH in every else np.zeros(0)
+    legs_size = layout.legs_vectors.shape[0]
+    voltage = segment.voltage_ab_v
+    result: tuple[Array, Array, Array, Array, Array, Array] = kernel.propagate(
+        np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1]), voltage_factor, segment.link_ratio,
+        phase_factor, rotor_factor, omega, channels,
+        float(np.median(np.diff(segment.time_s))) if n > 1 else 1e-4,
+        _substeps(model, layout, segment), layout.crossing_substeps,
+        base,
+        model.sum_kind(kernel.LEGS, legs_size) @ layout.legs_vectors,
+        model.sum_kind(kernel.LEGS_LINK, legs_size) @ layout.legs_vectors,
+        model.sum_kind(kernel.IRON_CURVE, layout.iron_vectors.shape[0]) @ layout.iron_vectors,
+        model.sum_kind(kernel.LEAKAGE_CURVE, layout.leak_vectors.shape[0]) @ layout.leak_vectors,
+        layout.legs_top, layout.legs_knee_a, layout.iron_top_wb, layout.leak_top_wb,
+        model.sum_kind(kernel.STOP, stops.size) if stops.size else np.zeros(0), stops,
+        model.sum_kind(kernel.BRANCH, branches.size) if branches.size else np.zeros(0), branches,
+        kinds, indices,
+        _if(uses_legs, layout.legs_vectors),
+        _if(kernel.IRON_CURVE in every, layout.iron_vectors),
+        _if(kernel.LEAKAGE_CURVE in every, layout.leak_vectors),
+        _initial_state(model, segment), with_tangent,
+    )
+    return result
+
+
+def _if(is_used: bool, vectors: Array) -> Array:
+    return vectors if is_used else vectors[:0]
+
+
+def _initial_state(model: Model, segment: Segment) -> Array:
+    """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
+    state = np.zeros(4)
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == kernel.INITIAL_FLUX and term.segment in (-1, segment.uid):
+            if term.index < 2:
+                state[term.index] += value
+                state[2 + term.index] += value
+            else:
+                state[term.index - 2] += value
+    return state
+
+
+def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
+    """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode)."""
+    r_s, r_r, l_sigma, l_m = model.nominal
+    rate = (r_s + r_r) / l_sigma + r_r / l_m
+    if model.has_kind(kernel.BRANCH):
+        rate = max(rate, 1.5 / float(layout.branch_time_s.min()))
+    if model.has_kind(kernel.LEAKAGE_CURVE):
+        rate *= 1.3
+    period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
+    return int(layout.substeps * max(1, np.ceil(rate * period / 0.25)))
+
+
+def _sense(
+    model: Model, record: Record, segment: Segment, channels: Array, layout: Layout,
+    trajectory: tuple[Array, Array, Array], jacobian: Array, listed: Sequence[Term],
+) -> Array:
+    """From terminal currents to what the sensors report: cable, delay, lag, nonlinearity, gain, offset, pickup."""
+    phases = record.facts.phases
+    to_phases = TO_PHASES[:phases]
+    current, after, before = (to_phases @ x for x in trajectory)
+    period = record.facts.sample_period_s
+    edge = np.diff(to_phases @ segment.voltage_ab_v, axis=1, prepend=0.0) / period
+    capacitance = model.total(CABLE)
+    if capacitance:
+        current = current + capacitance * edge
+    elapsed = segment.time_s - segment.time_s[0]
+    late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
+    for k, (number, at) in enumerate(layout.shift_times_s):
+        if number == segment.number:
+            late = late - period * model.total(SHIFT, k) * (elapsed >= at)
+    late = np.broadcast_to(late, elapsed.shape)
+    is_late = bool(np.any(late))
+    filled = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
+    rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
+    if is_late:
+        current, slope = resample_hermite(current, after, before, late / period, period)
+        for row in rows:
+            jacobian[row] = resample(jacobian[row], late / period)
+    else:
+        slope = before
+    lag = model.total(LAG)
+    lag_slope = slope
+    if lag > 0.0:
+        current, lag_slope = _lagged(current, slope, lag, period)
+        slope = _lagged(slope, np.gradient(slope, period, axis=1), lag, period)[0]
+        for row in rows:
+            jacobian[row] = _low_pass(jacobian[row], lag, period)
+    scale = layout.nonlinearity_scale_a
+    gain, even = model.sum_kind(GAIN, 3)[:phases, None], model.sum_kind(EVEN, 3)[:phases, None]
+    odd, fifth = model.sum_kind(ODD, 3)[:phases, None], model.sum_kind(FIFTH, 3)[:phases, None]
+    s = current / scale
+    distorted = current * (1.0 + gain + even * s + odd * s * s + fifth * s**4)
+    if rows and (gain.any() or even.any() or odd.any() or fifth.any()):
+        slope_of_sensor = 1.0 + gain + 2.0 * even * s + 3.0 * odd * s * s + 5.0 * fifth * s**4
+        for row in rows:
+            jacobian[row] *= slope_of_sensor
+    reported = distorted + model.sum_kind(OFFSET, 3)[:phases, None]
+    middle = record.segments[0].time_s[0]
+    age = (segment.time_s - middle) / 60.0
+    reported = reported + model.sum_kind(DRIFT, 3)[:phases, None] * age
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == TONE and value:
+            reported[term.index % 3] += value * channels[:, term.index // 3]
+    for k, term in enumerate(listed):
+        row = jacobian[4 + k]
+        if term.kind == DELAY:
+            row[:] = -slope
+        elif term.kind == LAG:
+            row[:] = -lag_slope
+        elif term.kind == CLOCK:
+            row[:] = -slope * elapsed * 1e-6
+        elif term.kind == SHIFT:
+            number, at = layout.shift_times_s[term.index]
+            if number == segment.number:
+                row[:] = slope * period * (elapsed >= at)
+        elif term.kind == OFFSET:
+            row[term.index] = 1.0
+        elif term.kind == DRIFT:
+            row[term.index] = age
+        elif term.kind == GAIN:
+            row[term.index] = current[term.index]
+        elif term.kind == EVEN:
+            row[term.index] = current[term.index] * s[term.index]
+        elif term.kind == ODD:
+            row[term.index] = current[term.index] * s[term.index] ** 2
+        elif term.kind == FIFTH:
+            row[term.index] = current[term.index] * s[term.index] ** 4
+        elif term.kind == TONE:
+            row[term.index % 3] = channels[:, term.index // 3]
+        elif term.kind == CABLE:
+            row[:] = edge
+        if term.kind >= 100:
+            row *= term.step
+    return reported
+
+
+def _low_pass(signal: Array, lag_s: float, period_s: float) -> Array:
+    """First-order lag of a signal linear between samples (first-order hold, exact for it)."""
+    x = period_s / lag_s
+    decay = np.exp(-x)
+    late = 1.0 - (1.0 - decay) / x
+    filtered: Array = lfilter([late, 1.0 - decay - late], [1.0, -decay], signal, axis=-1)
+    return filtered
+
+
+def _lagged(current: Array, slope: Array, lag_s: float, period_s: float) -> tuple[Array, Array]:
+    """First-order lag and minus its derivative with respect to the lag (central difference of the same filter).
+
+    Below a twentieth of a sample the lag is expanded: i - tau i' (its second-order term is then below 1e-3 of the
+    first at the excited frequencies).
+    """
+    if lag_s < 0.05 * period_s:
+        return current - lag_s * slope, slope
+    h = 1e-3 * lag_s
+    high, low = _low_pass_smooth(current, lag_s + h, period_s), _low_pass_smooth(current, lag_s - h, period_s)
+    return _low_pass_smooth(current, lag_s, period_s), -(high - low) / (2.0 * h)
+
+
+def _low_pass_smooth(signal: Array, lag_s: float, period_s: float) -> Array:
+    return _low_pass(signal, lag_s, period_s)

@@ -1,0 +1,99 @@
+"""A recording prepared for diagnosis: segments in alpha/beta, masks, and the known functions of time effects may use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.records import Signal
+
+PHASE_ANGLES_RAD = np.array([0.0, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0])
+TO_PHASES = np.stack([np.cos(PHASE_ANGLES_RAD), np.sin(PHASE_ANGLES_RAD)], axis=1)
+"""(3, 2): phase currents of an amplitude-invariant (alpha, beta) vector without zero sequence."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One stretch from de-energised to de-energised, without holes. Signals `(n,)`, currents `(phases, n)`."""
+
+    number: int
+    file: int
+    axis_deg: float
+    time_s: Signal
+    voltage_axis_v: Signal
+    currents_a: NDArray[np.float64]
+    is_good: NDArray[np.bool_]
+    link_ratio: Signal
+    starts_at_rest: bool = True
+    uid: int = 0
+
+    @property
+    def count(self) -> int:
+        return int(self.time_s.shape[0])
+
+    @property
+    def voltage_ab_v(self) -> NDArray[np.float64]:
+        angle = np.deg2rad(self.axis_deg)
+        return np.stack([self.voltage_axis_v * np.cos(angle), self.voltage_axis_v * np.sin(angle)])
+
+    @property
+    def axis_current_a(self) -> Signal:
+        """Least-squares projection of the measured phase currents on the excited axis."""
+        angle = np.deg2rad(self.axis_deg)
+        weights = TO_PHASES[: self.currents_a.shape[0]] @ np.array([np.cos(angle), np.sin(angle)])
+        projected: Signal = weights @ self.currents_a / float(weights @ weights)
+        return projected
+
+    def first(self, samples: int) -> Segment:
+        """The segment cut after so many samples."""
+        return Segment(
+            self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
+            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
+        )
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Scales of the machine and of the data. Currents and voltages are peak phase values."""
+
+    sample_period_s: float
+    rated_current_peak_a: float
+    rated_power_w: float
+    rated_flux_wb: float
+    current_peak_a: float
+    switching_frequency_hz: float | None
+    dc_link_v: float | None
+    phases: int
+    metadata: Mapping[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Segments plus `channels[k]` (n_k, c), the known functions of time, named by `channel_names`."""
+
+    segments: tuple[Segment, ...]
+    facts: Facts
+    channel_names: tuple[str, ...] = ()
+    channels: tuple[NDArray[np.float64], ...] = ()
+
+    @property
+    def samples(self) -> int:
+        return sum(segment.count for segment in self.segments)
+
+    def channel(self, name: str) -> int:
+        return self.channel_names.index(name)
+
+    def with_channels(self, names: tuple[str, ...], channels: tuple[NDArray[np.float64], ...]) -> Record:
+        """The record with more known functions of time appended, one array (n_k, len(names)) per segment."""
+        if self.channels:
+            channels = tuple(np.hstack(pair) for pair in zip(self.channels, channels, strict=True))
+        return Record(self.segments, self.facts, self.channel_names + names, channels)
+
+    def subset(self, keep: tuple[int, ...], samples: int | None = None) -> Record:
+        """Only the segments at the positions `keep`, each cut after `samples`."""
+        cut = [self.segments[k] if samples is None else self.segments[k].first(samples) for k in keep]
+        channels = tuple(np.ascontiguousarray(self.channels[k][: s.count]) for k, s in zip(keep, cut, strict=True))
+        return Record(tuple(cut), self.facts, self.channel_names, channels if self.channels else ())
