@@ -1,0 +1,268 @@
+"""Compiled inner loops of the parallel adaptive observer, in the paper's symbols.
+
+Discrete Kreisselmeier form of the machine behind a zero-order hold, exact for any sample period. With
+A(z) = z^2 + a1 z + a0, B(z) = b1 z + b0 the pulse transfer of the machine and Lambda(z) = (z - f1)(z - f2) the
+filter, y = ((Lambda - A)/Lambda) y + (B/Lambda) u, in partial fractions
+
+    zeta_y[k+1] = F zeta_y[k] + g y[k],   zeta_u[k+1] = F zeta_u[k] + g u[k],   g_i = 1 - f_i
+    y[k] = theta_1^T zeta_y[k] + theta_2^T zeta_u[k]
+
+The parallel observer replaces y by its own yhat (zhat for zeta_y). Its exact sensitivity is Lambda/A applied to the
+regressor w = (zhat, zeta_u): the same two filters driven by p = yhat + theta_1^T phi_y and q = u + theta_1^T phi_u.
+Sources: G. Kreisselmeier, IEEE TAC 22(1), 1977; Castaldi & Tilli 2005; L. Ljung, System Identification, ch. 11;
+G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, ch. V (UD update).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Offsets into the state vector.
+ZHAT, ZETA_U, PHI_Y, PHI_U = 0, 2, 4, 6
+FREE = 8  # dzhat / d(initial zhat), (2, 2) row-major
+NOISE, NOISE_LAG, LAST_ERROR = 12, 13, 14
+LAST_CURRENT, LAST_VOLTAGE, LAST_EXTRA = 15, 16, 17
+ABSORBING = 18  # 1 while the unknown initial state is still being estimated
+REJECTED, COUNT, SQUARES = 19, 20, 21
+STATE_SIZE = 22
+
+# theta_free (initial state) first: dropping it then leaves the factor of the marginal covariance.
+FREE_PARAMETERS, PARAMETERS = 2, 6
+
+FAST, LYAPUNOV, FROZEN = 0, 1, 2
+
+
+@njit(cache=True)
+def machine_from_theta(theta: Array, f: Array, period: float, out: Array) -> bool:
+    """(R_s, R_R, L_sigma, L_M) into `out`; False (and `out` untouched) where theta is no passive machine."""
+    g1, g2 = 1.0 - f[0], 1.0 - f[1]
+    a1 = -(f[0] + f[1]) - theta[0] * g1 - theta[1] * g2
+    a0 = f[0] * f[1] + theta[0] * g1 * f[1] + theta[1] * g2 * f[0]
+    b1 = theta[2] * g1 + theta[3] * g2
+    b0 = -theta[2] * g1 * f[1] - theta[3] * g2 * f[0]
+    half = -0.5 * a1
+    root = half * half - a0
+    if not (root > 0.0 and a0 > 0.0):
+        return False
+    slow_z = half + math.sqrt(root)
+    fast_z = a0 / slow_z
+    if not (0.0 < fast_z < slow_z < 1.0):
+        return False
+    slow, fast = math.log(slow_z) / period, math.log(fast_z) / period
+    slow_r = (b1 * slow_z + b0) / (slow_z - fast_z) * slow / (slow_z - 1.0)
+    fast_r = (b1 * fast_z + b0) / (fast_z - slow_z) * fast / (fast_z - 1.0)
+    if not (slow_r > 0.0 and fast_r > 0.0):
+        return False
+    total = slow_r + fast_r
+    alpha = -(slow_r * fast + fast_r * slow) / total
+    r_s = slow * fast / (total * alpha)
+    r_r = (-(slow + fast) - alpha) / total - r_s
+    if not (alpha > 0.0 and r_s > 0.0 and r_r > 0.0):
+        return False
+    out[0], out[1], out[2], out[3] = r_s, r_r, 1.0 / total, r_r / alpha
+    return True
+
+
+@njit(cache=True)
+def flux_gains(machine: Array, period: float) -> tuple[float, float]:
+    """(Ad00, Ad01) of the held-input model: i[k+1] without voltage = Ad00 i[k] + Ad01 psi_R[k]."""
+    r_s, r_r, l_s, l_m = machine[0], machine[1], machine[2], machine[3]
+    alpha = r_r / l_m
+    half = 0.5 * ((r_s + r_r) / l_s + alpha)
+    fast = -(half + math.sqrt(max(half * half - alpha * r_s / l_s, 0.0)))
+    slow = alpha * r_s / l_s / fast
+    rise = (math.exp(slow * period) - math.exp(fast * period)) / (slow - fast)
+    return math.exp(fast * period) + rise * (-(r_s + r_r) / l_s - fast), rise * alpha / l_s
+
+
+@njit(cache=True)
+def lookup(table: Array, span: float, x: float) -> float:
+    """Odd function tabulated at 0 ... span; constant beyond."""
+    a = abs(x) * (table.size - 1) / span
+    if a >= table.size - 1:
+        value = table[-1]
+    else:
+        k = int(a)
+        value = table[k] + (a - k) * (table[k + 1] - table[k])
+    return value if x >= 0.0 else -value
+
+
+@njit(cache=True)
+def advance(
+    u: Array, y: Array, f: Array, period: float, law: int, noise_memory: float, dead_zone: float, noise_floor: float,
+    delay: float, lost_v: Array, lost_span: float, extra_a: Array, extra_span: float,
+    state: Array, theta_in: Array, upper: Array, diagonal: Array, gamma: Array, machine: Array,
+    current: Array, rotor_flux: Array, stator_flux: Array,
+) -> None:
+    """Run the observer over one block of held voltages u and sampled currents y, `(n,)` each, updating all state.
+
+    `upper` (6, 6) and `diagonal` (6,) factor the covariance (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov
+    law. `lost_v` tabulates the inverter's voltage error along the axis over current 0 ... lost_span, `extra_a` the
+    magnetizing current beyond the linear one over stator flux 0 ... extra_span; size 1 = none.
+    """
+    f1, f2 = f[0], f[1]
+    g1, g2 = 1.0 - f1, 1.0 - f2
+    z1, z2, x1, x2 = state[0], state[1], state[2], state[3]
+    py1, py2, pu1, pu2 = state[4], state[5], state[6], state[7]
+    d11, d12, d21, d22 = state[8], state[9], state[10], state[11]
+    c0, c1, e_last = state[12], state[13], state[14]
+    i_last, u_last, extra_last = state[15], state[16], state[17]
+    absorbing = state[18] > 0.5
+    rejected, squares = state[19], 0.0
+    t1, t2, t3, t4 = theta_in[0], theta_in[1], theta_in[2], theta_in[3]
+    theta = np.empty(4)
+    ad00, ad01 = flux_gains(machine, period)
+    beta = 1.0 / noise_memory
+    psi = np.zeros(PARAMETERS)
+    v = np.zeros(PARAMETERS)
+    ff = np.zeros(PARAMETERS)
+    k_gain = np.zeros(PARAMETERS)
+    has_lost, has_extra = lost_v.size > 1, extra_a.size > 1
+
+    for k in range(u.size):
+        # Present machine, for the flux and for the resistance in the saturation's voltage.
+        if k & 63 == 0:
+            theta[0], theta[1], theta[2], theta[3] = t1, t2, t3, t4
+            if machine_from_theta(theta, f, period, machine):
+                ad00, ad01 = flux_gains(machine, period)
+
+        # Output and flux a priori.
+        yl = t1 * z1 + t2 * z2 + t3 * x1 + t4 * x2
+        extra = 0.0
+        if has_extra:
+            free = t1 * (f1 * z1 + g1 * yl) + t2 * (f2 * z2 + g2 * yl) + t3 * f1 * x1 + t4 * f2 * x2
+            extra = lookup(extra_a, extra_span, (free - ad00 * yl) / ad01 + machine[2] * yl)
+        e = y[k] - extra - yl
+
+        # Noise level: variance times the (AR(1)) length of its correlation, so that an error of the model, which is
+        # coloured, is not taken for information.
+        if law != FROZEN:
+            c0 += beta * (e * e - c0)
+            c1 += beta * (e * e_last - c1)
+            e_last = e
+            squares += e * e
+
+        if law == FAST:
+            rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)
+            rho = 0.0 if rho < 0.0 else (0.999 if rho > 0.999 else rho)
+            r = c0 * (1.0 + rho) / (1.0 - rho) + noise_floor
+            psi[2], psi[3], psi[4], psi[5] = py1, py2, pu1, pu2
+            first = 2
+            if absorbing:
+                first = 0
+                psi[0] = t1 * d11 + t2 * d21
+                psi[1] = t1 * d12 + t2 * d22
+            # Bierman: f = U^T psi, v = D f, then column by column.
+            for j in range(first, PARAMETERS):
+                s = psi[j]
+                for i in range(first, j):
+                    s += upper[i, j] * psi[i]
+                ff[j] = s
+                v[j] = diagonal[j] * s
+            alpha = r
+            for j in range(first, PARAMETERS):
+                alpha_last = alpha
+                alpha = alpha_last + ff[j] * v[j]
+                k_gain[j] = v[j]
+            step = e / alpha
+            # The gain K = b / alpha needs the whole sweep; first see whether the step is allowed.
+            # b_i accumulates U rows: b = U v.
+            for i in range(first, PARAMETERS):
+                s = v[i]
+                for j in range(i + 1, PARAMETERS):
+                    s += upper[i, j] * v[j]
+                k_gain[i] = s
+            n1, n2 = t1 + k_gain[2] * step, t2 + k_gain[3] * step
+            half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
+            a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
+            if half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0:
+                t1, t2 = n1, n2
+                t3 += k_gain[4] * step
+                t4 += k_gain[5] * step
+                if absorbing:
+                    s1, s2 = k_gain[0] * step, k_gain[1] * step
+                    z1 += d11 * s1 + d12 * s2
+                    z2 += d21 * s1 + d22 * s2
+                alpha = r
+                for j in range(first, PARAMETERS):
+                    alpha_last = alpha
+                    alpha = alpha_last + ff[j] * v[j]
+                    diagonal[j] *= alpha_last / alpha
+                    low = -ff[j] / alpha_last
+                    k_gain[j] = v[j]
+                    for i in range(first, j):
+                        old = upper[i, j]
+                        upper[i, j] = old + k_gain[i] * low
+                        k_gain[i] += v[j] * old
+            else:
+                rejected += 1.0
+        elif law == LYAPUNOV:
+            err = e - dead_zone if e > dead_zone else (e + dead_zone if e < -dead_zone else 0.0)
+            if err != 0.0:
+                power = 0.0
+                for i in range(4):
+                    ff[i] = gamma[i, 0] * z1 + gamma[i, 1] * z2 + gamma[i, 2] * x1 + gamma[i, 3] * x2
+                power = ff[0] * z1 + ff[1] * z2 + ff[2] * x1 + ff[3] * x2
+                step = err / (1.0 + power)
+                n1, n2 = t1 + ff[0] * step, t2 + ff[1] * step
+                half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
+                a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
+                if half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0:
+                    t1, t2 = n1, n2
+                    t3 += ff[2] * step
+                    t4 += ff[3] * step
+                else:
+                    rejected += 1.0
+
+        # Output and flux a posteriori: what the observer goes on with, and what the caller sees.
+        yl = t1 * z1 + t2 * z2 + t3 * x1 + t4 * x2
+        free = t1 * (f1 * z1 + g1 * yl) + t2 * (f2 * z2 + g2 * yl) + t3 * f1 * x1 + t4 * f2 * x2
+        psi_r = (free - ad00 * yl) / ad01
+        psi_s = psi_r + machine[2] * yl
+        extra = lookup(extra_a, extra_span, psi_s) if has_extra else 0.0
+        i_now = yl + extra
+        current[k] = i_now
+        rotor_flux[k] = psi_r
+        stator_flux[k] = psi_s
+
+        # The voltage that drives the linear machine over this period.
+        drive = u[k] - delay * (u[k] - u_last)
+        u_last = u[k]
+        if has_lost:
+            drive -= lookup(lost_v, lost_span, 1.5 * i_now - 0.5 * i_last)
+        if has_extra:
+            drive -= machine[0] * (1.5 * extra - 0.5 * extra_last)
+        i_last, extra_last = i_now, extra
+
+        # Filters: regressor, sensitivity, and the response to the unknown initial state.
+        p = yl + t1 * py1 + t2 * py2
+        q = drive + t1 * pu1 + t2 * pu2
+        z1, z2 = f1 * z1 + g1 * yl, f2 * z2 + g2 * yl
+        x1, x2 = f1 * x1 + g1 * drive, f2 * x2 + g2 * drive
+        py1, py2 = f1 * py1 + g1 * p, f2 * py2 + g2 * p
+        pu1, pu2 = f1 * pu1 + g1 * q, f2 * pu2 + g2 * q
+        if absorbing:
+            s1, s2 = t1 * d11 + t2 * d21, t1 * d12 + t2 * d22
+            d11, d12 = f1 * d11 + g1 * s1, f1 * d12 + g1 * s2
+            d21, d22 = f2 * d21 + g2 * s1, f2 * d22 + g2 * s2
+            if abs(d11) + abs(d12) + abs(d21) + abs(d22) < 1e-5:
+                absorbing = False
+
+    state[0], state[1], state[2], state[3] = z1, z2, x1, x2
+    state[4], state[5], state[6], state[7] = py1, py2, pu1, pu2
+    state[8], state[9], state[10], state[11] = d11, d12, d21, d22
+    state[12], state[13], state[14] = c0, c1, e_last
+    state[15], state[16], state[17] = i_last, u_last, extra_last
+    state[18] = 1.0 if absorbing else 0.0
+    state[19] = rejected
+    state[20] += u.size
+    state[21] = squares
+    theta_in[0], theta_in[1], theta_in[2], theta_in[3] = t1, t2, t3, t4
+    theta[0], theta[1], theta[2], theta[3] = t1, t2, t3, t4
+    machine_from_theta(theta, f, period, machine)

@@ -1,0 +1,347 @@
+"""The parallel adaptive observer: sample by sample from held voltages and sampled currents to the four parameters.
+
+Two laws on the same observer (equations: `kernels`). `fast` is the recursive prediction-error method: least-squares gain
+with the exact sensitivity, in UD form, no forgetting. What forgetting is usually needed for - a start far from the truth -
+is done by (a) weighting each sample with the present residual's spectral density, so that data seen with a wrong model
+weigh little, and (b) going over the stored data again from the present estimate whenever their number has doubled, until
+`memory_s`; from then on the recursion runs alone in constant memory. `lyapunov` is the gradient law of Castaldi & Tilli
+2005 (h = 0, k = 1) with a constant gain matrix, dead zone and the SPR condition checked over the prior box.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.errors import UsageError
+from commissioner.identify import kernels
+from commissioner.identify.compensation import NOTHING, Compensation
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import ParameterBox
+from commissioner.motor.standstill import poles_per_s, to_pulse_transfer
+from commissioner.records import Signal
+
+Law = Literal["fast", "lyapunov"]
+Matrix = NDArray[np.float64]
+
+PRIOR_LOG_STD = 0.5
+"""Spread of the prior around its typical member: a factor 1.65 either way is one standard deviation."""
+NOISE_MEMORY_S = 0.1
+FIRST_REVIEW_S = 0.3
+LYAPUNOV_TIME_CONSTANT_S = 5.0
+
+
+@dataclass(frozen=True)
+class BlockEstimate:
+    """What the observer knows after a block. Signals are `(n,)`, a posteriori, aligned with the block's samples.
+
+    `std` is one standard deviation of (R_s, R_R, L_sigma, L_M). `rotor_flux_wb` and `stator_flux_wb` are those of the
+    linear machine at each sample's instant.
+    """
+
+    parameters: InverseGamma
+    std: tuple[float, float, float, float]
+    residual_rms_a: float
+    noise_a: float
+    current_a: Signal
+    rotor_flux_wb: Signal
+    stator_flux_wb: Signal
+    samples: int
+    lost_samples: int
+    restarts: int
+
+
+@dataclass
+class _Shell:
+    """All that changes from block to block."""
+
+    state: Matrix
+    theta: Matrix
+    upper: Matrix
+    diagonal: Matrix
+    machine: Matrix
+
+
+@dataclass(frozen=True)
+class _Piece:
+    voltage_v: Signal
+    current_a: Signal
+    restarts: bool
+    open_loop_v: Signal | None = None
+
+
+@dataclass
+class ParallelObserver:
+    """Feed blocks with `advance`; nothing is read from or written to anywhere else.
+
+    `prior` bounds the machine (from the nameplate), `current_scale_a` its currents (rated peak). `starts_at_rest` says
+    that current and flux are zero at the first sample; otherwise, and after every gap, the unknown state is estimated
+    along with the parameters. Raises UsageError where the Lyapunov law has no positive-real margin over the prior.
+    """
+
+    prior: ParameterBox
+    sample_period_s: float
+    current_scale_a: float
+    law: Law = "fast"
+    start: InverseGamma | None = None
+    compensation: Compensation = NOTHING
+    starts_at_rest: bool = True
+    memory_s: float = 120.0
+    dead_zone_a: float = 0.0
+    expected_voltage_v: Signal | None = None
+    lost_samples: int = field(default=0, init=False)
+    restarts: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        first = self.start or self.prior.typical
+        self._filter = filter_poles(self.prior, self.sample_period_s)
+        self._law = kernels.FAST if self.law == "fast" else kernels.LYAPUNOV
+        self._gamma = np.zeros((4, 4))
+        if self.law == "lyapunov":
+            _require_margin(self.prior, self._filter, self.sample_period_s)
+            if self.expected_voltage_v is not None:
+                self._gamma = self._gain_matrix(self.expected_voltage_v)
+        self._shell = self._fresh(first, self.current_scale_a**2)
+        self._history: list[_Piece] = []
+        self._samples = 0
+        self._next_review = max(FIRST_REVIEW_S / self.sample_period_s, 100.0)
+        self._first = True
+
+    def advance(
+        self, voltage_v: Signal, current_a: Signal, lost_before: int = 0, lost_voltage_v: Signal | None = None
+    ) -> BlockEstimate:
+        """Take in one block of `(n,)` voltages along the axis (held over each period) and currents (at its start).
+
+        `lost_before` samples are missing between the last block and this one. Where their voltage is known
+        (`lost_voltage_v`) the observer runs through the hole open loop with adaptation frozen; otherwise its states
+        restart as unknowns. Either way no sample is invented.
+        """
+        voltage_v = np.ascontiguousarray(voltage_v, dtype=np.float64)
+        current_a = np.ascontiguousarray(current_a, dtype=np.float64)
+        if voltage_v.ndim != 1 or voltage_v.shape != current_a.shape:
+            raise ValueError(f"voltage {voltage_v.shape} and current {current_a.shape} must be equal (n,)")
+        if self.law == "lyapunov" and not self._gamma.any():
+            self._gamma = self._gain_matrix(voltage_v)
+        self.lost_samples += lost_before
+        bridged = lost_voltage_v if lost_before else None
+        restarts = (self._first and not self.starts_at_rest) or (lost_before > 0 and bridged is None)
+        self.restarts += int(restarts and not self._first)
+        self._first = False
+        return self._advance_with_reviews(_Piece(voltage_v, current_a, restarts, bridged))
+
+    # -- the parts ------------------------------------------------------------------------------------------------
+
+    def _advance_with_reviews(self, piece: _Piece) -> BlockEstimate:
+        """Split the block where the stored data have doubled, and go over them again there."""
+        signals: list[tuple[Signal, Signal, Signal]] = []
+        squares = 0.0
+        total = piece.voltage_v.shape[0]
+        done = 0
+        while done < total or not signals:
+            cut = total if self.law != "fast" else min(total, done + max(1, int(self._next_review) - self._samples))
+            part = _Piece(
+                piece.voltage_v[done:cut], piece.current_a[done:cut], piece.restarts and done == 0,
+                piece.open_loop_v if done == 0 else None,
+            )
+            signals.append(self._run(self._shell, part))
+            squares += float(self._shell.state[kernels.SQUARES])
+            self._samples += cut - done
+            done = cut
+            self._remember(part)
+        current, rotor, stator = (np.concatenate(parts) for parts in zip(*signals, strict=True))
+        return BlockEstimate(
+            parameters=self.parameters,
+            std=self._std(),
+            residual_rms_a=math.sqrt(squares / max(total, 1)),
+            noise_a=math.sqrt(float(self._shell.state[kernels.NOISE])),
+            current_a=current,
+            rotor_flux_wb=rotor,
+            stator_flux_wb=stator,
+            samples=self._samples,
+            lost_samples=self.lost_samples,
+            restarts=self.restarts,
+        )
+
+    def _remember(self, part: _Piece) -> None:
+        if self.law != "fast" or self._next_review * self.sample_period_s > self.memory_s:
+            self._history.clear()
+            return
+        self._history.append(part)
+        if self._samples >= int(self._next_review):
+            self.review()
+            self._next_review *= 2.0
+
+    def review(self) -> None:
+        """Go over the stored data once more from the present estimate (one Gauss-Newton step of the recursion)."""
+        if not self._history:
+            return
+        # The noise of the last pass includes the model's error, which the new pass starts without.
+        fresh = self._fresh(self.parameters, float(self._shell.state[kernels.NOISE]), around_start=True)
+        for piece in self._history:
+            self._run(fresh, piece)
+        if np.all(np.isfinite(fresh.theta)) and self._is_machine(fresh.theta):
+            self._shell = fresh
+
+    def _is_machine(self, theta: Matrix) -> bool:
+        return bool(kernels.machine_from_theta(theta, self._filter, self.sample_period_s, np.empty(4)))
+
+    def _run(self, shell: _Shell, piece: _Piece) -> tuple[Signal, Signal, Signal]:
+        if piece.restarts:
+            _restart(shell, self.current_scale_a)
+        if piece.open_loop_v is not None:
+            self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
+        return self._kernel(shell, piece.voltage_v, piece.current_a, self._law)
+
+    def _kernel(self, shell: _Shell, voltage_v: Signal, current_a: Signal, law: int) -> tuple[Signal, Signal, Signal]:
+        signals = tuple(np.empty_like(voltage_v) for _ in range(3))
+        compensation = self.compensation
+        kernels.advance(
+            np.ascontiguousarray(voltage_v, dtype=np.float64), current_a, self._filter, self.sample_period_s, law,
+            NOISE_MEMORY_S / self.sample_period_s, self.dead_zone_a, (1e-9 * self.current_scale_a) ** 2,
+            compensation.delay_s / self.sample_period_s, compensation.lost_v, compensation.lost_span_a,
+            compensation.extra_a, compensation.extra_span_wb,
+            shell.state, shell.theta, shell.upper, shell.diagonal, self._gamma, shell.machine, *signals,
+        )
+        return signals[0], signals[1], signals[2]
+
+    @property
+    def parameters(self) -> InverseGamma:
+        """The last estimate that is a passive machine, projected into the prior box widened twofold."""
+        values = self._shell.machine
+        low, high = self.prior.lower.as_tuple(), self.prior.upper.as_tuple()
+        return InverseGamma(*(float(min(max(v, 0.5 * a), 2.0 * b)) for v, a, b in zip(values, low, high, strict=True)))
+
+    @property
+    def samples(self) -> int:
+        return self._samples
+
+    def covariance(self) -> Matrix:
+        """(4, 4) of (R_s, R_R, L_sigma, L_M); for the Lyapunov law, which has none, zeros."""
+        if self.law != "fast":
+            return np.zeros((4, 4))
+        back = np.linalg.inv(_jacobian(InverseGamma(*map(float, self._shell.machine)), self._filter, self.sample_period_s))
+        upper, diagonal = self._shell.upper[2:, 2:], self._shell.diagonal[2:]
+        root = back @ upper * np.sqrt(diagonal)
+        return np.asarray(root @ root.T)
+
+    def _std(self) -> tuple[float, float, float, float]:
+        a, b, c, d = np.sqrt(np.diag(self.covariance()))
+        return float(a), float(b), float(c), float(d)
+
+    def _fresh(self, machine: InverseGamma, variance_a2: float, around_start: bool = False) -> _Shell:
+        state = np.zeros(kernels.STATE_SIZE)
+        state[kernels.NOISE] = variance_a2
+        theta = to_theta(machine, self._filter, self.sample_period_s)
+        if around_start:
+            jacobian = _jacobian(machine, self._filter, self.sample_period_s) * np.array(machine.as_tuple())
+            covariance = PRIOR_LOG_STD**2 * jacobian @ jacobian.T
+        else:
+            covariance = _prior_covariance(self.prior, self._filter, self.sample_period_s)
+        upper, diagonal = np.eye(kernels.PARAMETERS), np.zeros(kernels.PARAMETERS)
+        upper[2:, 2:], diagonal[2:] = ud_factors(covariance)
+        return _Shell(state, theta, upper, diagonal, np.array(machine.as_tuple()))
+
+    def _gain_matrix(self, voltage_v: Signal) -> Matrix:
+        """Gamma = (T / time constant) x (regressor power of the typical machine)^-1: the same speed for every machine."""
+        w = _regressor(self.prior.typical, self._filter, self.sample_period_s, voltage_v)
+        power = w.T @ w / max(w.shape[0], 1)
+        power += 1e-6 * np.trace(power) * np.eye(4) + 1e-30 * np.eye(4)
+        return np.asarray(self.sample_period_s / LYAPUNOV_TIME_CONSTANT_S * np.linalg.inv(power))
+
+
+def filter_poles(prior: ParameterBox, period_s: float) -> Matrix:
+    """Discrete poles (f1, f2) of the filters: left of the typical machine's by 2 (slow) and 1.5 (fast)."""
+    slow, fast = poles_per_s(prior.typical)
+    return np.exp(np.array([2.0 * slow, 1.5 * fast]) * period_s)
+
+
+def positive_real_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> float:
+    """The smallest Re(Lambda/A) over |z| = 1 and the machines of the box's corners and middles, with Lambda/A = 1 at
+    z = infinity. The gradient law converges where it is positive (observer error passive), the least-squares law above 1/2."""
+    omega = np.concatenate([[0.0], np.geomspace(1e-3, math.pi / period_s, 400)])
+    z = np.exp(1j * omega * period_s)
+    top = (z - filter_z[0]) * (z - filter_z[1])
+    levels = zip(prior.lower.as_tuple(), prior.typical.as_tuple(), prior.upper.as_tuple(), strict=True)
+    worst = math.inf
+    for values in itertools.product(*levels):
+        slow, fast = poles_per_s(InverseGamma(*values))
+        bottom = (z - math.exp(slow * period_s)) * (z - math.exp(fast * period_s))
+        worst = min(worst, float(np.min((top / bottom).real)))
+    return worst
+
+
+def _require_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> None:
+    margin = positive_real_margin(prior, filter_z, period_s)
+    if not margin > 0.0:
+        raise UsageError(
+            "the Lyapunov law has no positive-real margin over the machines this nameplate allows",
+            step="choose observer gains", value=f"margin {margin:.3g}", limit="above 0",
+            remedy="use the fast law, or correct the nameplate: rated slip and current set the box",
+        )
+
+
+def to_theta(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
+    """(theta_1, theta_2), `(4,)`: partial fractions of (Lambda - A)/Lambda and B/Lambda at f1 and f2."""
+    t = to_pulse_transfer(machine, period_s)
+    f1, f2 = filter_z
+    g1, g2 = 1.0 - f1, 1.0 - f2
+    spread = f1 - f2
+    return np.array([
+        -(f1 * f1 + t.a1 * f1 + t.a0) / (g1 * spread), (f2 * f2 + t.a1 * f2 + t.a0) / (g2 * spread),
+        (t.b1 * f1 + t.b0) / (g1 * spread), -(t.b1 * f2 + t.b0) / (g2 * spread),
+    ])
+
+
+def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
+    """(U, d) with U unit upper triangular and U diag(d) U^T the covariance."""
+    reversed_root = np.linalg.cholesky(covariance[::-1, ::-1])
+    upper = reversed_root[::-1, ::-1]
+    scale = np.diag(upper)
+    return upper / scale, scale**2
+
+
+def _jacobian(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
+    """d theta / d(R_s, R_R, L_sigma, L_M), (4, 4), by central differences."""
+    columns = []
+    for j, value in enumerate(machine.as_tuple()):
+        step = 1e-4 * value
+        pair = []
+        for sign in (1.0, -1.0):
+            moved = list(machine.as_tuple())
+            moved[j] += sign * step
+            pair.append(to_theta(InverseGamma(*moved), filter_z, period_s))
+        columns.append((pair[0] - pair[1]) / (2.0 * step))
+    return np.column_stack(columns)
+
+
+def _prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) -> Matrix:
+    """Covariance of theta over log-normal machines around the typical one (a fixed quasi-random set)."""
+    log_typical = np.log(prior.typical.as_tuple())
+    draws = np.random.default_rng(1).standard_normal((400, 4))
+    thetas = [to_theta(InverseGamma(*np.exp(log_typical + PRIOR_LOG_STD * d)), filter_z, period_s) for d in draws]
+    return np.cov(np.array(thetas).T)
+
+
+def _regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage_v: Signal) -> Matrix:
+    """w = (zeta_y, zeta_u) of the machine under the voltage, `(n, 4)`."""
+    from scipy.signal import lfilter  # noqa: PLC0415  the only use; keeps the import of the observer light
+
+    t = to_pulse_transfer(machine, period_s)
+    current = lfilter([0.0, t.b1, t.b0], [1.0, t.a1, t.a0], voltage_v)
+    columns = [lfilter([0.0, 1.0 - f], [1.0, -f], x) for x in (current, voltage_v) for f in filter_z]
+    return np.column_stack(columns)
+
+
+def _restart(shell: _Shell, current_scale_a: float) -> None:
+    """Unknown state: filters at zero, free response as two more parameters, known to a few rated currents."""
+    shell.state[kernels.ZHAT : kernels.NOISE] = 0.0
+    shell.state[kernels.FREE], shell.state[kernels.FREE + 3] = 1.0, 1.0
+    shell.state[kernels.LAST_CURRENT : kernels.ABSORBING] = 0.0
+    shell.state[kernels.ABSORBING] = 1.0
+    shell.upper[:2, :] = np.eye(2, kernels.PARAMETERS)
+    shell.diagonal[:2] = (4.0 * current_scale_a) ** 2
