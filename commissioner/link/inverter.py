@@ -377,7 +377,8 @@ class Inverter:
         layout = cursor.stream.layout
         request = encode_request(self._heartbeat, cursor.next_index)
         address = self.profile.items["heartbeat"].address
-        decoded = decode_window(self.port.exchange(address, request, layout.address, layout.words), cursor)
+        words = self.port.exchange(address, request, layout.address, layout.words, proves_itself=True)
+        decoded = decode_window(words, cursor)
         if isinstance(decoded, WindowRefusal):
             raise ReplyMismatch(
                 decoded.reason.value, step="fetch samples", value=decoded.seen, limit=decoded.expected,

@@ -58,8 +58,13 @@ class Port(Protocol):
         """Write the registers in one transaction (FC16)."""
         ...
 
-    def exchange(self, write_address: int, values: Sequence[int], read_address: int, count: int) -> Words:
-        """Write, then read, in one transaction (FC23), or FC16 and FC03 where the drive has no FC23."""
+    def exchange(
+        self, write_address: int, values: Sequence[int], read_address: int, count: int, *, proves_itself: bool = False
+    ) -> Words:
+        """Write, then read, in one transaction (FC23), or FC16 and FC03 where the drive has no FC23.
+
+        `proves_itself`: the caller can tell from the content that the answer is his; no other proof is asked for.
+        """
         ...
 
     def write_coil(self, address: int, value: bool) -> None:

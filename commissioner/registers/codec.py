@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from commissioner.errors import ReplyMismatch, UsageError
 from commissioner.registers.profile import Item, Span
@@ -58,16 +58,20 @@ def encode_span(span: Span, values: Mapping[str, Value]) -> Words:
     return tuple(word for item in span.items for word in encode_item(item, values[item.name]))
 
 
-def crc16_modbus(words: Iterable[int]) -> int:
-    """CRC-16/MODBUS (reflected polynomial 0xA001, start 0xFFFF) over the registers, high byte first.
+def crc16_modbus(words: Sequence[int]) -> int:
+    """CRC-16/MODBUS over registers, each high byte first."""
+    return crc16_bytes(struct.pack(f">{len(words)}H", *words))
 
-    Returned as a number: 0x4B37 for the bytes "123456789" of the catalogue, which are registers only in even count.
+
+def crc16_bytes(data: bytes) -> int:
+    """CRC-16/MODBUS: reflected polynomial 0xA001, start 0xFFFF; 0x4B37 for b"123456789" (the catalogue's check value).
+
+    Zero over a whole RTU frame, whose last two bytes are the sum, low byte first.
     """
     crc = 0xFFFF
     table = _CRC_TABLE
-    for word in words:
-        crc = crc >> 8 ^ table[(crc ^ word >> 8) & 0xFF]
-        crc = crc >> 8 ^ table[(crc ^ word) & 0xFF]
+    for byte in data:
+        crc = crc >> 8 ^ table[(crc ^ byte) & 0xFF]
     return crc
 
 

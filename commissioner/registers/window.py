@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from commissioner.errors import UsageError
 from commissioner.records import SampleBlock
-from commissioner.registers.codec import Words, crc16_modbus
+from commissioner.registers.codec import Words, crc16_bytes
 from commissioner.registers.profile import WindowLayout
 
 VOLTAGE_BIT, CURRENT_U_BIT, CURRENT_V_BIT, CURRENT_W_BIT = 1, 2, 4, 8
@@ -119,7 +119,7 @@ def decode_window(words: Sequence[int], cursor: StreamCursor) -> Window | Window
         return WindowRefusal(Refusal.LENGTH, f"{len(words)} registers", f"{layout.words} registers")
     packed = struct.pack(f">{len(words)}H", *words)
     header = _decode_header(layout, packed)
-    refusal = _examine(words, header, cursor)
+    refusal = _examine(packed, header, cursor)
     return refusal or _accept(packed, header, cursor)
 
 
@@ -129,10 +129,10 @@ def _decode_header(layout: WindowLayout, packed: bytes) -> dict[str, int]:
     return dict(zip((name for name, _ in layout.header), struct.unpack_from(form, packed), strict=True))
 
 
-def _examine(words: Sequence[int], header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:
+def _examine(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:
     stream = cursor.stream
-    start = stream.layout.header_words
-    check_sum = crc16_modbus((*words[: start - 1], *words[start:]))
+    start = 2 * stream.layout.header_words
+    check_sum = crc16_bytes(packed[: start - 2] + packed[start:])
     if header["crc16"] != check_sum:
         return WindowRefusal(Refusal.CHECK_SUM, f"0x{header['crc16']:04X}", f"0x{check_sum:04X}")
     if header["session_id"] != stream.session:
