@@ -1,0 +1,151 @@
+"""`python -m sim`: the simulated inverter as a server, a recording, or an answer key."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import signal
+import ssl
+import sys
+from pathlib import Path
+
+from sim.scenario import Scenario, ScenarioError, build, read_document
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Exit code: 0 done, 2 what was asked for cannot be, 5 a port or device cannot be had."""
+    options = _parser().parse_args(arguments)
+    from sim.faults import FaultError  # noqa: PLC0415 - after --help
+
+    try:
+        document = read_document(options.scenario)
+        if document.get("kind") == "running":
+            return _record_running(document, options)
+        scenario = build(document, options.scenario)
+        if options.recording:
+            return _record_standstill(scenario, options)
+        return _serve(scenario, options)
+    except (ScenarioError, FaultError, ValueError) as error:
+        sys.stderr.write(f"sim: {error}\n")
+        return 2
+    except OSError as error:
+        sys.stderr.write(f"sim: {error}\n")
+        return 5
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m sim", description=__doc__)
+    parser.add_argument("--scenario", default="default", help="name of a scenario, or a TOML file")
+    parser.add_argument("--tcp", type=int, default=-1, metavar="PORT", help="serve Modbus TCP; 0 = any free port")
+    parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
+    parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--parity", choices="NEO", default="N")
+    parser.add_argument("--tls", type=int, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port")
+    parser.add_argument("--cert", type=Path, help="server certificate (PEM)")
+    parser.add_argument("--key", type=Path, help="its key (PEM)")
+    parser.add_argument("--ca", type=Path, help="certificate authority that client certificates must come from")
+    parser.add_argument("--speed", default="1", help="1, N times real time, or `max`: paced by the reader")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--nvm", type=Path, help="file that is the drive's non-volatile memory")
+    parser.add_argument("--state-log", type=Path, help="JSON lines of what is really true")
+    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:ARG][@WHEN]", help="see sim/faults.py")
+    parser.add_argument("--truth", action="store_true", help="print the answer key as JSON")
+    parser.add_argument("--recording", type=Path, metavar="FILE", help="write a recording (.csv, .csv.gz, .parquet)")
+    parser.add_argument("--list", action="store_true", help="list the scenarios")
+    return parser
+
+
+def _speed(text: str) -> float:
+    if text == "max":
+        return 0.0
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= 1000.0:
+        raise ScenarioError(f"--speed {text!r}: must be `max` or a number in (0, 1000]")
+    return value
+
+
+def _print_truth(truth: dict[str, object]) -> None:
+    sys.stdout.write(json.dumps(truth, indent=1, default=float) + "\n")
+    sys.stdout.flush()
+
+
+def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
+    from sim.server import Options, serve  # noqa: PLC0415 - the recording needs no server
+    from sim.truth import answer_key  # noqa: PLC0415
+
+    if options.list:
+        return _list()
+    if options.truth:
+        _print_truth(answer_key(scenario, options.seed))
+    if options.tcp < 0 and options.tls < 0 and not options.rtu:
+        return 0 if options.truth else _nothing_to_do()
+    serving = Options(
+        _speed(options.speed), options.seed, options.nvm, options.state_log, tuple(options.fault),
+        options.tcp, options.tls, _tls(options) if options.tls >= 0 else None, options.rtu, options.baud, options.parity,
+    )
+    asyncio.run(_serve_until_signal(scenario, serving, serve))
+    return 0
+
+
+async def _serve_until_signal(scenario, serving, serve) -> None:  # noqa: ANN001
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    await serve(scenario, serving, _announce, stop)
+
+
+def _announce(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+def _list() -> int:
+    from sim.scenario import names  # noqa: PLC0415
+
+    sys.stdout.write("\n".join(names()) + "\n")
+    return 0
+
+
+def _nothing_to_do() -> int:
+    sys.stderr.write("sim: nothing to do: give --tcp PORT, --tls PORT, --rtu PATH, --recording FILE or --truth\n")
+    return 2
+
+
+def _tls(options: argparse.Namespace) -> ssl.SSLContext:
+    missing = [name for name in ("cert", "key", "ca") if getattr(options, name) is None]
+    if missing:
+        raise ScenarioError(f"--tls needs --{' --'.join(missing)}")
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH, cafile=str(options.ca))
+    context.verify_mode = ssl.CERT_REQUIRED
+    context.load_cert_chain(options.cert, options.key)
+    return context
+
+
+def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
+    from sim.recording import record, write_table  # noqa: PLC0415
+
+    columns, metadata, truth = record(scenario, options.seed)
+    write_table(options.recording, columns, metadata)
+    if options.truth:
+        _print_truth(truth)
+    return 0
+
+
+def _record_running(document: dict[str, object], options: argparse.Namespace) -> int:
+    from sim.recording import write_table  # noqa: PLC0415
+    from sim.running_recording import record  # noqa: PLC0415 - another physics, loaded when asked for
+
+    columns, metadata, truth = record(document, options.seed)
+    if options.recording:
+        write_table(options.recording, columns, metadata)
+    if options.truth:
+        _print_truth(truth)
+    return 0 if options.recording or options.truth else _nothing_to_do()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
