@@ -24,7 +24,7 @@ DRIFT_ORDERS = 3
 
 @dataclass(frozen=True)
 class Comb:
-    """One periodicity: its phase at every sample of the segment, and how many harmonics are kept.
+    """One periodicity: its phase at every sample of the segment, and which harmonics are kept.
 
     `follows`: "mains" where the phase is tied to the supply angle (a shaft at constant slip), "clock" where to time.
     """
@@ -32,7 +32,7 @@ class Comb:
     name: str
     phase_rad: Signal
     frequency_hz: float
-    harmonics: int
+    orders: tuple[int, ...]
     follows: str
 
 
@@ -40,7 +40,7 @@ class Comb:
 class Lines:
     """Complex amplitudes of every line in the turning frame; line 0 is the mean.
 
-    `comb[k]` indexes the combs (-1 for the mean), `order[k]` is the signed harmonic, `rate_rad_per_s[k]` its mean
+    `comb[k]` indexes the combs (-1 for the mean, one past the last comb for the mains harmonics), `order[k]` is the signed harmonic, `rate_rad_per_s[k]` its mean
     angular frequency. `*_influence[b, k]` is what block b's residual added: the covariance of the lines is their sum of
     outer products times B / (B - 1) (cluster-robust, so coloured and unsteady noise counts for what it is).
     """
@@ -87,8 +87,8 @@ def _zero_padded(signal: Vector, factor: int) -> Vector:
 def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> Lines:
     """All combs and the mains harmonics in one weighted least squares on the segment `part`.
 
-    Columns: the mean, e^{+-j h phi} of each comb, e^{j k theta_e} for k = +-1 ... +-supply_orders and a cubic drift of the
-    mean (both only to keep them out of the rest). Comb phases are `(n,)` over the segment.
+    Columns: the mean, e^{+-j h phi} of each comb, e^{j k theta_e} for k = +-1 ... +-supply_orders, and a cubic drift of the
+    mean (only to keep it out of the rest). Comb phases are `(n,)` over the segment.
     """
     time = frame.time_s[part]
     count = time.size
@@ -96,14 +96,20 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     rows: list[Vector] = [np.ones(count, dtype=np.complex128)]
     comb_index, order, rate = [-1], [0], [0.0]
     for p, comb in enumerate(combs):
-        for h, row in enumerate(_powers(comb.phase_rad, comb.harmonics), start=1):
+        powers = _powers(comb.phase_rad, max(comb.orders, default=0))
+        for h in comb.orders:
+            row = powers[h - 1]
             rows += [row, np.conj(row)]
             comb_index += [p, p]
             order += [h, -h]
             rate += [2 * np.pi * h * comb.frequency_hz, -2 * np.pi * h * comb.frequency_hz]
-    wanted = len(rows)
-    for row in _powers(frame.supply_angle_rad[part], supply_orders):
+    supply = float(np.average(frame.supply_rad_per_s[part], weights=window))
+    for k, row in enumerate(_powers(frame.supply_angle_rad[part], supply_orders), start=1):
         rows += [row, np.conj(row)]
+        comb_index += [len(combs)] * 2
+        order += [k, -k]
+        rate += [k * supply, -k * supply]
+    wanted = len(rows)
     rows += _drift(time, window)
     design = np.array(rows)
     both = np.stack([frame.current_a[part], frame.voltage_v[part]])
@@ -115,8 +121,7 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     influence = _influence(weighted, residual, solve)[:, :wanted]
     return Lines(
         np.array(comb_index), np.array(order), np.array(rate), amplitudes[:wanted, 0], amplitudes[:wanted, 1],
-        influence[..., 0], influence[..., 1], float(np.average(frame.supply_rad_per_s[part], weights=window)),
-        residual[0], residual[1],
+        influence[..., 0], influence[..., 1], supply, residual[0], residual[1],
     )
 
 
@@ -147,3 +152,27 @@ def _influence(weighted: Vector, residual: Vector, solve: tuple[Vector, bool]) -
     flat = np.moveaxis(scores, 1, 0).reshape(weighted.shape[0], -1)
     solved = linalg.cho_solve(solve, flat).reshape(weighted.shape[0], BLOCKS, 2)
     return np.asarray(np.moveaxis(solved, 0, 1) * np.sqrt(BLOCKS / (BLOCKS - 1)), dtype=np.complex128)
+
+
+def free_orders(
+    frequency_hz: float, highest: int, taken_hz: list[float], supply_hz: float, duration_s: float
+) -> tuple[int, ...]:
+    """Orders of a comb whose lines can be told from lines of others and of the mains within `duration_s`.
+
+    Mains lines that carry something are the odd harmonics: in the turning frame multiples of 2 f_e, and f_e (offset).
+    """
+    cell = 1.0 / duration_s
+    mains = np.array([1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]) * supply_hz
+    others = np.concatenate([mains, np.asarray(taken_hz, dtype=np.float64)])
+    orders = np.arange(1, highest + 1)
+    apart = np.abs(orders[:, None] * frequency_hz - others[None, :]).min(axis=1)
+    return tuple(int(h) for h in orders[apart > cell])
+
+
+def keep(lines: Lines, wanted: NDArray[np.bool_]) -> Lines:
+    """Only the lines marked `wanted` `(k,)`."""
+    return Lines(
+        lines.comb[wanted], lines.order[wanted], lines.rate_rad_per_s[wanted], lines.current_a[wanted],
+        lines.voltage_v[wanted], lines.current_influence[:, wanted], lines.voltage_influence[:, wanted],
+        lines.supply_rad_per_s, lines.residual_current_a, lines.residual_voltage_v,
+    )

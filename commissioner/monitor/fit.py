@@ -1,8 +1,9 @@
 """Circuit parameters from running data: theta = (R_s, R_r, L_m, L_l), leakages split as the start says.
 
 Schantz & Leeb, (19), (20): a true speed has no imaginary part, and its mean is the shaft speed that the spectrum gave.
-Here each line's imaginary part is weighed by its own noise plus a share of the line itself (a real machine's air gap
-makes lines that no torque made), and a prior around the start keeps what the data leave open.
+Here each line's imaginary part is divided by its own standard deviation *at the parameters tried*: with fixed weights the
+fit would shrink the leakage because that shrinks the noise. Air-gap effects make lines that no torque made; they enter as
+a model error, a robust loss keeps them from steering, and a prior around the start keeps what the data leave open.
 """
 
 from __future__ import annotations
@@ -14,20 +15,22 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.inversion import basis_of, motion
+from commissioner.monitor.inversion import SpeedLines, Torus, complex_speed, speed_noise, torus
 from commissioner.monitor.supply import Vector
 from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
 
-NAMES = ("R_s", "R_r", "L_m", "L_l")
+NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "magnetizing_inductance_h", "leakage_inductance_h")
 PRIOR_FROM_NAMEPLATE = (0.40, 0.35, 0.30, 0.40)
 """Standard deviations of the logarithms of (R_s, R_r, L_m, L_l) around a nameplate start: published machines against it."""
 PRIOR_FROM_COMMISSIONING = (0.12, 0.15, 0.08, 0.08)
 """A warm motor has up to 40 % more resistance than a cold one, and its own saturation."""
-LINE_MODEL_ERROR = 0.01
-"""Share of a line's speed amplitude that air-gap effects may put into its imaginary part."""
-MEAN_IMAGINARY_ERROR = 2e-4
-"""Of synchronous speed: iron loss and sensor phase put this much into the mean's imaginary part."""
+LINE_MODEL_ERROR = 0.015
+"""Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
+SENSOR_ASYMMETRY = 0.002
+"""Difference between the gains of three sensors: that share of the mean appears as a negative sequence."""
+MEAN_MODEL_ERROR = 1e-4
+"""Of synchronous speed: mains harmonics and unbalance put this much into the mean of (14) by their squares."""
 DECADE = np.log(10.0)
 
 
@@ -38,6 +41,18 @@ class Start:
     circuit: TCircuit
     log_std: tuple[float, float, float, float]
     origin: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The fit's data. `mean_speed_std` is the spectrum's; infinite where no shaft line was found."""
+
+    lines: Lines
+    on: Torus
+    pole_pairs: int
+    mean_speed_rad_per_s: float
+    mean_speed_std: float
+    model_error: Signal
 
 
 @dataclass(frozen=True)
@@ -53,126 +68,128 @@ class Fitted:
     open_direction: NDArray[np.float64]
     open_share: float
     chi_square_per_line: float
-    imaginary_rms_rad_per_s: float
+    imaginary_share: float
 
 
-@dataclass(frozen=True)
-class Problem:
-    """The fit's data: lines, the grid on which the quotient is formed, and how to get back to lines from there."""
-
-    lines: Lines
-    pole_pairs: int
-    mean_speed_rad_per_s: float
-    mean_speed_std: float
-    basis: Vector
-    project: Vector
-    partner: NDArray[np.int64]
-    positive: NDArray[np.int64]
+def pose(lines: Lines, start: TCircuit, pole_pairs: int, mean_speed_rad_per_s: float, mean_speed_std: float) -> Problem:
+    """The problem with its model error, which is a share of each line's voltages and leakage drops at the start values."""
+    on = torus(lines)
+    leakage = start.stator_leakage_h + start.rotor_leakage_h
+    drop = np.abs(lines.voltage_v) + leakage * np.abs(lines.rate_rad_per_s * lines.current_a)
+    error = LINE_MODEL_ERROR * (drop[on.positive] + drop[on.partner])
+    twice = np.abs(lines.rate_rad_per_s[on.positive] / lines.supply_rad_per_s - 2.0) < 1e-6
+    error = error + np.where(twice, SENSOR_ASYMMETRY * drop[0], 0.0)
+    flux = np.abs(lines.voltage_v[0]) / lines.supply_rad_per_s
+    return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, 0.5 * error / (flux * pole_pairs))
 
 
-def pose(lines: Lines, phases_rad: list[Signal], pole_pairs: int, mean_speed: float, mean_std: float) -> Problem:
-    """The problem on a grid `phases_rad` of instants that covers every comb several times."""
-    basis = basis_of(lines, phases_rad)
-    project = np.linalg.pinv(basis)
-    positive = np.flatnonzero(lines.order > 0)
-    partner = np.array([
-        int(np.flatnonzero((lines.comb == lines.comb[k]) & (lines.order == -lines.order[k]))[0]) for k in positive
-    ], dtype=np.int64)
-    return Problem(lines, pole_pairs, mean_speed, mean_std, basis, project, partner, positive)
-
-
-def split_speed(problem: Problem, circuit: TCircuit, current_a: Vector, voltage_v: Vector) -> tuple[complex, Vector, Vector]:
-    """(mean, lines of the real part, lines of the imaginary part) of the complex speed."""
-    lines = problem.lines
-    made = motion(
-        circuit, problem.pole_pairs, current_a, voltage_v, lines.rate_rad_per_s, lines.supply_rad_per_s, problem.basis
-    )
-    amplitude = problem.project @ made.speed_rad_per_s
-    upper, lower = amplitude[problem.positive], np.conj(amplitude[problem.partner])
-    return complex(amplitude[0]), 0.5 * (upper + lower), -0.5j * (upper - lower)
+def informative(lines: Lines, mains: int) -> NDArray[np.bool_]:
+    """The mean, every load line, and those mains pairs (even, as symmetric harmonics are here) that carry voltage."""
+    noise = np.sqrt(np.sum(np.abs(lines.voltage_influence) ** 2, axis=0))
+    carries = np.abs(lines.voltage_v) > np.maximum(10 * noise, 1e-3 * np.abs(lines.voltage_v[0]))
+    strong = {int(abs(k)) for k in lines.order[(lines.comb == mains) & carries] if k % 2 == 0}
+    return np.array([p != mains or abs(int(k)) in strong for p, k in zip(lines.comb, lines.order, strict=True)])
 
 
 def fit(problem: Problem, start: Start) -> Fitted:
-    """Bounded trust-region least squares within a decade of the start (20); two rounds, weights from the first."""
-    centre = _logs(start.circuit)
+    """Bounded trust-region least squares within a decade of the start (20)."""
+    centre = logs_of(start.circuit)
     split = start.circuit.rotor_leakage_h / start.circuit.stator_leakage_h
     prior = np.array(start.log_std)
-    theta = centre
-    for _ in range(2):
-        weights = _weights(problem, _circuit(theta, split))
 
-        def residual(logs: NDArray[np.float64], weights: tuple[Signal, float, float] = weights) -> NDArray[np.float64]:
-            return np.concatenate([_misfit(problem, _circuit(logs, split), weights), (logs - centre) / prior])
+    def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([_robust(_misfit(problem, circuit_of(logs, split))), (logs - centre) / prior])
 
-        solved = least_squares(
-            residual, np.clip(theta, centre - 0.99 * DECADE, centre + 0.99 * DECADE), method="trf",
-            bounds=(centre - DECADE, centre + DECADE), x_scale=prior, max_nfev=60,
-        )
-        theta = solved.x
-    information = solved.jac.T @ solved.jac
-    covariance = np.linalg.inv(information)
-    circuit = _circuit(theta, split)
-    data = solved.fun[: -len(prior)]
+    solved = least_squares(
+        residual, centre, method="trf", bounds=(centre - DECADE, centre + DECADE), x_scale=prior, max_nfev=80
+    )
+    circuit = circuit_of(solved.x, split)
+    data = _misfit(problem, circuit)
+    inflation = max(1.0, float(np.median(np.abs(data[2:]) ** 2) / np.log(2))) if data.size > 3 else 1.0
+    jacobian = solved.jac.copy()
+    jacobian[: -len(prior)] /= np.sqrt(inflation)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
     direction, share = _open(covariance, prior)
-    _, _, imaginary = split_speed(problem, circuit, problem.lines.current_a, problem.lines.voltage_v)
+    _, upper, lower = complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
+    imaginary, total = np.sum(np.abs(upper - lower) ** 2), np.sum(np.abs(upper + lower) ** 2)
     return Fitted(
-        circuit, covariance, direction, share, float(np.mean(data**2)),
-        float(np.sqrt(2 * np.sum(np.abs(imaginary) ** 2))),
+        circuit, covariance, direction, share, float(np.mean(np.abs(data) ** 2)), float(np.sqrt(imaginary / total)) if total else 0.0
     )
 
 
-def _open(covariance: NDArray[np.float64], prior: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """The combination with the largest share of its prior variance left."""
-    scaled = covariance / np.outer(prior, prior)
-    values, vectors = np.linalg.eigh(scaled)
-    direction = vectors[:, -1] * prior
-    direction = direction / np.linalg.norm(direction)
-    return direction * np.sign(direction[int(np.argmax(np.abs(direction)))]), float(values[-1])
+def speed_lines(problem: Problem, fitted: Fitted) -> SpeedLines:
+    """Each harmonic from its two side bands, weighed by noise and by what the parameters' uncertainty does to each."""
+    mean, upper, lower = complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
+    weight = band_weights(problem, fitted)
+    value = problem.mean_speed_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
+    return SpeedLines(value, weight * upper + (1 - weight) * lower)
 
 
-def _logs(circuit: TCircuit) -> NDArray[np.float64]:
+def band_weights(problem: Problem, fitted: Fitted) -> Signal:
+    """Share of the upper side band in each harmonic, `(m,)`."""
+    _, noise_up, noise_low = speed_noise(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
+    up, low = np.sum(np.abs(noise_up) ** 2, axis=0), np.sum(np.abs(noise_low) ** 2, axis=0)
+    _, upper, lower = complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
+    for step in steps(fitted):
+        _, moved_up, moved_low = complex_speed(circuit_at(fitted, step), problem.pole_pairs, problem.lines, problem.on)
+        up = up + np.abs(moved_up - upper) ** 2
+        low = low + np.abs(moved_low - lower) ** 2
+    return np.asarray(low / np.maximum(up + low, 1e-300))
+
+
+def steps(fitted: Fitted) -> NDArray[np.float64]:
+    """Four moves of the logarithms whose outer products sum to their covariance."""
+    values, vectors = np.linalg.eigh(fitted.log_covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T)
+
+
+def logs_of(circuit: TCircuit) -> NDArray[np.float64]:
+    """log(R_s, R_r, L_m, L_ls)."""
     return np.log([
         circuit.stator_resistance_ohm, circuit.rotor_resistance_ohm, circuit.magnetizing_inductance_h,
         circuit.stator_leakage_h,
     ])
 
 
-def _circuit(logs: NDArray[np.float64], split: float) -> TCircuit:
+def circuit_of(logs: NDArray[np.float64], split: float) -> TCircuit:
+    """The circuit of log(R_s, R_r, L_m, L_ls) with L_lr = split L_ls."""
     r_s, r_r, l_m, l_l = (float(x) for x in np.exp(logs))
     return TCircuit(r_s, r_r, l_l, l_l * split, l_m)
 
 
 def circuit_at(fitted: Fitted, step: NDArray[np.float64]) -> TCircuit:
     """The fitted circuit moved by `step` in the logarithms."""
-    split = fitted.circuit.rotor_leakage_h / fitted.circuit.stator_leakage_h
-    return _circuit(_logs(fitted.circuit) + step, split)
+    return circuit_of(logs_of(fitted.circuit) + step, fitted.circuit.rotor_leakage_h / fitted.circuit.stator_leakage_h)
 
 
-def _weights(problem: Problem, circuit: TCircuit) -> tuple[Signal, float, float]:
-    """Standard deviations of the imaginary lines, of the mean's imaginary part and of its real part."""
-    lines = problem.lines
-    mean, real, imaginary = split_speed(problem, circuit, lines.current_a, lines.voltage_v)
-    spread = np.zeros(real.size)
-    mean_spread = 0.0
-    for b in range(lines.current_influence.shape[0]):
-        moved_mean, _, moved = split_speed(
-            problem, circuit, lines.current_a + lines.current_influence[b], lines.voltage_v + lines.voltage_influence[b]
-        )
-        spread += np.abs(moved - imaginary) ** 2
-        mean_spread += abs(moved_mean - mean) ** 2
-    model = LINE_MODEL_ERROR * np.abs(real)
-    synchronous = lines.supply_rad_per_s / problem.pole_pairs
-    return (
-        np.sqrt(0.5 * spread + model**2), float(np.hypot(np.sqrt(0.5 * mean_spread), MEAN_IMAGINARY_ERROR * synchronous)),
-        float(np.hypot(np.sqrt(0.5 * mean_spread), problem.mean_speed_std)),
-    )
+def _misfit(problem: Problem, circuit: TCircuit) -> Vector:
+    """Complex misfits over their standard deviations: the mean's imaginary and real part, then each line's imaginary."""
+    mean, upper, lower = complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
+    noise_mean, noise_up, noise_low = speed_noise(circuit, problem.pole_pairs, problem.lines, problem.on)
+    synchronous = problem.lines.supply_rad_per_s / problem.pole_pairs
+    own = np.hypot(np.sqrt(0.5 * np.sum(np.abs(noise_mean) ** 2)), MEAN_MODEL_ERROR * synchronous)
+    difference = 0.5 * (upper - lower)
+    variance = 0.25 * np.sum(np.abs(noise_up - noise_low) ** 2, axis=0) + problem.model_error**2
+    known = np.hypot(own, problem.mean_speed_std)
+    real = (mean.real - problem.mean_speed_rad_per_s) / known if np.isfinite(known) else 0.0
+    return np.concatenate([[mean.imag / own, real], difference / np.sqrt(0.5 * variance)]).astype(np.complex128)
 
 
-def _misfit(problem: Problem, circuit: TCircuit, weights: tuple[Signal, float, float]) -> NDArray[np.float64]:
-    line_std, mean_imaginary_std, mean_real_std = weights
-    mean, _, imaginary = split_speed(problem, circuit, problem.lines.current_a, problem.lines.voltage_v)
-    scaled = imaginary / line_std
-    return np.concatenate([
-        scaled.real, scaled.imag,
-        [mean.imag / mean_imaginary_std, (mean.real - problem.mean_speed_rad_per_s) / mean_real_std],
-    ])
+ROBUST_AT = 3.0
+
+
+def _robust(misfit: Vector) -> NDArray[np.float64]:
+    """Real and imaginary parts; beyond `ROBUST_AT` standard deviations a line's pull grows with the logarithm only."""
+    size = np.abs(misfit)
+    scale = ROBUST_AT * np.sqrt(np.log1p((size / ROBUST_AT) ** 2)) / np.maximum(size, 1e-12)
+    scale[:2] = 1.0
+    kept = misfit * np.where(size > 1e-9, scale, 1.0)
+    return np.concatenate([kept.real, kept.imag[2:]])
+
+
+def _open(covariance: NDArray[np.float64], prior: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """The combination with the largest share of its prior variance left."""
+    values, vectors = np.linalg.eigh(covariance / np.outer(prior, prior))
+    direction = vectors[:, -1] * prior
+    direction = direction / np.linalg.norm(direction)
+    return direction * np.sign(direction[int(np.argmax(np.abs(direction)))]), float(values[-1])

@@ -1,0 +1,144 @@
+"""From a spectrum to combs: the shaft first, then whatever else repeats, each refined and told from mixing products."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from commissioner.monitor import periods
+from commissioner.monitor.averaging import Comb, free_orders, separate
+from commissioner.monitor.periods import PairSpectrum, Periodicity, ShaftSearch
+from commissioner.monitor.supply import TurningFrame
+from commissioner.records import Signal
+
+SUPPLY_ORDERS = 13
+MOST_ORDERS = 40
+MOST_SHAFT_ORDERS = 24
+USED_FOR_REFINING = 4
+
+
+@dataclass(frozen=True)
+class Found:
+    """The periodicities, with the spectrum in which the shaft was looked for and the one that is left at the end."""
+
+    shaft: Periodicity | None
+    loads: tuple[Periodicity, ...]
+    spectrum: PairSpectrum
+    left_over: PairSpectrum
+    candidates: tuple[tuple[float, float], ...]
+
+
+def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[float, ...] = ()) -> Found:
+    """Shaft and load periods of the segment. Loads at rational multiples of the shaft are the shaft's own comb."""
+    residual = separate(frame, part, [], SUPPLY_ORDERS).residual_current_a
+    highest = frame.band_hz * 0.95
+    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest)
+    shaft, candidates = _find_shaft(frame, part, residual, spectrum, search)
+    known = [shaft] if shaft else []
+    left = spectrum
+    for frequency in given_hz:
+        known.append(_refined(frame, part, residual, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
+    for _ in range(periods.MOST_LOADS):
+        combs = [comb_of(frame, part, found, [c.frequency_hz for c in known[:k]]) for k, found in enumerate(known)]
+        left_current = separate(frame, part, combs, SUPPLY_ORDERS).residual_current_a
+        left = periods.pair_spectrum(left_current, frame.sample_period_s, highest)
+        new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
+        if new is None:
+            break
+        known.append(new)
+    return Found(shaft, tuple(known[1:] if shaft else known), spectrum, left, candidates)
+
+
+def _find_shaft(
+    frame: TurningFrame, part: slice, residual: Signal, spectrum: PairSpectrum, search: ShaftSearch
+) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
+    harmonics = max(2, min(8, int(frame.band_hz * 0.9 / search.synchronous_hz)))
+    candidates = periods.shaft_candidates(spectrum, search, harmonics)
+    table = tuple((f, score) for f, score, _ in candidates)
+    for frequency, _, seen in candidates[:1]:
+        powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
+        if powers.max() > periods.SIGNIFICANT or powers.sum() > 2 * periods.SIGNIFICANT:
+            return _refined(frame, part, residual, "shaft", frequency, seen), table
+    return None, table
+
+
+def _refined(
+    frame: TurningFrame, part: slice, residual: Signal, name: str, frequency_hz: float, seen: tuple[int, ...]
+) -> Periodicity:
+    """The frequency at which the comb captures most; a shaft follows the mains, others what captures more."""
+    time = frame.time_s[part]
+    strongest = _strongest(frame, residual, frequency_hz, seen)
+    tries = []
+    for follows in ("mains",) if name == "shaft" else ("clock", "mains"):
+        phase = comb_phase(frame, part, frequency_hz, follows)
+        demodulated = periods.demodulate(residual, time, phase, strongest)
+        shift, std, power = periods.refine(demodulated, 0.8 / np.ptp(time))
+        tries.append((power, frequency_hz + shift, std, follows))
+    power, frequency, std, follows = max(tries)
+    return Periodicity(name, frequency, std, follows, power, seen)
+
+
+def _strongest(frame: TurningFrame, residual: Signal, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:
+    """Up to four harmonics, those with the most power times order squared (they fix the frequency best)."""
+    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, frame.band_hz * 0.95)
+    orders = np.array(seen or (1, 2), dtype=np.float64)
+    power = spectrum.at(orders * frequency_hz, 0.3)
+    ranked = orders[np.argsort(-power * np.minimum(orders, 6) ** 2)]
+    return [int(h) for h in ranked[:USED_FOR_REFINING]]
+
+
+def comb_phase(frame: TurningFrame, part: slice, frequency_hz: float, follows: str) -> Signal:
+    """Phase of the fundamental over the segment, zero at its middle: rho theta_e for "mains", 2 pi f t for "clock"."""
+    time = frame.time_s[part]
+    if follows == "clock":
+        return np.asarray(2 * np.pi * frequency_hz * (time - 0.5 * (time[0] + time[-1])))
+    angle = frame.supply_angle_rad[part]
+    ratio = 2 * np.pi * frequency_hz / mean_supply(frame, part)
+    return np.asarray(ratio * (angle - angle[angle.size // 2]))
+
+
+def mean_supply(frame: TurningFrame, part: slice) -> float:
+    """Supply frequency of the segment in rad/s: turns of the supply angle over its length."""
+    angle, time = frame.supply_angle_rad[part], frame.time_s[part]
+    return float((angle[-1] - angle[0]) / (time[-1] - time[0]))
+
+
+def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: list[float]) -> Comb:
+    """The comb's phase and orders on the segment; orders that collide with `others_hz` or the mains are left out."""
+    time = frame.time_s[part]
+    limit = MOST_SHAFT_ORDERS if found.name == "shaft" else MOST_ORDERS
+    highest = min(limit, int(0.9 * frame.band_hz / found.frequency_hz))
+    taken = [h * f for f in others_hz for h in range(1, int(frame.band_hz / f) + 1) if h <= limit]
+    orders = free_orders(found.frequency_hz, highest, taken, mean_supply(frame, part) / (2 * np.pi), float(np.ptp(time)))
+    phase = comb_phase(frame, part, found.frequency_hz, found.follows)
+    return Comb(found.name, phase, found.frequency_hz, orders, found.follows)
+
+
+def _next_load(
+    frame: TurningFrame, part: slice, residual: Signal, left: PairSpectrum, known: list[Periodicity], supply_hz: float,
+    first: PairSpectrum,
+) -> Periodicity | None:
+    """The strongest remaining pair that is no product of known combs, as a comb of its own."""
+    strongest = max((first.power * first.floor_a2).max(), 1e-300)
+    combs_hz = [c.frequency_hz for c in known]
+    for frequency, power in periods.find_peaks_above(left, periods.SIGNIFICANT, periods.LOWEST_LOAD_HZ, periods.HIGHEST_LOAD_HZ):
+        k = int(round(frequency / left.frequency_hz[1]))
+        if power * left.floor_a2[k] < LEAST_SHARE * strongest or not _is_torque_like(left, k):
+            continue
+        if periods.is_product(frequency, combs_hz, supply_hz, left.cell_hz):
+            continue
+        fundamental, seen = periods.lowest_fundamental(left, frequency, combs_hz)
+        found = _refined(frame, part, residual, f"load {fundamental:.4g} Hz", fundamental, seen)
+        return replace(found, name=f"load {found.frequency_hz:.4g} Hz")
+    return None
+
+
+LEAST_SHARE = 1e-4
+"""Power of a load line against the strongest line: below 1 % of its amplitude it moves no waveform."""
+
+
+def _is_torque_like(spectrum: PairSpectrum, k: int) -> bool:
+    """A torque makes both side bands; one alone is a slot or network line. True within a factor of 8 in amplitude."""
+    upper, lower = abs(spectrum.upper[k]), abs(spectrum.lower[k])
+    return bool(max(upper, lower) < 8 * min(upper, lower))

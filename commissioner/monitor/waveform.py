@@ -1,0 +1,136 @@
+"""Speed, torque and load torque within the period, with a standard deviation at every point.
+
+Load torque (1): tau_l = tau_e - J d omega_r / dt, the derivative taken line by line in the frequency domain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.monitor.averaging import Lines
+from commissioner.monitor.fit import Fitted, Problem, band_weights, circuit_at, speed_lines, steps
+from commissioner.monitor.inversion import (
+    RotorState, SpeedLines, Torus, basis_of, complex_speed, rotor_state, speed_noise, speed_on, torque_of,
+)
+from commissioner.monitor.supply import Vector
+from commissioner.motor.running import TCircuit
+from commissioner.records import Signal
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """At `(n,)` instants; the load torque is None where the inertia is unknown. Standard deviations likewise."""
+
+    time_s: Signal
+    shaft_angle_rad: Signal
+    speed_rad_per_s: Signal
+    torque_nm: Signal
+    load_torque_nm: Signal | None
+    speed_std: Signal
+    torque_std: Signal
+    load_torque_std: Signal | None
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What the inversion found, as lines: enough to evaluate everything at any instant, and its small changes."""
+
+    circuit: TCircuit
+    speed: SpeedLines
+    state: RotorState
+    changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
+    """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
+
+
+def solve(problem: Problem, fitted: Fitted) -> Solved:
+    """The solution and one change per noise block and per direction of the parameters' covariance."""
+    speed = speed_lines(problem, fitted)
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    state = rotor_state(fitted.circuit, pairs, lines, on, speed)
+    weight = band_weights(problem, fitted)
+    changes = [*_noise_changes(problem, fitted, speed, state, weight), *_parameter_changes(problem, fitted, speed, weight)]
+    if np.isfinite(problem.mean_speed_std):
+        moved = SpeedLines(speed.mean_rad_per_s + problem.mean_speed_std, speed.amplitude_rad_per_s)
+        changes.append((fitted.circuit, moved, state.flux_wb, lines.current_a))
+    return Solved(fitted.circuit, speed, state, tuple(changes))
+
+
+def _noise_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Signal
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    circuit = fitted.circuit
+    _, noise_up, noise_low = speed_noise(circuit, pairs, lines, on)
+    noise = weight * noise_up + (1 - weight) * noise_low
+    drive = circuit.rotor_resistance_ohm * circuit.magnetizing_inductance_h / circuit.rotor_inductance_h
+    flux_on = on.basis @ state.flux_wb
+    changes = []
+    for b in range(noise.shape[0]):
+        wobble = 2 * np.real(on.basis[:, on.positive] @ noise[b])
+        push = drive * lines.current_influence[b] + 1j * pairs * (on.project @ (wobble * flux_on))
+        moved = SpeedLines(speed.mean_rad_per_s, speed.amplitude_rad_per_s + noise[b])
+        changes.append((circuit, moved, state.flux_wb + state.inverse @ push, lines.current_a + lines.current_influence[b]))
+    return changes
+
+
+def _parameter_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Signal
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    changes = []
+    for step in steps(fitted):
+        circuit = circuit_at(fitted, step)
+        mean, upper, lower = complex_speed(circuit, pairs, lines, on)
+        value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
+        moved = SpeedLines(value, weight * upper + (1 - weight) * lower)
+        changes.append((circuit, moved, rotor_state(circuit, pairs, lines, on, moved).flux_wb, lines.current_a))
+    return changes
+
+
+def evaluate(
+    problem: Problem, solved: Solved, time_s: Signal, comb_phases_rad: Mapping[int, Signal], inertia_kg_m2: float | None
+) -> Waveform:
+    """All quantities at instants where the combs have the phases given."""
+    lines, pairs = problem.lines, problem.pole_pairs
+    basis = basis_of(lines, comb_phases_rad, time_s.size)
+    value = _at(solved.circuit, pairs, problem, basis, solved.speed, solved.state.flux_wb, lines.current_a)
+    moved = [_at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes]
+    spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved)) for k in range(3)]
+    inertia = inertia_kg_m2
+    load_std = None
+    if inertia is not None:
+        load_std = np.sqrt(sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved))
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (value[0][1:] + value[0][:-1]) * np.diff(time_s))])
+    return Waveform(
+        time_s, angle, value[0], value[1], None if inertia is None else value[1] - inertia * value[2], spread[0], spread[1],
+        load_std,
+    )
+
+
+def _at(
+    circuit: TCircuit, pairs: int, problem: Problem, basis: Vector, speed: SpeedLines, flux: Vector, current: Vector
+) -> tuple[Signal, Signal, Signal]:
+    """(speed, torque, acceleration) at the basis' instants."""
+    positive = problem.on.positive
+    rate = problem.lines.rate_rad_per_s[positive]
+    both = basis[:, positive] @ np.stack([speed.amplitude_rad_per_s, 1j * rate * speed.amplitude_rad_per_s], axis=1)
+    torque = torque_of(circuit, pairs, basis @ flux, basis @ current)
+    return speed.mean_rad_per_s + 2 * both[:, 0].real, torque, 2 * both[:, 1].real
+
+
+def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float]:
+    """Mean electromagnetic torque over all combs' phases, and its standard deviation."""
+    on, lines = problem.on, problem.lines
+
+    def mean(circuit: TCircuit, flux: Vector, current: Vector) -> float:
+        return float(torque_of(circuit, problem.pole_pairs, on.basis @ flux, on.basis @ current).mean())
+
+    value = mean(solved.circuit, solved.state.flux_wb, lines.current_a)
+    moved = [mean(circuit, flux, current) - value for circuit, _, flux, current in solved.changes]
+    return value, float(np.sqrt(np.sum(np.square(moved))))
+
+
+__all__ = ["Lines", "Solved", "Torus", "Waveform", "evaluate", "mean_torque_nm", "solve", "speed_on"]
