@@ -1,0 +1,203 @@
+"""The flux guard: two independent estimates, a prediction, and how much amplitude they permit.
+
+What saturates is the stator flux, so that is what is limited; the rotor flux is reported beside it. Estimates: (a) the
+observer's; (b) model-free, the integral of u - R_s i - inverter error with drift removed by a second-order high-pass a
+decade below the lowest tone. The excitation is known in advance: (c) both are carried forward over link latency plus
+reaction time. Amplitude: a tone of amplitude A cannot make more flux than A / omega (1 - R_s Y is at most 1 for a passive
+machine), so a first scale is safe for any motor; from there it is raised in steps of at most `MAX_RAISE`, to what the
+estimated machine (its standard errors taken threefold to the bad side) keeps within `TARGET` of the limit, as long as
+(a) and (b) agree.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from commissioner.identify.excitation import Excitation
+from commissioner.identify.observer import BlockEstimate
+from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.standstill import admittance_s, held_input
+from commissioner.records import Signal
+
+TARGET = 0.96
+BACK_OFF_ABOVE = 0.99
+ABORT_ABOVE = 1.01
+MAX_RAISE = 2.0
+AGREEMENT = 0.12
+
+
+class FluxAdvice(enum.Enum):
+    RAISE = "flux is low and both estimates agree: the amplitude may rise to the permitted scale"
+    HOLD = "keep the amplitude: the estimates have not confirmed more"
+    BACK_OFF = "flux is about to reach the limit: reduce the amplitude to the permitted scale"
+    ABORT = "flux is at the limit and still rising: de-energise"
+
+
+@dataclass(frozen=True)
+class FluxReading:
+    """Peaks of the stator flux since the last reading (observer, model-free), its predicted peak, `fraction` of the
+    limit reached by the largest, and what to do."""
+
+    observer_wb: float
+    model_free_wb: float
+    predicted_wb: float
+    rotor_wb: float
+    fraction: float
+    advice: FluxAdvice
+    permitted_scale: float
+
+
+@dataclass
+class FluxGuard:
+    """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking effect
+    (link both ways); `reaction_s` what the drive's amplitude ramp takes."""
+
+    limit_wb: float
+    latency_s: float
+    excitation: Excitation
+    sample_period_s: float
+    stator_resistance_ohm: float
+    inverter: InverterError = IDEAL_INVERTER
+    axis_deg: float = 0.0
+    reaction_s: float = 0.02
+    _integral: tuple[float, float] = field(default=(0.0, 0.0), init=False)
+    _samples: int = field(default=0, init=False)
+    _scale_since_s: float = field(default=0.0, init=False)
+    _last_scale: float = field(default=0.0, init=False)
+    _was_high: bool = field(default=False, init=False)
+    _granted: float = field(default=0.0, init=False)
+    _recent: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
+
+    @property
+    def safe_scale(self) -> float:
+        """The scale at which no motor whatever can pass the limit."""
+        bias = 1.0 if self.excitation.dc_bias_v == 0.0 else 0.5
+        return min(1.0, bias * self.limit_wb / max(self._bound_wb(), 1e-12))
+
+    def advance(
+        self, voltage_v: Signal, current_a: Signal, estimate: BlockEstimate, present_scale: float, lost_before: int = 0
+    ) -> FluxReading:
+        """Take in the block the observer has just taken in; `current_a` is along the axis, `(n,)`."""
+        self._samples += lost_before + voltage_v.shape[0]
+        time_s = self._samples * self.sample_period_s
+        model_free = self._integrate(voltage_v, current_a)
+        observer = np.abs(estimate.stator_flux_wb)
+        observer_wb, model_free_wb = float(np.max(observer)), float(np.max(np.abs(model_free)))
+        predicted_wb = self._predict(estimate, float(model_free[-1]), time_s, present_scale)
+        fraction = max(observer_wb, model_free_wb, predicted_wb) / self.limit_wb
+        difference = float(np.max(np.abs(estimate.stator_flux_wb - model_free)))
+        self._recent = [r for r in self._recent if time_s - r[0] < self._window_s]
+        self._recent.append((time_s, difference, max(observer_wb, model_free_wb), estimate.residual_rms_a))
+        if abs(present_scale - self._last_scale) > 1e-4:
+            self._scale_since_s = time_s
+        self._last_scale = present_scale
+        permitted = self._permit(estimate, present_scale, time_s, current_a)
+        advice, permitted = self._advise(fraction, max(observer_wb, model_free_wb), present_scale, permitted)
+        rotor_wb = float(np.max(np.abs(estimate.rotor_flux_wb)))
+        return FluxReading(observer_wb, model_free_wb, predicted_wb, rotor_wb, fraction, advice, permitted)
+
+    # -- estimates ------------------------------------------------------------------------------------------------
+
+    @property
+    def _lowest_hz(self) -> float:
+        return min(t.frequency_hz for t in self.excitation.tones) if self.excitation.tones else 1.0
+
+    @property
+    def _window_s(self) -> float:
+        return max(0.25 / self._lowest_hz, 0.2)
+
+    def _integrate(self, voltage_v: Signal, current_a: Signal) -> Signal:
+        """psi' = u - R_s i - F(i) - 2 zeta w psi - w^2 integral(psi); mean current over the period by trapezoid."""
+        from scipy.signal import lfilter  # noqa: PLC0415
+
+        following = np.append(current_a[1:], 2.0 * current_a[-1] - current_a[-2] if current_a.size > 1 else current_a[-1])
+        mean = 0.5 * (current_a + following)
+        emf = voltage_v - self.stator_resistance_ohm * mean - self.inverter.on_axis(mean, self.axis_deg)
+        corner = 2.0 * math.pi * 0.08 * self._lowest_hz * self.sample_period_s
+        # Damped high-pass times integrator, as one difference equation; two states in direct form II transposed.
+        a = [1.0, -2.0 + 1.4 * corner, 1.0 - 1.4 * corner + corner * corner]
+        b = [self.sample_period_s, -self.sample_period_s]
+        flux, final = lfilter(b, a, emf, zi=np.array(self._integral))
+        self._integral = (float(final[0]), float(final[1]))
+        return np.asarray(flux)
+
+    def _predict(self, estimate: BlockEstimate, model_free_wb: float, time_s: float, scale: float) -> float:
+        """Largest |stator flux| over the horizon, from the observer's state and from the model-free flux."""
+        steps = max(2, math.ceil((self.latency_s + self.reaction_s) / self.sample_period_s))
+        stride = max(1, steps // 200)
+        period = self.sample_period_s * stride
+        future = time_s + (np.arange(steps // stride + 1) + 0.5) * period
+        voltage = self.excitation.voltage_v(future, scale)
+        matrix, gain = held_input(estimate.parameters, period)
+        current, rotor = float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1])
+        leakage = estimate.parameters.leakage_inductance_h
+        plateau = float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0])
+        top, free = 0.0, model_free_wb
+        for u in voltage:
+            drive = u - math.copysign(min(plateau, abs(u)), current)
+            free += period * (drive - estimate.parameters.stator_resistance_ohm * current)
+            current, rotor = (
+                matrix[0, 0] * current + matrix[0, 1] * rotor + gain[0] * drive,
+                matrix[1, 0] * current + matrix[1, 1] * rotor + gain[1] * drive,
+            )
+            top = max(top, abs(rotor + leakage * current), abs(free))
+        return float(top)
+
+    # -- amplitude ------------------------------------------------------------------------------------------------
+
+    def _bound_wb(self) -> float:
+        """Sum of A / omega (1 + |sin phase|): flux of a machine without resistance, started from rest at full scale."""
+        return sum(
+            t.amplitude_v / (2.0 * math.pi * t.frequency_hz) * (1.0 + abs(math.sin(t.phase_rad)))
+            for t in self.excitation.tones
+        )
+
+    def _peak_at_full_scale(self, machine: InverseGamma) -> float:
+        """Sum over tones of the machine's flux amplitudes: no phase relation can exceed it."""
+        f = np.array([t.frequency_hz for t in self.excitation.tones])
+        amplitude = np.array([t.amplitude_v for t in self.excitation.tones])
+        flux = np.abs((1.0 - machine.stator_resistance_ohm * admittance_s(machine, f)) / (2j * np.pi * f))
+        return float(np.sum(flux * amplitude))
+
+    def _permit(self, estimate: BlockEstimate, scale: float, time_s: float, current_a: Signal) -> float:
+        safe = TARGET * self.safe_scale
+        rested_s = time_s - self._scale_since_s
+        if not self._confirms(estimate, current_a) or rested_s < max(0.2, self.latency_s + self.reaction_s):
+            return max(min(scale, self._granted), safe)
+        r_s, r_r, l_s, l_m = estimate.parameters.as_tuple()
+        s = estimate.std
+        worst = replace(
+            estimate.parameters,
+            stator_resistance_ohm=max(r_s - 3.0 * s[0], 0.5 * r_s),
+            magnetizing_inductance_h=l_m + min(3.0 * s[3], l_m),
+        )
+        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12)
+        self._granted = max(safe, min(1.0, by_model, MAX_RAISE * max(scale, safe)))
+        return self._granted
+
+    def _confirms(self, estimate: BlockEstimate, current_a: Signal) -> bool:
+        """Both flux estimates have agreed over a quarter of the lowest tone, and the observer explains the current."""
+        if len(self._recent) < 2 or self._recent[-1][0] - self._recent[0][0] < 0.8 * self._window_s:
+            return False
+        reached = max(r[2] for r in self._recent)
+        difference = max(r[1] for r in self._recent)
+        rms = float(np.sqrt(np.mean(current_a**2)))
+        explained = estimate.residual_rms_a < max(0.2 * rms, 3.0 * estimate.noise_a)
+        certain = estimate.std[0] < 0.1 * estimate.parameters.stator_resistance_ohm
+        certain &= estimate.std[3] < 0.2 * estimate.parameters.magnetizing_inductance_h
+        return bool(difference < AGREEMENT * max(reached, 0.05 * self.limit_wb) and explained and certain)
+
+    def _advise(self, fraction: float, reached: float, scale: float, permitted: float) -> tuple[FluxAdvice, float]:
+        if fraction <= BACK_OFF_ABOVE:
+            self._was_high = False
+            return (FluxAdvice.RAISE if permitted > 1.001 * scale else FluxAdvice.HOLD), permitted
+        if self._was_high and reached > ABORT_ABOVE * self.limit_wb:
+            return FluxAdvice.ABORT, 0.0
+        self._was_high = True
+        self._granted = min(permitted, scale * TARGET / fraction)
+        return FluxAdvice.BACK_OFF, self._granted
