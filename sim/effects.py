@@ -97,7 +97,7 @@ def _dc_link_ripple(effect, plant, p, s):
     p[at.P_RIPPLE_SHAPE] = _shape(effect)
 
 
-@_entry("sampling_delay", "s", "samples are this old; `jitter` shape alternates +-20 % of it", ("constant", "alternating"), 2e-6, 3e-4)
+@_entry("sampling_delay", "s", "samples are this old; `alternating` by +-20 % more or less", ("constant", "alternating"), 2e-6, 3e-4)
 def _sampling_delay(effect, plant, p, s):
     s[at.S_DELAY] = effect.size
 
@@ -138,7 +138,7 @@ def _leakage_saturation(effect, plant, p, s):
     p[at.P_LEAKSAT] = effect.size / (1.0 - effect.size) / reach
 
 
-@_entry("rotor_skin_effect", "fraction at rated frequency", "R_r(f_N)/R_r(0) - 1 of the cage", ("one_cell", "two_cells"), 0.01, 0.8)
+@_entry("rotor_skin_effect", "fraction at rated frequency", "R_r(f_N)/R_r(0) - 1 of the cage", ("one_cell", "two_cells"), 0.01, 0.6)
 def _rotor_skin_effect(effect, plant, p, s):
     """Bars as R in series with (R parallel L) cells; the DC leakage stays that of the machine."""
     m, w = plant.machine, 2.0 * math.pi * plant.nameplate.rated_frequency_hz
@@ -173,7 +173,7 @@ def _stator_heating(effect, plant, p, s):
     p[at.P_HEAT_S_SHAPE] = _shape(effect)
 
 
-@_entry("rotor_heating", "1/min at rated current", "rise of the cage resistance", ("leaky", "slow"), 0.01, 0.5)
+@_entry("rotor_heating", "1/min at rated current", "rise of the cage resistance", ("leaky", "slow"), 0.02, 2.0)
 def _rotor_heating(effect, plant, p, s):
     p[at.P_HEAT_R] = effect.size / (120.0 * plant.nameplate.rated_current_a**2)
     p[at.P_HEAT_R_TAU] = effect.details.get("time_constant_s", (60.0, 1e9)[_shape(effect)])
@@ -262,6 +262,6 @@ def _resistance_anisotropy(effect, plant, p, s):
         p[slot] *= 1.0 + 2.0 * effect.size * (math.cos(turn) * c2 + math.sin(turn) * s2)
 
 
-@_entry("cable_capacitance", "F", "capacitance behind the sensors, star", ("step", "damped"), 3e-10, 5e-8)
+@_entry("cable_capacitance", "F", "capacitance behind the sensors, star", ("step", "damped"), 5e-10, 2e-7)
 def _cable_capacitance(effect, plant, p, s):
     s[at.S_CABLE_F], s[at.S_CABLE_SHAPE] = effect.size, _shape(effect)

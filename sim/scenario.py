@@ -18,7 +18,7 @@ from sim.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, 
 FOLDER = Path(__file__).parent / "scenarios"
 MACHINE_TABLE = FOLDER / "machines.csv"
 TOP = {"name", "kind", "description", "machine", "nameplate", "power_stage", "sensors", "heating", "effects", "drive",
-       "interlocks", "faults", "recording", "firmware_map"}
+       "interlocks", "faults", "recording", "firmware_map", "noise", "unlisted"}
 SIGNED = {"offset_a", "shaft_speed_rad_per_s", "heatsink_degc", "winding_degc", "saturation_at_rated_flux"}
 CHOICES = {"saturation_shape": SATURATION_SHAPES, "dead_time_shape": SIGN_SHAPES, "threshold_shape": SIGN_SHAPES}
 MAY_BE_ZERO = {"noise_a", "bits", "delay_s", "lag_s", "link_noise_v", "threshold_v", "slope_ohm", "dead_time_s",
@@ -101,6 +101,7 @@ def build(document: dict[str, Any], source: str = "scenario") -> Scenario:
         _effects(document.get("effects", {}), source), _positive(drive.pop("control_period_s", 2e-4), source, "drive.control_period_s"),
     )
     recording = document.get("recording", {})
+    _check_noise(document, source)
     _known(recording, {"segments", "link_column", "w_column", "pause_s"}, source, "recording.")
     return Scenario(
         str(document.get("name", "scenario")), kind, plant, _setup(drive, document.get("interlocks", {}), source),
@@ -108,6 +109,14 @@ def build(document: dict[str, Any], source: str = "scenario") -> Scenario:
         bool(recording.get("link_column", True)), bool(recording.get("w_column", True)),
         float(recording.get("pause_s", 1.0)), int(document.get("firmware_map", {}).get("shift", 0)), document,
     )
+
+
+def _check_noise(document: dict[str, Any], source: str) -> None:
+    noise, unlisted = document.get("noise", {}), document.get("unlisted", {})
+    _known(noise, {"kind"}, source, "noise.")
+    if noise.get("kind", "white") not in ("white", "red", "flicker"):
+        raise ScenarioError(f"{source}: noise.kind = {noise['kind']!r}, must be white, red or flicker")
+    _known(unlisted, {"voltage_curvature", "sensor_slew", "echo"}, source, "unlisted.")
 
 
 def _known(table: Any, allowed: set[str], source: str, where: str) -> None:
