@@ -149,7 +149,7 @@ def main() -> None:
         if as_json:
             _say(_usage(error), as_json)
         else:
-            getattr(error, "show", lambda: print(error, file=sys.stderr))()  # noqa: T201
+            _show_usage(error)
         sys.exit(2)
     except typer.Exit as stop:
         sys.exit(stop.exit_code)
@@ -171,6 +171,13 @@ def _say(error: CommissionerError, as_json: bool) -> None:
         screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
     else:
         screen.failure(error)
+
+
+def _show_usage(error: TyperException) -> None:
+    if hasattr(error, "show"):
+        error.show()
+    else:
+        print(error, file=sys.stderr)  # noqa: T201
 
 
 def _usage(error: Exception) -> CommissionerError:

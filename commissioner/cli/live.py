@@ -43,7 +43,7 @@ class LiveView:
                     f"    {escape(record.drive_type)} #{record.serial_number}, firmware {record.firmware_version}, "
                     f"{record.rated_drive_current_a:g} A, {1e6 * record.control_period_s:g} µs"
                 )
-            case told.ChecksJudged(results=results):
+            case told.ChecksJudged():
                 self._checks(record)
             case told.StaircaseFitted():
                 self._close()
@@ -61,7 +61,8 @@ class LiveView:
             case told.AxisFinished():
                 self._close()
                 self._line(
-                    f"    {record.why}; energised {record.energised_s:.1f} s, flux to {record.peak_flux_fraction:.0%} of the limit"
+                    f"    {record.why}; energised {record.energised_s:.1f} s, "
+                    f"flux to {record.peak_flux_fraction:.0%} of the limit"
                 )
             case told.VerdictReached():
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")

@@ -96,8 +96,9 @@ def _ask(url: str, seconds: float, write_back: bool, *, as_json: bool) -> None:
             remedy="add --yes once you have made sure that the motor may be energised",
         )
     screen.out.print(
-        f"[bold yellow]The motor at {url} will be energised[/] at standstill on one axis at a time, for about {seconds:.0f} s in "
-        "all.\nNo torque is made on purpose, but the shaft may still move slightly. Guards on, people away, emergency stop tested?"
+        f"[bold yellow]The motor at {url} will be energised[/] at standstill on one axis at a time, for about "
+        f"{seconds:.0f} s in all.\nNo torque is made on purpose, but the shaft may still move slightly. "
+        "Guards on, people away, emergency stop tested?"
     )
     screen.out.print(
         "Accepted parameters will be written into the drive."

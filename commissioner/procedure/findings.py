@@ -95,7 +95,7 @@ class VerdictReached:
 
 @dataclass(frozen=True)
 class RunEnded:
-    """`outcome` is commissioned | rejected | aborted | faulted; `error` holds step, value, limit and remedy of a failure."""
+    """`outcome` is commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy."""
 
     outcome: str
     reason: str

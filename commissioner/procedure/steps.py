@@ -55,17 +55,17 @@ class Job:
     link_latency_s: float
 
     @property
-    def rated_current_peak_a(self) -> float:
-        return math.sqrt(2) * self.nameplate.rated_current_a
+    def scale_ramp_per_s(self) -> float:
+        return self.plan.excitation.scale_ramp_per_s
 
     @property
     def test_current_a(self) -> float:
         """The largest phase current that any test aims at, peak."""
-        return self.plan.limits.current_fraction * self.rated_current_peak_a
+        return self.plan.limits.current_fraction * self.nameplate.rated_current_peak_a
 
     @property
     def trip_current_a(self) -> float:
-        return self.plan.limits.trip_fraction * self.rated_current_peak_a
+        return self.plan.limits.trip_fraction * self.nameplate.rated_current_peak_a
 
     @property
     def test_voltage_v(self) -> float:
@@ -100,6 +100,7 @@ class Findings:
     snapshot: ParameterSnapshot | None = None
     checks: tuple[CheckResult, ...] = ()
     tests_done: int = 0
+    dc_voltages_v: tuple[float, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
     estimate: InverseGamma | None = None
     blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)
@@ -109,6 +110,12 @@ class Findings:
     identification: Identification | None = None
     verdict: Verdict | None = None
     written: tuple[WrittenParameter, ...] = ()
+
+    def resistance_ohm(self, job: Job) -> float:
+        """The newest stator resistance: from the last staircase, else the plate's typical value."""
+        if self.staircases:
+            return self.staircases[-1].stator_resistance.value
+        return prior(job.nameplate).typical.stator_resistance_ohm
 
 
 def connect(job: Job, findings: Findings) -> Step:

@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any
 
@@ -42,7 +42,7 @@ Present = Callable[[object], None]
 class _Progress:
     """What the runner keeps while it goes."""
 
-    facts: SafetyFacts = SafetyFacts()
+    facts: SafetyFacts = field(default_factory=SafetyFacts)
     segment: int = -1
     session_s: float = 0.0
     flux_fraction: float = 0.0
@@ -71,7 +71,7 @@ class Runner:
         return self._progress.facts.energised_s
 
     def perform(self, course: Course) -> RunEnded:
-        """Run the course to its end. Faults, guards and the operator end it as a value; the drive is always disarmed."""
+        """Run the course to its end. Faults, guards and the operator end it as a value; the drive is disarmed."""
         error: CommissionerError | None = None
         ended: RunEnded | None = None
         with self._stop:

@@ -1,0 +1,189 @@
+"""The report of a commissioning run: what was found, whether to trust it, what was written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from commissioner.procedure.steps import Findings
+from commissioner.report import figures
+from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
+
+_TONES: dict[str, Tone] = {"commissioned": "good", "rejected": "warn", "aborted": "warn", "faulted": "bad"}
+_NAMES = (
+    ("stator_resistance_ohm", "Stator resistance R_s", 1.0, "Ω"),
+    ("rotor_resistance_ohm", "Rotor resistance R_R", 1.0, "Ω"),
+    ("leakage_inductance_h", "Leakage inductance L_σ", 1e3, "mH"),
+    ("magnetizing_inductance_h", "Magnetizing inductance L_M", 1e3, "mH"),
+    ("rotor_time_constant_s", "Rotor time constant", 1e3, "ms"),
+)
+
+
+def run_page(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings) -> str:
+    """The whole page as one self-contained HTML text, for every way a run can end."""
+    outcome = str(result["outcome"])
+    return render(
+        Page(
+            title=f"commissioner · run {result['run']}",
+            headline=_headline(result),
+            tone=_TONES.get(outcome, "bad"),
+            facts=list(_facts(result)),
+            sections=[section for section in _sections(result, journal, findings) if section.parts],
+            footer="SI units; per-phase star equivalent, rotor quantities referred to the stator; inverse-Gamma circuit. "
+            "Intervals are 95 %.",
+        )
+    )
+
+
+def _headline(result: Mapping[str, Any]) -> str:
+    reason = str(result["reason"])
+    sentence = reason[:1].upper() + reason[1:]
+    return f"{str(result['outcome']).capitalize()}. {sentence}."
+
+
+def _facts(result: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    drive = result.get("drive") or {}
+    if drive:
+        yield "Drive", f"{drive['drive_type']} #{drive['serial_number']}"
+    yield "Energised in all", f"{result['energised_s']:.1f} s"
+    peak = (result.get("flux_guard") or {}).get("peak_fraction")
+    if peak:
+        yield "Largest flux, of the limit", f"{100 * peak:.0f} %"
+    written = result.get("written") or ()
+    yield "Parameters in the drive", "new values, read back and stored" if written else "unchanged"
+
+
+def _sections(
+    result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings
+) -> Iterator[Section]:
+    tests = _tests(journal)
+    yield Section("Result", list(_result_parts(result)))
+    yield Section("What objects", list(_objections(result)))
+    yield Section("Axes side by side", list(_axes_parts(result)))
+    if tests:
+        limit = (result.get("flux_guard") or {}).get("limit_wb")
+        yield Section(
+            "Course of the tests",
+            [
+                picture(figures.convergence(tests), "Online estimate of each test with two standard errors."),
+                *_flux_parts(tests, limit),
+            ],
+        )
+    yield Section("Currents and residual", list(_current_parts(findings)))
+    yield Section("Checks before energising", list(_check_parts(result)))
+    yield Section("What happened, in order", [_course(journal)])
+
+
+def _result_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
+    error = result.get("error")
+    if error:
+        yield Table(
+            ("What", "Seen"),
+            [(name, str(error[name])) for name in ("step", "value", "limit", "remedy") if error.get(name) not in (None, "")],
+        )
+    parameters = result.get("parameters") or {}
+    if not parameters:
+        return
+    before = result.get("before") or {}
+    written = {row["field"]: row for row in result.get("written") or ()}
+    rows = []
+    for name, words, factor, unit in _NAMES:
+        if name not in parameters:
+            continue
+        value, std = parameters[name]["value"], parameters[name]["std"] or 0.0
+        old = before.get(name)
+        rows.append(
+            (
+                words,
+                f"{factor * value:.4g} {unit}",
+                f"± {100 * 1.96 * std / abs(value):.2g} %",
+                f"{factor * old:.4g} {unit}" if old else "—",
+                f"{100 * (value / old - 1):+.1f} %" if old else "—",
+                _written_cell(written.get(name), factor, unit),
+            )
+        )
+    yield Table(("Parameter", "Value", "95 % interval", "In the drive before", "Change", "Read back"), rows)
+    yield from result.get("remarks") or ()
+
+
+def _written_cell(row: Mapping[str, Any] | None, factor: float, unit: str) -> str:
+    return f"{factor * row['read_back']:.4g} {unit}" if row else "not written"
+
+
+def _objections(result: Mapping[str, Any]) -> Iterator[Table]:
+    rows = [(o["what"], str(o["value"]), str(o["limit"]), o["remedy"]) for o in result.get("objections") or ()]
+    if rows:
+        yield Table(("Objection", "Seen", "Limit", "Remedy"), rows, tones=["warn"] * len(rows))
+
+
+def _axes_parts(result: Mapping[str, Any]) -> Iterator[Table | Picture]:
+    axes = result.get("axes") or ()
+    if not axes or not result.get("parameters"):
+        return
+    yield picture(
+        figures.axes_side_by_side(axes, result["parameters"]),
+        "Each test's estimate with its 95 % interval (blue) and the combined value (green).",
+    )
+
+
+def _flux_parts(tests: Sequence[Sequence[Mapping[str, Any]]], limit_wb: float | None) -> Iterator[Picture]:
+    if limit_wb:
+        yield picture(
+            figures.fluxes(tests, limit_wb),
+            "Peak of both flux estimates over each tenth of a second; the guard acts on the larger, predicted one.",
+        )
+
+
+def _current_parts(findings: Findings) -> Iterator[Picture]:
+    identification = findings.identification
+    if identification is None:
+        return
+    for trace in identification.traces:
+        yield picture(
+            figures.currents(trace.time_s, trace.current_a, trace.residual_a, trace.title),
+            "Measured current along the axis, and what the identified model leaves of it.",
+            raster=True,
+        )
+
+
+def _check_parts(result: Mapping[str, Any]) -> Iterator[Table]:
+    checks = result.get("checks") or ()
+    if checks:
+        yield Table(
+            ("Check", "Seen", "Wanted", "Result"),
+            [(c["name"], str(c["value"]), str(c["limit"]), "passed" if c["has_passed"] else c["remedy"]) for c in checks],
+            tones=["good" if c["has_passed"] else "bad" for c in checks],
+        )
+
+
+_TOLD = ("state_entered", "staircase_fitted", "guard_acted", "axis_finished", "verdict_reached", "parameters_written", "error", "disarmed")
+
+
+def _course(journal: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        (str(line["utc"])[11:23], str(line["kind"]).replace("_", " "), _told(line["record"]))
+        for line in journal
+        if line["kind"] in _TOLD
+    ]
+    return Table(("UTC", "What", "Facts"), rows)
+
+
+def _told(record: Mapping[str, Any]) -> str:
+    parts = []
+    for key, value in record.items():
+        if isinstance(value, float):
+            parts.append(f"{key} {value:.4g}")
+        elif isinstance(value, str | int) and value != "":
+            parts.append(f"{key} {value}")
+    return ", ".join(parts)
+
+
+def _tests(journal: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+    """The online estimates, one list per test."""
+    tests: list[list[Mapping[str, Any]]] = []
+    for line in journal:
+        if line["kind"] == "excitation_chosen":
+            tests.append([])
+        elif line["kind"] == "estimate_updated" and tests:
+            tests[-1].append(line["record"])
+    return [test for test in tests if test]
