@@ -16,6 +16,8 @@ SUPPLY_ORDERS = 13
 MOST_ORDERS = 40
 MOST_SHAFT_ORDERS = 24
 USED_FOR_REFINING = 4
+DRIFT_DEGREE = 4
+"""A slip that wanders over the segment: phase polynomial beyond a fixed ratio to the mains (or to the clock)."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,9 @@ def _refined(
         shift, std, power = periods.refine(demodulated, 0.8 / np.ptp(time))
         tries.append((power, frequency_hz + shift, std, follows))
     power, frequency, std, follows = max(tries)
-    return Periodicity(name, frequency, std, follows, power, seen)
+    phase = comb_phase(frame, part, frequency, follows)
+    drift = periods.track(periods.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
+    return Periodicity(name, frequency, std, follows, power, seen, drift)
 
 
 def _strongest(frame: TurningFrame, residual: Signal, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:
@@ -112,6 +116,8 @@ def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: lis
     taken = [h * f for f in others_hz for h in range(1, int(frame.band_hz / f) + 1) if h <= limit]
     orders = free_orders(found.frequency_hz, highest, taken, mean_supply(frame, part) / (2 * np.pi), float(np.ptp(time)))
     phase = comb_phase(frame, part, found.frequency_hz, found.follows)
+    if found.drift is not None:
+        phase = phase + found.drift(time)
     return Comb(found.name, phase, found.frequency_hz, orders, found.follows)
 
 

@@ -7,14 +7,14 @@ combs anywhere. A refined comb is judged by the power it captures, and by whethe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.ndimage import median_filter
 
-from commissioner.monitor.supply import TurningFrame, Vector
+from commissioner.monitor.supply import Vector
 from commissioner.records import Signal
 
 SIGNIFICANT = 18.0
@@ -61,7 +61,7 @@ class Periodicity:
     follows: str
     evidence: float
     harmonics_seen: tuple[int, ...]
-    rejected: tuple[str, ...] = field(default=())
+    drift: PhaseDrift | None = None
 
 
 def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float) -> PairSpectrum:
@@ -160,6 +160,41 @@ def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> fl
         (2 * np.pi * demodulated.harmonic) ** 2 * known / (demodulated.noise_variance + 1e-300)
     ) * np.sum(centre**2)
     return float(1 / np.sqrt(information)) if information > 0 else float("inf")
+
+
+@dataclass(frozen=True)
+class PhaseDrift:
+    """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1."""
+
+    polynomial: NDArray[np.float64]
+    centre_s: float
+    half_s: float
+
+    def __call__(self, time_s: Signal) -> Signal:
+        return np.asarray(np.polynomial.legendre.legval((time_s - self.centre_s) / self.half_s, self.polynomial))
+
+
+def track(demodulated: Demodulated, degree: int) -> PhaseDrift:
+    """The smooth phase that the comb's blocks show together: delta_b = sum h Im(z_b conj c) / sum h^2 |c|^2, iterated.
+
+    Harmonics are weighed by their noise; coefficients below three standard deviations are dropped.
+    """
+    time = demodulated.time_s
+    centre, half = 0.5 * (time[0] + time[-1]), 0.5 * np.ptp(time)
+    basis = np.polynomial.legendre.legvander((time - centre) / half, degree)
+    h = demodulated.harmonic[:, None]
+    weight = 1 / (demodulated.noise_variance[:, None] + 1e-300)
+    coefficients = np.zeros(degree + 1)
+    for _ in range(5):
+        turned = demodulated.sums * np.exp(-1j * h * (basis @ coefficients)[None, :])
+        mean = turned.mean(axis=1, keepdims=True)
+        bottom = np.sum(h**2 * np.abs(mean) ** 2 * weight)
+        delta = np.sum(h * weight * np.imag(turned * np.conj(mean)), axis=0) / max(bottom, 1e-300)
+        coefficients = coefficients + np.linalg.lstsq(basis, delta, rcond=None)[0]
+    std = np.sqrt(0.5 / max(bottom, 1e-300)) / np.sqrt(np.sum(basis**2, axis=0))
+    coefficients = np.where(np.abs(coefficients) > 3 * std, coefficients, 0.0)
+    coefficients[0] = 0.0
+    return PhaseDrift(coefficients, float(centre), float(half))
 
 
 def find_peaks_above(spectrum: PairSpectrum, threshold: float, low_hz: float, high_hz: float) -> list[tuple[float, float]]:
@@ -263,9 +298,3 @@ def is_product(frequency_hz: float, combs_hz: list[float], supply_hz: float, tol
     for group in multiples:
         sums = (sums[:, None] + group[None, :]).ravel()
     return bool(np.any(np.abs(sums - frequency_hz) < tolerance_hz))
-
-
-def speed_frame(frame: TurningFrame, part: slice) -> tuple[Vector, Signal]:
-    """The segment's current and its times from zero at the middle."""
-    time = frame.time_s[part]
-    return frame.current_a[part], time - 0.5 * (time[0] + time[-1])

@@ -1,0 +1,207 @@
+"""Which channel is which: sequence, spacing, polarity, and which current belongs to which voltage.
+
+Six phasors decide. A motor takes active and reactive power, so its current lags its voltage by 0 to 90 degrees; the
+nameplate says by how much at this current. The simplest mistake that explains the phasors is taken, and reported;
+where two mistakes explain them equally well the data are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
+
+Entry = tuple[str, str, str, float | str | None, float | str | None, str]
+Order = tuple[int, int, int]
+Sign = tuple[int, int, int]
+Option = tuple[Order, Sign, float]
+
+SPACING_TOLERANCE_DEG = 25.0
+"""3 % negative-sequence voltage makes up to 30 % of it in the current: 17 degrees."""
+LAG_TOLERANCE_DEG = 45.0
+CLEARLY_BETTER_DEG = 15.0
+THIRD = 2 * np.pi / 3
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity; findings as plain entries."""
+
+    current_order: Order
+    voltage_order: Order
+    current_sign: Sign
+    voltage_sign: Sign
+    runs_backwards: bool
+    lag_deg: float
+    findings: tuple[Entry, ...]
+    channel_map: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Triple:
+    """Three phasors read as a symmetric system: polarities, sequence (+1, -1), and how far off 120 degrees it is."""
+
+    sign: Sign
+    sequence: int
+    deviation_deg: float
+
+
+def pair(
+    currents: list[complex], voltages: list[complex], plate: Nameplate, start: TCircuit, frequency_hz: float,
+    line_to_line: bool,
+) -> Pairing:
+    """The order and polarity of all channels, or findings that refuse."""
+    findings: list[Entry] = []
+    v, i = read_triple(voltages), read_triple(currents)
+    for name, triple in (("voltage", v), ("current", i)):
+        _spacing(name, triple, findings)
+    voltage_order, turned = _voltage_order(v.sequence, line_to_line)
+    ordered = _ordered(v.sign, voltage_order)
+    voltage_sign: Sign = (turned * ordered[0], turned * ordered[1], turned * ordered[2])
+    star = _star([voltage_sign[k] * voltages[voltage_order[k]] for k in range(3)], line_to_line)
+    reference = positive_sequence(star)
+    options = _options(currents, i, reference)
+    expected = _expected_lag_deg(currents, star, plate, start, frequency_hz)
+    chosen, lag = _choose(options, expected, v.sequence == i.sequence, v.sequence < 0, findings)
+    current_order, current_sign = chosen
+    if v.sequence < 0:
+        findings.append((
+            "phase_order", "corrected", "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
+            "u-w-v", "u-v-w", "exchange two phases of all channels if the motor turns forwards",
+        ))
+    _report_currents(current_order, current_sign, (0, 1, 2) if v.sequence > 0 else (0, 2, 1), findings)
+    if v.sign != (1, 1, 1):
+        flipped = [name for name, sign in zip("uvw", v.sign, strict=True) if sign < 0]
+        findings.append(("polarity", "corrected", "voltage channel " + ", ".join(flipped) + " is inverted", "inverted",
+                         "same polarity", "turn the probe round"))
+    mapping = {
+        f"phase {name}": f"current {'-' if current_sign[k] < 0 else ''}{'uvw'[current_order[k]]}, "
+        f"voltage {'-' if voltage_sign[k] < 0 else ''}{'uvw'[voltage_order[k]]}" for k, name in enumerate("uvw")
+    }
+    return Pairing(
+        current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, tuple(findings), mapping
+    )
+
+
+def _voltage_order(sequence: int, line_to_line: bool) -> tuple[Order, int]:
+    """(order, polarity) that makes a positive sequence: phases v and w exchanged, which turns uv into -wu."""
+    if sequence > 0:
+        return (0, 1, 2), 1
+    return ((2, 1, 0), -1) if line_to_line else ((0, 2, 1), 1)
+
+
+def read_triple(phasors: list[complex]) -> Triple:
+    """The polarities and sequence for which the three are closest to 120 degrees apart; as given wins a tie."""
+    best = Triple((1, 1, 1), 1, 1e9)
+    for flips in ((1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, 1, 1)):
+        for sequence in (1, -1):
+            turned = [
+                sign * phasor * np.exp(1j * sequence * k * THIRD)
+                for k, (sign, phasor) in enumerate(zip(flips, phasors, strict=True))
+            ]
+            unit = [t / max(abs(t), 1e-12) for t in turned]
+            middle = np.sum(unit)
+            deviation = max(abs(np.degrees(np.angle(u * np.conj(middle)))) for u in unit) if abs(middle) > 0.5 else 180.0
+            if deviation < best.deviation_deg - 1e-6:
+                best = Triple(flips, sequence, float(deviation))
+    return best
+
+
+def positive_sequence(phasors: list[complex]) -> complex:
+    """(1/3)(u + a v + a^2 w)."""
+    return complex(sum(p * np.exp(1j * k * THIRD) for k, p in enumerate(phasors)) / 3)
+
+
+def _ordered(sign: Sign, order: Order) -> Sign:
+    return sign[order[0]], sign[order[1]], sign[order[2]]
+
+
+def _star(voltages: list[complex], line_to_line: bool) -> list[complex]:
+    if not line_to_line:
+        return voltages
+    uv, vw, wu = voltages
+    return [(uv - wu) / 3, (vw - uv) / 3, (wu - vw) / 3]
+
+
+def _spacing(name: str, triple: Triple, findings: list[Entry]) -> None:
+    if triple.deviation_deg > SPACING_TOLERANCE_DEG:
+        findings.append((
+            "phase_spacing", "refused", f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
+            triple.deviation_deg, SPACING_TOLERANCE_DEG, "check that three different phases are measured",
+        ))
+
+
+def _options(currents: list[complex], read: Triple, reference: complex) -> list[Option]:
+    """(order, sign, lag in degrees) of every assignment that makes a positive sequence."""
+    found = []
+    for order, turned in product(((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)), (1, -1)):
+        even = order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        if even != (read.sequence > 0):
+            continue
+        sign = tuple(turned * s for s in _ordered(read.sign, order))
+        sequence = positive_sequence([sign[k] * currents[order[k]] for k in range(3)])
+        lag = float(np.degrees(np.angle(reference * np.conj(sequence))))
+        found.append((order, (int(sign[0]), int(sign[1]), int(sign[2])), lag))
+    return found
+
+
+def _expected_lag_deg(
+    currents: list[complex], star: list[complex], plate: Nameplate, start: TCircuit, frequency_hz: float
+) -> float:
+    """The lag at which the nameplate's circuit draws a current of this size; 80 degrees below its no-load current."""
+    voltage = float(np.mean(np.abs(star)))
+    current = float(np.mean(np.abs(currents)))
+    supply = 2 * np.pi * frequency_hz
+    slip = slip_at_current(start, supply, voltage, current)
+    return min(float(np.degrees(np.angle(stator_impedance(start, supply, slip)))), 80.0)
+
+
+def _choose(
+    options: list[Option], expected_deg: float, same_sequence: bool, backwards: bool,
+    findings: list[Entry],
+) -> tuple[tuple[Order, Sign], float]:
+    """The simplest plausible assignment; refused where none is, or where another fits clearly better."""
+    plausible = [option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < LAG_TOLERANCE_DEG]
+    if not plausible:
+        order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))
+        findings.append((
+            "pairing", "refused", "no order of the current channels makes a motor: the current's lag is "
+            f"{lag:.0f} degrees where {expected_deg:.0f} are expected", lag, "0 ... 90 degrees",
+            "check which current belongs to which voltage, and the polarities",
+        ))
+        return (order, sign), lag
+    preferred: Order = (0, 2, 1) if backwards and same_sequence else (0, 1, 2)
+
+    def mistakes(option: Option) -> int:
+        return sum(option[0][k] != preferred[k] for k in range(3)) + sum(s < 0 for s in option[1])
+
+    plausible.sort(key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
+    order, sign, lag = plausible[0]
+    rivals = [o for o in plausible[1:] if abs(o[2] - expected_deg) + CLEARLY_BETTER_DEG < abs(lag - expected_deg)]
+    if rivals and mistakes(plausible[0]) > 0:
+        findings.append((
+            "pairing", "refused", "the current channels are crossed and two orders are possible "
+            f"(lags of {lag:.0f} and {rivals[0][2]:.0f} degrees)", lag, f"{expected_deg:.0f} degrees expected",
+            "check which current belongs to which voltage",
+        ))
+    return (order, sign), lag
+
+
+def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: list[Entry]) -> None:
+    """One sentence per kind of mistake."""
+    if order != voltage_order or any(s < 0 for s in sign):
+        names = ", ".join(
+            f"{'uvw'[k]} from {'inverted ' if sign[k] < 0 else ''}current_{'uvw'[order[k]]}_a" for k in range(3)
+        )
+        crossed = order != voltage_order
+        findings.append((
+            "crossed_channels" if crossed else "polarity", "corrected",
+            ("the current channels are crossed against the voltages; " if crossed else "a current channel is inverted; ")
+            + f"taken: phase {names} (exchanging the voltages instead would explain it as well)",
+            names, "u, v, w in order", "correct the wiring or the column names",
+        ))
