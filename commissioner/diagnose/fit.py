@@ -78,21 +78,42 @@ def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: fl
     return flat.reshape(*signal.shape[:-2], -1)
 
 
-def normal_equations(model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise) -> Normal:
-    """Gram matrix and slope of the whitened residual for the four and `wanted`, one block per segment."""
+def normal_equations(
+    model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise, block: int = 1
+) -> Normal:
+    """Gram matrix and slope of the whitened residual for the four and `wanted`, one block per segment.
+
+    `block` > 1 averages so many neighbouring samples first (white noise only): a screening needs no more bandwidth
+    than the excitation has.
+    """
     size = 4 + len(wanted)
     grams, slopes, chi2, counts = [], [], [], []
     for k, segment in enumerate(record.segments):
-        prediction = predict(model, record, k, layout, wanted)
+        here = [c for c, term in enumerate(wanted) if term.segment in (-1, segment.uid)]
+        rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
+        prediction = predict(model, record, k, layout, [wanted[c] for c in here])
         residual = segment.currents_a - prediction.currents_a
         stacked = np.concatenate([prediction.jacobian, residual[None]], axis=0)
-        white = whiten(stacked, segment.is_good, noise, record.facts.sample_period_s)
-        gram = white @ white.T
-        grams.append(gram[:size, :size])
-        slopes.append(gram[:size, size])
-        chi2.append(float(gram[size, size]))
+        good = segment.is_good
+        if block > 1 and noise.is_white:
+            stacked, good = _averaged(stacked, good, block)
+        white = whiten(stacked, good, noise, record.facts.sample_period_s)
+        product = white @ white.T
+        gram, slope = np.zeros((size, size)), np.zeros(size)
+        gram[np.ix_(rows, rows)] = product[:-1, :-1]
+        slope[rows] = product[:-1, -1]
+        grams.append(gram)
+        slopes.append(slope)
+        chi2.append(float(product[-1, -1]))
         counts.append(int(segment.is_good.sum()) * record.facts.phases)
     return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
+
+
+def _averaged(stacked: Array, good: NDArray[np.bool_], block: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
+    n = stacked.shape[-1] // block * block
+    summed = stacked[..., :n].reshape(*stacked.shape[:-1], -1, block).sum(axis=-1) / np.sqrt(block)
+    return summed, good[:n].reshape(-1, block).all(axis=1)
 
 
 def chi2_of(model: Model, record: Record, layout: Layout, noise: Noise) -> float:
@@ -111,7 +132,8 @@ def segment_chi2(model: Model, record: Record, layout: Layout, noise: Noise) -> 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:
     """Minimise |r - J d|^2 + damping |diag J'J d|^2 within bounds, from the normal equations."""
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scale = np.sqrt(np.diag(gram))
+    scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-150))
     scaled = gram / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled + damping * np.eye(scale.shape[0]))
     keep = values > 1e-11 * values[-1]

@@ -35,7 +35,7 @@ LEGS_LINK = 19  # as LEGS, scaled with the link voltage and switching frequency 
 SQRT3 = np.sqrt(3.0)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def spline_weights(y, top, intervals, weights, row):
     """Uniform cubic B-spline weights on [0, top], linear beyond. `weights[row, 0:4]` values, `[4:8]` slopes; first index."""
     h = top / intervals
@@ -61,7 +61,7 @@ def spline_weights(y, top, intervals, weights, row):
     return j
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _curve(coefficients, j, weights, row, offset):
     return (
         coefficients[j] * weights[row, offset]
@@ -71,11 +71,11 @@ def _curve(coefficients, j, weights, row, offset):
     )
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _slope(
-    x, dx, k, dk, with_tangent,
+    x, dx, k, dk, stage, with_tangent,
     va, vb, voltage_raw_a, voltage_raw_b, link,
-    ru, rv, rw, rr, omega, channel_row,
+    ru, rv, rw, rr, omega, channels, t,
     base, legs, iron, leak, legs_top, legs_knee, iron_top, leak_top,
     stop_gain, stop_radius, z, z_ref, dz, dz_ref, branch_gain, branch_time,
     kinds, indices, legs_vectors, iron_vectors, leak_vectors,
@@ -172,8 +172,8 @@ def _slope(
     du -= ru
     dv -= rv
     dw -= rw
-    k[0] = va + (2.0 * eu - ev - ew) / 3.0
-    k[1] = vb + (ev - ew) / SQRT3
+    k[stage, 0] = va + (2.0 * eu - ev - ew) / 3.0
+    k[stage, 1] = vb + (ev - ew) / SQRT3
     vaa = (4.0 * du + dv + dw) / 6.0
     vab = (dw - dv) / (2.0 * SQRT3)
     vbb = 0.5 * (dv + dw)
@@ -189,14 +189,14 @@ def _slope(
     wa = waa * ca + wab * cb
     wb = wab * ca + wbb * cb
     # (7)
-    k[2] = -wa - omega * x[3]
-    k[3] = -wb + omega * x[2]
+    k[stage, 2] = -wa - omega * x[3]
+    k[stage, 3] = -wb + omega * x[2]
     for n in range(branches):
-        k[4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
-        k[5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
+        k[stage, 4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
+        k[stage, 5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
     # slope of the terminal current while the voltage is held
-    qa = (1.0 - nu) * k[2] + nu * k[0]
-    qb = (1.0 - nu) * k[3] + nu * k[1]
+    qa = (1.0 - nu) * k[stage, 2] + nu * k[stage, 0]
+    qb = (1.0 - nu) * k[stage, 3] + nu * k[stage, 1]
     dja = jaa * qa + jab * qb
     djb = jab * qa + jbb * qb
     for s in range(stops):
@@ -211,8 +211,8 @@ def _slope(
         else:
             dja += stop_gain[s] / r * qa
             djb += stop_gain[s] / r * qb
-    ea = k[0] - k[2]
-    eb = k[1] - k[3]
+    ea = k[stage, 0] - k[stage, 2]
+    eb = k[stage, 1] - k[stage, 3]
     out[2 + 2 * stops] = (iaa * ea + iab * eb + nu * dja) * shrink
     out[3 + 2 * stops] = (iab * ea + ibb * eb + nu * djb) * shrink
     if not with_tangent:
@@ -271,20 +271,20 @@ def _slope(
             ft[0, p] = (va - rs * ta) * shrink
             ft[1, p] = (vb - rs * tb) * shrink
         elif kind == VOLTAGE_MOD:
-            fv[0, p] = voltage_raw_a * channel_row[n]
-            fv[1, p] = voltage_raw_b * channel_row[n]
+            fv[0, p] = voltage_raw_a * channels[t, n]
+            fv[1, p] = voltage_raw_b * channels[t, n]
         elif kind == OMEGA:
-            fw[0, p] = channel_row[n] * x[3]
-            fw[1, p] = -channel_row[n] * x[2]
+            fw[0, p] = channels[t, n] * x[3]
+            fw[1, p] = -channels[t, n] * x[2]
         elif kind == PHASE_RESISTANCE:
-            pu = -rs * channel_row[n] * iu
-            pv = -rs * channel_row[n + 1] * iv
-            pw = -rs * channel_row[n + 2] * iw
+            pu = -rs * channels[t, n] * iu
+            pv = -rs * channels[t, n + 1] * iv
+            pw = -rs * channels[t, n + 2] * iw
             fv[0, p] = (2.0 * pu - pv - pw) / 3.0
             fv[1, p] = (pv - pw) / SQRT3
         elif kind == ROTOR_MOD:
-            fw[0, p] = r_r * channel_row[n] * (wa / rr)
-            fw[1, p] = r_r * channel_row[n] * (wb / rr)
+            fw[0, p] = r_r * channels[t, n] * (wa / rr)
+            fw[1, p] = r_r * channels[t, n] * (wb / rr)
         elif kind == ROTOR_ANISOTROPY:
             fw[0, p] = rr * ca if n == 0 else rr * cb
             fw[1, p] = -rr * cb if n == 0 else rr * ca
@@ -336,8 +336,8 @@ def _slope(
         out_b = vab * dta + vbb * dtb + fv[1, p]
         dca = gm * ((1.0 + mas) * dx[2, p] + mbs * dx[3, p]) + dja - dia
         dcb = gm * (mbs * dx[2, p] + (1.0 - mas) * dx[3, p]) + djb - dib
-        dk[0, p] = out_a
-        dk[1, p] = out_b
+        dk[stage, 0, p] = out_a
+        dk[stage, 1, p] = out_b
         fj[0, p] = dca
         fj[1, p] = dcb
         fi[0, p] = dta
@@ -350,18 +350,18 @@ def _slope(
     for p in range(count):
         dwa = waa * fj[0, p] + wab * fj[1, p] + fw[0, p]
         dwb = wab * fj[0, p] + wbb * fj[1, p] + fw[1, p]
-        dk[2, p] = -dwa - omega * dx[3, p]
-        dk[3, p] = -dwb + omega * dx[2, p]
+        dk[stage, 2, p] = -dwa - omega * dx[3, p]
+        dk[stage, 3, p] = -dwb + omega * dx[2, p]
         fw[0, p] = dwa
         fw[1, p] = dwb
     for n in range(branches):
         if branch_gain[n] != 0.0:
             for p in range(count):
-                dk[4 + 2 * n, p] = (fw[0, p] - dx[4 + 2 * n, p]) / branch_time[n]
-                dk[5 + 2 * n, p] = (fw[1, p] - dx[5 + 2 * n, p]) / branch_time[n]
+                dk[stage, 4 + 2 * n, p] = (fw[0, p] - dx[4 + 2 * n, p]) / branch_time[n]
+                dk[stage, 5 + 2 * n, p] = (fw[1, p] - dx[5 + 2 * n, p]) / branch_time[n]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def propagate(
     voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega_rad_per_s, channels,
     period, substeps, crossing_substeps,
@@ -437,7 +437,6 @@ def propagate(
         rw = rs * phase_factor[t, 2]
         rr = r_r * rotor_factor[t]
         om = omega_rad_per_s[t]
-        row = channels[t]
 
         steps = substeps
         h = period / steps
@@ -464,8 +463,8 @@ def propagate(
             vb = last_b if e < 0 else now_b
             wants = with_tangent if e >= 0 else has_loss_tangent
             _slope(
-                y, dy, k[stage], dk[stage], wants, va, vb, voltage_a[t], voltage_b[t], link,
-                ru, rv, rw, rr, om, row, base, legs_now, iron, leak, legs_top, legs_knee, iron_top, leak_top,
+                y, dy, k, dk, stage, wants, va, vb, voltage_a[t], voltage_b[t], link,
+                ru, rv, rw, rr, om, channels, t, base, legs_now, iron, leak, legs_top, legs_knee, iron_top, leak_top,
                 stop_gain, stop_radius, z, z_ref, dz, dz_ref, branch_gain, branch_time,
                 kinds, indices, legs_vectors, iron_vectors, leak_vectors, fj, fi, ft, fv, fw, dzt, wts, out,
             )

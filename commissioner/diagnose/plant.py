@@ -186,6 +186,8 @@ def _propagate(
     voltage_factor, rotor_factor = np.ones(n), np.ones(n)
     omega, phase_factor = np.zeros(n), np.ones((n, 3))
     for term, value in zip(model.terms, model.values, strict=True):
+        if term.segment not in (-1, segment.uid):
+            continue
         if term.kind == kernel.VOLTAGE_MOD:
             voltage_factor += value * channels[:, term.index]
         elif term.kind == kernel.ROTOR_MOD:
@@ -253,7 +255,7 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
     if model.has_kind(kernel.LEAKAGE_CURVE):
         rate *= 1.3
     period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
-    return int(layout.substeps * max(1, np.ceil(rate * period / 0.25)))
+    return int(layout.substeps * np.clip(np.ceil(rate * period / 0.25), 1, 40))
 
 
 def _sense(
@@ -305,7 +307,7 @@ def _sense(
     age = (segment.time_s - middle) / 60.0
     reported = reported + model.sum_kind(DRIFT, 3)[:phases, None] * age
     for term, value in zip(model.terms, model.values, strict=True):
-        if term.kind == TONE and value:
+        if term.kind == TONE and value and term.segment in (-1, segment.uid):
             reported[term.index % 3] += value * channels[:, term.index // 3]
     for k, term in enumerate(listed):
         row = jacobian[4 + k]

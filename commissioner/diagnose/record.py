@@ -95,5 +95,7 @@ class Record:
     def subset(self, keep: tuple[int, ...], samples: int | None = None) -> Record:
         """Only the segments at the positions `keep`, each cut after `samples`."""
         cut = [self.segments[k] if samples is None else self.segments[k].first(samples) for k in keep]
+        if not self.channels:
+            return Record(tuple(cut), self.facts)
         channels = tuple(np.ascontiguousarray(self.channels[k][: s.count]) for k, s in zip(keep, cut, strict=True))
-        return Record(tuple(cut), self.facts, self.channel_names, channels if self.channels else ())
+        return Record(tuple(cut), self.facts, self.channel_names, channels)

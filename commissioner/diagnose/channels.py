@@ -1,0 +1,165 @@
+"""Known functions of time that effects ride on: heat doses, lagged power, ripple and mains lines, hats, phase patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.record import TO_PHASES, Record, Segment
+
+Array = NDArray[np.float64]
+SAG_LAGS_S = (0.001, 0.01, 0.1)
+HEAT_LEAK_S = 20.0
+HATS = 5
+RIPPLE_HZ = (100.0, 120.0, 300.0, 360.0)
+MAINS_HZ = (50.0, 60.0)
+SEARCH = 0.008
+"""Relative range in which a mains-bound frequency is looked for (grid codes allow 1 %, seconds-long records see less)."""
+
+
+def add_channels(record: Record, model: Model, layout: Layout) -> tuple[Record, dict[str, float]]:
+    """The record with every known function of time, from measured currents and the nominal model's residual."""
+    predictions = [predict(model, record, k, layout) for k in range(len(record.segments))]
+    rotor = [p.rotor_current_a for p in predictions]
+    residuals = [s.currents_a - p.currents_a for s, p in zip(record.segments, predictions, strict=True)]
+    record = _with(record, _phase_patterns(record))
+    record = _with(record, _heat(record, rotor))
+    record = _with(record, _sag(record))
+    record = _with(record, _hats(record))
+    lines: dict[str, float] = {}
+    for name, bases, build in (("ripple", RIPPLE_HZ, _ripple_drive), ("mains", MAINS_HZ, _mains_drive)):
+        signals = build(record, residuals, model)
+        found = [_refine(record, signals, base) for base in bases]
+        best = int(np.argmax([ratio for _, ratio in found]))
+        lines[f"{name}_{bases[best]:.0f}_hz"] = found[best][0]
+        record = _with(record, _line(record, f"{name}_{bases[best]:.0f}", found[best][0]))
+    return record, lines
+
+
+Named = tuple[tuple[str, ...], list[Array]]
+
+
+def _with(record: Record, named: Named) -> Record:
+    return record.with_channels(named[0], tuple(np.ascontiguousarray(c) for c in named[1]))
+
+
+def _phase_patterns(record: Record) -> Named:
+    """Phase resistances of a second-harmonic tensor, constant: cos and sin of twice the phase angle."""
+    double = 2.0 * np.arctan2(TO_PHASES[:, 1], TO_PHASES[:, 0])
+    row = np.concatenate([np.cos(double), np.sin(double)])
+    names = tuple(f"phase_{n}_{p}" for n in ("cos", "sin") for p in "uvw")
+    return names, [np.tile(row, (s.count, 1)) for s in record.segments]
+
+
+def _three_phases(segment: Segment) -> Array:
+    currents = np.where(segment.is_good, segment.currents_a, 0.0)
+    if currents.shape[0] == 3:
+        return currents
+    return np.vstack([currents, -currents.sum(axis=0)])
+
+
+def _heat(record: Record, rotor: Sequence[Array]) -> Named:
+    """Doses in minutes at rated current: own phase, mean of phases, own phase with a leak, rotor. Carried over segments."""
+    period, rated = record.facts.sample_period_s, record.facts.rated_current_peak_a / np.sqrt(2.0)
+    own, leaky, cage = np.zeros(3), np.zeros(3), 0.0
+    last_time, last_file = None, -1
+    decay = float(np.exp(-period / HEAT_LEAK_S))
+    out = []
+    for segment, rotor_current in zip(record.segments, rotor, strict=True):
+        if segment.file != last_file:
+            own, leaky, cage, last_time = np.zeros(3), np.zeros(3), 0.0, None
+        if last_time is not None:
+            leaky = leaky * np.exp(-max(segment.time_s[0] - last_time, 0.0) / HEAT_LEAK_S)
+        rate = _three_phases(segment) ** 2 / rated**2 * period / 60.0
+        rotor_rate = (rotor_current**2).sum(axis=0) / (2.0 * rated**2) * period / 60.0
+        dose = own[:, None] + np.cumsum(rate, axis=1) - rate
+        leak = np.stack([
+            lfilter([1.0], [1.0, -decay], rate[p], zi=[decay * leaky[p]])[0] - rate[p] for p in range(3)
+        ])
+        cage_dose = cage + np.cumsum(rotor_rate) - rotor_rate
+        mean = np.repeat(dose.mean(axis=0)[None], 3, axis=0)
+        out.append(np.vstack([dose, mean, leak, cage_dose[None]]).T)
+        own, leaky, cage = dose[:, -1], leak[:, -1], float(cage_dose[-1])
+        last_time, last_file = float(segment.time_s[-1]), segment.file
+    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky") for p in "uvw")
+    return (*names, "rotor_heat"), out
+
+
+def _sag(record: Record) -> Named:
+    """Minus lagged electrical power over rated power."""
+    period, out = record.facts.sample_period_s, []
+    for segment in record.segments:
+        power = 1.5 * segment.voltage_axis_v * segment.axis_current_a / record.facts.rated_power_w
+        columns = []
+        for lag in SAG_LAGS_S:
+            a = 1.0 - float(np.exp(-period / lag))
+            columns.append(-lfilter([a], [1.0, a - 1.0], power))
+        out.append(np.stack(columns, axis=1))
+    return tuple(f"sag_{lag * 1e3:.0f}ms" for lag in SAG_LAGS_S), out
+
+
+def _hats(record: Record) -> Named:
+    out = []
+    for segment in record.segments:
+        at = np.linspace(0.0, HATS - 1.0, segment.count)
+        out.append(np.stack([np.clip(1.0 - np.abs(at - k), 0.0, None) for k in range(HATS)], axis=1))
+    return tuple(f"hat_{k}" for k in range(HATS)), out
+
+
+def _mains_drive(record: Record, residuals: Sequence[Array], model: Model) -> list[Array]:
+    return [np.asarray(r) for r in residuals]
+
+
+def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model) -> list[Array]:
+    """Residual turned into a voltage by the nominal impedance, times the command: a ripple line stands out at its f."""
+    r_s, r_r, l_sigma, l_m = model.nominal
+    out = []
+    for segment, residual in zip(record.segments, residuals, strict=True):
+        n = segment.count
+        angle = np.deg2rad(segment.axis_deg)
+        weights = TO_PHASES[: residual.shape[0]] @ np.array([np.cos(angle), np.sin(angle)])
+        along = weights @ residual / float(weights @ weights)
+        s = 2j * np.pi * np.fft.rfftfreq(n, record.facts.sample_period_s)
+        impedance = r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m)
+        impedance[s.imag > 2.0 * np.pi * 800.0] = 0.0
+        voltage = np.fft.irfft(np.fft.rfft(along) * impedance, n)
+        out.append((voltage * segment.voltage_axis_v)[None])
+    return out
+
+
+def _refine(record: Record, signals: Sequence[Array], base: float) -> tuple[float, float]:
+    """The frequency near `base` where the signals are strongest, and its power over the median nearby."""
+    period = record.facts.sample_period_s
+    span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
+    grid = base * np.linspace(1 - SEARCH, 1 + SEARCH, 2 * int(4 * SEARCH * base * span) + 3)
+    powers = np.zeros(grid.shape[0])
+    for signal in signals:
+        window = np.hanning(signal.shape[1])
+        powers += sum(np.abs(_zoom(row * window, grid, period)) ** 2 for row in signal)
+    best = int(np.argmax(powers))
+    return float(grid[best]), float(powers[best] / max(float(np.median(powers)), 1e-300))
+
+
+def _zoom(signal: Array, frequency: Array, period: float) -> Array:
+    """Fourier sums at a few frequencies after block averaging around the centre frequency."""
+    centre = float(np.mean(frequency))
+    n = signal.shape[0]
+    block = max(1, int(0.02 / period))
+    base = signal * np.exp(-2j * np.pi * centre * np.arange(n) * period)
+    m = n // block
+    slow = base[: m * block].reshape(m, block).sum(axis=1)
+    at = (np.arange(m) * block + 0.5 * (block - 1)) * period
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency - centre, at)) @ slow)
+
+
+def _line(record: Record, name: str, frequency: float) -> Named:
+    """Cosine and sine of the time within the segment: phases need not carry over pauses."""
+    out = []
+    for segment in record.segments:
+        angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
+        out.append(np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return (f"{name}_cos", f"{name}_sin"), out

@@ -1,0 +1,86 @@
+"""What every entry of the catalogue states: its numbers, how they read, its sign, and what it is mistaken for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.plant import Layout, Term
+from commissioner.diagnose.record import Facts, Record
+
+Array = NDArray[np.float64]
+Sizes = Mapping[str, tuple[float, str]]
+"""Engineering values by name, each with its unit; the first one decides the sign."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What an effect may look at to set up its numbers: scales, dictionaries, known functions of time."""
+
+    record: Record
+    layout: Layout
+    iron_flux_wb: float
+    sum_of_lines_hz: Mapping[str, float]
+
+    @property
+    def facts(self) -> Facts:
+        return self.record.facts
+
+    @property
+    def axes(self) -> int:
+        """Directions of the plane that were excited (0 and 180 degrees are one)."""
+        return len({round(s.axis_deg % 180.0, 3) for s in self.record.segments})
+
+    @property
+    def link_varies(self) -> bool:
+        ratios = [float(np.mean(s.link_ratio)) for s in self.record.segments]
+        return max(ratios) > 1.05 * min(ratios)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One named cause. `terms(setting)` are its numbers (empty: these data cannot show it)."""
+
+    name: str
+    title: str
+    sign: int
+    terms: Callable[[Setting], tuple[Term, ...]]
+    sizes: Callable[[Setting, Mapping[str, float]], Sizes]
+    signature: str
+    confounders: tuple[str, ...]
+    source: str
+    family: str
+    split_by: str
+
+
+def effect(
+    name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
+    split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes],
+) -> Callable[[Callable[[Setting], tuple[Term, ...]]], Effect]:
+    """Turns the function that lists an effect's terms into its catalogue entry."""
+
+    def enter(terms: Callable[[Setting], tuple[Term, ...]]) -> Effect:
+        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by)
+        object.__setattr__(entry, "__doc__", terms.__doc__)
+        return entry
+
+    return enter
+
+
+def spline_value(vectors: Array, coefficients: Array, top: float, at: float) -> float:
+    """The curve `coefficients @ vectors` of a uniform cubic B-spline on [0, top], at one point (clamped)."""
+    spline = coefficients @ vectors
+    intervals = spline.shape[0] - 3
+    y = min(max(at, 0.0), top)
+    j = min(int(y / top * intervals), intervals - 1)
+    u = y / top * intervals - j
+    weights = np.array([(1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3]) / 6.0
+    return float(weights @ spline[j : j + 4])
+
+
+def listed(values: Mapping[str, float], prefix: str, count: int) -> Array:
+    """`prefix_0 ... prefix_{count-1}` as an array, zero where absent."""
+    return np.array([values.get(f"{prefix}_{k}", 0.0) for k in range(count)])

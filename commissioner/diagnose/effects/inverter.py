@@ -1,0 +1,127 @@
+"""Causes in the power stage: legs, link and cable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from commissioner.diagnose import kernel
+from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
+from commissioner.diagnose.plant import CABLE, Term
+
+
+def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    layout = setting.layout
+    weights = listed(values, "leg", layout.legs_vectors.shape[0])
+    top = spline_value(layout.legs_vectors, weights, layout.legs_top, layout.legs_top)
+    grid = np.linspace(0.0, layout.legs_top, 200)
+    curve = np.array([spline_value(layout.legs_vectors, weights, layout.legs_top, y) for y in grid])
+    reached = np.flatnonzero(curve >= 0.5 * top) if top > 0 else np.array([0])
+    half = float(layout.legs_knee_a * np.sinh(grid[reached[0]])) if reached.size else 0.0
+    return {"voltage_v": (top, "V"), "half_current_a": (half, "A")}
+
+
+def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    sizes = dict(_leg_sizes(setting, values))
+    facts = setting.facts
+    if facts.switching_frequency_hz and facts.dc_link_v:
+        seconds = sizes["voltage_v"][0] / (facts.switching_frequency_hz * facts.dc_link_v)
+        sizes["time_us"] = (seconds * 1e6, "us")
+    return sizes
+
+
+def _legs(name: str, kind: int, setting: Setting) -> tuple[Term, ...]:
+    count = setting.layout.legs_vectors.shape[0]
+    return tuple(Term(name, f"leg_{k}", "V", kind, k, 1.0) for k in range(count))
+
+
+@effect(
+    "dead_time", "Dead time of the inverter legs", sign=1, family="odd", sizes=_dead_time_sizes,
+    signature="each leg loses a voltage with the sign of its own current, largest relative to the command at small "
+    "current; odd lines around every tone; leaks into the cross axis off the multiples of 30 degrees",
+    confounders=("device_drop", "dc_link_sag", "sensor_nonlinearity"),
+    source="J. Holtz, J. Quan, IEEE Trans. Ind. Appl. 38(4), 2002; V_dt = T_d f_sw V_dc per leg",
+    split_by="repeat one segment at half the switching frequency or another link voltage",
+)
+def dead_time(setting: Setting) -> tuple[Term, ...]:
+    """v_x = v_x* - F(|i_x|) sign(i_x), F a spline over asinh(i) that rises from 0 to V_dt [V >= 0] and stays there.
+
+    Scales with link voltage times switching frequency where these differ between segments.
+    """
+    return _legs("dead_time", kernel.LEGS_LINK, setting)
+
+
+@effect(
+    "device_drop", "Threshold voltage of the switches and diodes", sign=1, family="odd", sizes=_leg_sizes,
+    signature="as dead time, but independent of switching frequency and link voltage",
+    confounders=("dead_time", "dc_link_sag"),
+    source="A. R. Munoz, T. A. Lipo, IEEE Trans. Power Electron. 14(2), 1999; slope resistance is part of R_s",
+    split_by="repeat one segment at half the switching frequency or another link voltage",
+)
+def device_drop(setting: Setting) -> tuple[Term, ...]:
+    """v_x = v_x* - V_th(|i_x|) sign(i_x), V_th >= 0 [V]. Its own terms exist only where dead time can be told from it."""
+    return _legs("device_drop", kernel.LEGS, setting) if setting.link_varies else ()
+
+
+def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"sag_at_rated_power": (float(sum(values.values())), "1")}
+
+
+@effect(
+    "dc_link_sag", "DC link that sags under load, uncompensated", sign=1, family="odd", sizes=_sag_sizes,
+    signature="voltage error proportional to command times power: odd lines that grow with the cube of the level",
+    confounders=("dead_time", "sensor_nonlinearity", "leakage_saturation"),
+    source="v = v* (1 - k LP(p) / P_N); six-pulse rectifier regulation, e.g. N. Mohan, Power Electronics, ch. 5",
+    split_by="record the DC-link voltage, or repeat at another amplitude",
+)
+def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
+    """Relative loss of voltage at rated power, k >= 0, through first-order lags of 1, 10 and 100 ms (a dictionary)."""
+    names = [n for n in setting.record.channel_names if n.startswith("sag_")]
+    return tuple(
+        Term("dc_link_sag", n, "1", kernel.VOLTAGE_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
+    )
+
+
+def _ripple_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    sizes: dict[str, tuple[float, str]] = {}
+    for base in (100, 120, 300, 360):
+        parts = [v for k, v in values.items() if k.startswith(f"ripple_{base}_")]
+        if parts:
+            sizes[f"amplitude_{base}_hz"] = (float(np.sqrt(2.0 * np.mean(np.square(parts)))), "1")
+    return sizes
+
+
+@effect(
+    "dc_link_ripple", "Ripple of the DC link", sign=0, family="non-periodic", sizes=_ripple_sizes,
+    signature="side lines at every tone plus and minus 100, 120, 300 or 360 Hz, proportional to the tone",
+    confounders=("mains_pickup",),
+    source="v = v* (1 + a cos wt + b sin wt); rectifier ripple, N. Mohan, Power Electronics, ch. 5",
+    split_by="record the DC-link voltage",
+)
+def dc_link_ripple(setting: Setting) -> tuple[Term, ...]:
+    """Relative amplitudes a, b of the rectifier's ripple line (frequency refined on the data)."""
+    names = [n for n in setting.record.channel_names if n.startswith("ripple_")]
+    return tuple(
+        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kernel.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid)
+        for s in setting.record.segments for n in names
+    )
+
+
+def _cable_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"capacitance_nf": (values.get("capacitance", 0.0) * 1e9, "nF")}
+
+
+@effect(
+    "cable_capacitance", "Capacitance of the motor cable", sign=1, family="linear", sizes=_cable_sizes,
+    signature="a current that leads the voltage by 90 degrees, growing with frequency; no distortion",
+    confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
+    source="i_sensor = i + C dv/dt at the inverter-side sensor",
+    split_by="excite lines up to 0.4 of the sampling rate",
+)
+def cable_capacitance(setting: Setting) -> tuple[Term, ...]:
+    """C >= 0 [F] per phase to the star point, charged by the mean command's difference over one sample."""
+    return (Term("cable_capacitance", "capacitance", "F", CABLE, 0, 1e-9, 0.0, 1e-4),)
+
+
+ENTRIES: tuple[Effect, ...] = (dead_time, device_drop, dc_link_sag, dc_link_ripple, cable_capacitance)

@@ -1,0 +1,264 @@
+"""Causes in iron, rotor and winding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from commissioner.diagnose import kernel
+from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
+from commissioner.diagnose.plant import Term
+
+
+def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    layout = setting.layout
+    weights = listed(values, "curve", layout.iron_vectors.shape[0])
+    extra = spline_value(layout.iron_vectors, weights, layout.iron_top_wb, setting.iron_flux_wb)
+    return {
+        "extra_current_a": (extra * setting.iron_flux_wb, "A"),
+        "at_flux_wb": (setting.iron_flux_wb, "Wb"),
+    }
+
+
+@effect(
+    "magnetizing_saturation", "Saturation of the main flux path", sign=1, family="odd", sizes=_saturation_sizes,
+    signature="odd lines of the lowest tone, growing very fast with level; even lines with DC bias",
+    confounders=("magnetic_hysteresis", "dc_link_sag"),
+    source="i_M = psi/L_M (1 + b |psi/psi_n|^S): Qu, Ranta, Hinkkanen, Luomi, IEEE Trans. Ind. Appl. 48(3), 2012",
+    split_by="repeat the lowest tone at half and at full flux",
+)
+def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
+    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached; G >= 0 at its end.
+
+    `split` moves the saturating flux between rotor (-0.5) and stator (+0.5) side of the leakage.
+    """
+    count = setting.layout.iron_vectors.shape[0]
+    step = setting.facts.rated_current_peak_a / max(setting.iron_flux_wb, 1e-9) * 0.01
+    curve = tuple(
+        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kernel.IRON_CURVE, k, step) for k in range(count)
+    )
+    return (*curve, Term("magnetizing_saturation", "split", "1", kernel.NU, 0, 0.1, -0.5, 0.5))
+
+
+def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"coercive_current_a": (float(sum(values.values())), "A")}
+
+
+@effect(
+    "magnetic_hysteresis", "Hysteresis of the iron", sign=1, family="odd", sizes=_hysteresis_sizes,
+    signature="a loop that does not depend on rate; broad odd lines falling slowly with order",
+    confounders=("magnetizing_saturation", "dead_time", "rotor_skin_effect"),
+    source="vector stop operators (Prandtl-Ishlinskii): M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996",
+    split_by="repeat the lowest tone at several amplitudes",
+)
+def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
+    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k the stop operator of the iron flux with fixed radius r_k."""
+    radii = setting.layout.stop_radius_wb
+    return tuple(
+        Term("magnetic_hysteresis", f"loop_{k}", "A", kernel.STOP, k, 0.01, 0.0, np.inf) for k in range(radii.size)
+    )
+
+
+def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    pairs: dict[str, list[float]] = {}
+    for name, value in values.items():
+        pairs.setdefault(name.rpartition("_")[2], []).append(value)
+    largest = max((float(np.hypot(*p)) for p in pairs.values() if len(p) == 2), default=0.0)
+    return {"flux_wb": (largest, "Wb")}
+
+
+@effect(
+    "remanence", "Flux left in the iron before the test", sign=1, family="start", sizes=_remanence_sizes,
+    signature="a transient at the start of a segment that decays with the rotor time constant",
+    confounders=("sensor_offset", "magnetic_hysteresis"),
+    source="initial state of the flux equation; P. Vas, Sensorless Vector and Direct Torque Control, 1998",
+    split_by="wait longer before the segment, or start it with the opposite polarity",
+)
+def remanence(setting: Setting) -> tuple[Term, ...]:
+    """Initial flux vector (alpha, beta) [Wb] of every segment that starts at rest."""
+    step = 0.01 * max(setting.iron_flux_wb, 1e-6)
+    return tuple(
+        Term("remanence", f"{axis}_{s.uid}", "Wb", kernel.INITIAL_FLUX, c, step, segment=s.uid)
+        for s in setting.record.segments if s.starts_at_rest
+        for c, axis in enumerate(("alpha", "beta"))
+    )
+
+
+def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    layout = setting.layout
+    weights = listed(values, "curve", layout.leak_vectors.shape[0])
+    at = layout.leak_top_wb / 1.2
+    gain = spline_value(layout.leak_vectors, weights, layout.leak_top_wb, at)
+    linear = at / max(setting.facts.current_peak_a, 1e-9)
+    return {"inductance_drop": (1.0 - 1.0 / (1.0 + gain * linear) if gain * linear > -0.9 else gain * linear, "1"),
+            "at_current_a": (setting.facts.current_peak_a, "A")}
+
+
+@effect(
+    "leakage_saturation", "Leakage path that saturates with current", sign=1, family="odd", sizes=_leakage_sizes,
+    signature="odd intermodulation around the highest tones, growing with the cube of the current",
+    confounders=("sensor_nonlinearity", "dc_link_sag"),
+    source="T. A. Lipo, A. Consoli, IEEE Trans. Ind. Appl. IA-20(1), 1984; T. Tuovinen et al., IEEE ECCE 2011",
+    split_by="DC staircase with a small high tone on top",
+)
+def leakage_saturation(setting: Setting) -> tuple[Term, ...]:
+    """Extra inverse leakage S(|psi_sigma|) [1/H], a cubic spline with S(0) = 0 over the leakage flux reached."""
+    count = setting.layout.leak_vectors.shape[0]
+    step = 0.01 * setting.facts.current_peak_a / setting.layout.leak_top_wb
+    return tuple(Term("leakage_saturation", f"curve_{k}", "1/H", kernel.LEAKAGE_CURVE, k, step) for k in range(count))
+
+
+def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"branch_conductance_s": (float(sum(values.values())), "S")}
+
+
+@effect(
+    "rotor_skin_effect", "Current displacement in the rotor bars", sign=1, family="linear", sizes=_skin_sizes,
+    signature="rotor resistance rises and leakage falls between 50 and 600 Hz; excited lines only, proportional to level",
+    confounders=("iron_loss", "sampling_delay", "sensor_lag", "cable_capacitance"),
+    source="ladder network of a bar: A. Levy, H. Auinger, cited in Babb & Williams, Trans. AIEE 70, 1951",
+    split_by="tones on both sides of the corner, 20 Hz to 1 kHz",
+)
+def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
+    """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners fixed at 40, 120 and 400 Hz."""
+    return tuple(
+        Term("rotor_skin_effect", f"branch_{k}", "S", kernel.BRANCH, k, 0.01, 0.0, np.inf)
+        for k in range(setting.layout.branch_time_s.size)
+    )
+
+
+def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    g = values.get("conductance", 0.0)
+    return {"conductance_ms": (g * 1e3, "mS")}
+
+
+@effect(
+    "iron_loss", "Eddy-current loss of the iron", sign=1, family="linear", sizes=_loss_sizes,
+    signature="resistance rises with the square of frequency up to more than 1 kHz; looks like a lead",
+    confounders=("rotor_skin_effect", "sampling_delay", "cable_capacitance"),
+    source="conductance across the stator flux: E. Levi, IEEE Trans. Energy Convers. 10(2), 1995",
+    split_by="tones above 1 kHz, or a running no-load test",
+)
+def iron_loss(setting: Setting) -> tuple[Term, ...]:
+    """Conductance g >= 0 [S] fed by the stator's induced voltage."""
+    return (Term("iron_loss", "conductance", "S", kernel.IRON_LOSS, 0, 1e-4, 0.0, 0.2),)
+
+
+def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"rise_per_minute_at_rated_current": (float(sum(values.values())), "1/min")}
+
+
+@effect(
+    "stator_heating", "Stator winding that warms during the test", sign=1, family="drifting", sizes=_heating_sizes,
+    signature="skirts around the lowest tone, resistance higher in later segments, most in the phase that carried most",
+    confounders=("rotor_heating", "resistance_anisotropy", "sensor_gain_mismatch"),
+    source="adiabatic heating, IEC 60079-7 form; copper 0.393 %/K",
+    split_by="repeat the first segment last, axes in the order a-b-c-c-b-a",
+)
+def stator_heating(setting: Setting) -> tuple[Term, ...]:
+    """R_x = R_s (1 + k integral i_x^2 / I_N^2 dt): relative rise per minute at rated current, k >= 0, each phase by its
+
+    own current, by the mean of the three, and with a leak of 20 s (a dictionary).
+    """
+    names = [n for n in setting.record.channel_names if n.startswith("heat_") and n.endswith("_u")]
+    return tuple(
+        Term("stator_heating", n[5:-2], "1/min", kernel.PHASE_RESISTANCE, setting.record.channel(n), 0.01, 0.0, 5.0)
+        for n in names
+    )
+
+
+@effect(
+    "rotor_heating", "Rotor cage that warms during the test", sign=1, family="drifting", sizes=_heating_sizes,
+    signature="rotor resistance higher in later segments; only AC content heats it",
+    confounders=("stator_heating",),
+    source="as stator heating, driven by the rotor current of the nominal model",
+    split_by="a DC-bias segment between two AC segments",
+)
+def rotor_heating(setting: Setting) -> tuple[Term, ...]:
+    """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current."""
+    names = [n for n in setting.record.channel_names if n.startswith("rotor_heat")]
+    return tuple(
+        Term("rotor_heating", n, "1/min", kernel.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
+    )
+
+
+def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"speed_rad_per_s": (float(np.abs(list(values.values())).max(initial=0.0)), "rad/s")}
+
+
+@effect(
+    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes,
+    signature="current in the axis that gets no voltage, proportional to the rotor flux",
+    confounders=("sensor_offset", "inductance_anisotropy"),
+    source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
+    split_by="block the shaft",
+)
+def shaft_motion(setting: Setting) -> tuple[Term, ...]:
+    """Electrical speed [rad/s] as hat functions of time, five per segment."""
+    return tuple(
+        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kernel.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
+        for s in setting.record.segments
+        for n in setting.record.channel_names if n.startswith("hat_")
+    )
+
+
+def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    parts = {p: [values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin")] for p in ("leakage", "magnetizing")}
+    return {
+        f"{p}_anisotropy": (float(np.hypot(*pair)), "1") for p, pair in parts.items() if any(pair) or p == "leakage"
+    }
+
+
+@effect(
+    "inductance_anisotropy", "Inductance that depends on the axis", sign=0, family="axis", sizes=_anisotropy_sizes,
+    signature="leakage differs with the axis angle (period 180 degrees) and couples the axes; no distortion",
+    confounders=("sensor_gain_mismatch", "resistance_anisotropy"),
+    source="second-harmonic tensor of eccentricity and slotting: M. Linke, R. Kennel, J. Holtz, IEEE IECON 2003",
+    split_by="three or more axes",
+)
+def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
+    """1/L_sigma times (1 + [c s; s -c]), and the same for 1/L_M; needs at least two axes."""
+    if setting.axes < 2:
+        return ()
+    kinds = (("leakage", kernel.LEAKAGE_ANISOTROPY), ("magnetizing", kernel.MAGNETIZING_ANISOTROPY))
+    return tuple(
+        Term("inductance_anisotropy", f"{part}_{name}", "1", kind, c, 0.01, -0.5, 0.5)
+        for part, kind in kinds for c, name in enumerate(("cos", "sin"))
+    )
+
+
+def _resistance_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {
+        f"{p}_anisotropy": (float(np.hypot(values.get(f"{p}_cos", 0.0), values.get(f"{p}_sin", 0.0))), "1")
+        for p in ("stator", "rotor") if f"{p}_cos" in values
+    }
+
+
+@effect(
+    "resistance_anisotropy", "Resistance that depends on the axis", sign=0, family="axis", sizes=_resistance_sizes,
+    signature="resistance differs between phases (joint, winding) or rotor directions (broken bar); excited lines only",
+    confounders=("sensor_gain_mismatch", "stator_heating", "inductance_anisotropy"),
+    source="R_x = R_s (1 + c cos 2 theta_x + s sin 2 theta_x); rotor: same tensor on R_R",
+    split_by="three or more axes, first axis repeated",
+)
+def resistance_anisotropy(setting: Setting) -> tuple[Term, ...]:
+    """Relative second-harmonic tensors of R_s (phase resistances) and R_R; needs at least two axes."""
+    if setting.axes < 2:
+        return ()
+    channel = setting.record.channel
+    stator = tuple(
+        Term("resistance_anisotropy", f"stator_{n}", "1", kernel.PHASE_RESISTANCE, channel(f"phase_{n}_u"), 0.01, -0.5, 0.5)
+        for n in ("cos", "sin")
+    )
+    rotor = tuple(
+        Term("resistance_anisotropy", f"rotor_{n}", "1", kernel.ROTOR_ANISOTROPY, c, 0.01, -0.5, 0.5)
+        for c, n in enumerate(("cos", "sin"))
+    )
+    return stator + rotor
+
+
+ENTRIES: tuple[Effect, ...] = (
+    magnetizing_saturation, magnetic_hysteresis, remanence, leakage_saturation, rotor_skin_effect, iron_loss,
+    stator_heating, rotor_heating, shaft_motion, inductance_anisotropy, resistance_anisotropy,
+)

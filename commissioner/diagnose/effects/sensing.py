@@ -1,0 +1,210 @@
+"""Causes in sensors, converter and clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect
+from commissioner.diagnose.plant import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, SHIFT, TONE, Term
+
+PHASES = ("u", "v", "w")
+
+
+def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"delay_us": (values.get("delay", 0.0) * 1e6, "us")}
+
+
+@effect(
+    "sampling_delay", "Delay between command and sampled current", sign=1, family="linear", sizes=_delay_sizes,
+    signature="phase proportional to frequency at excited lines, no distortion",
+    confounders=("sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance"),
+    source="computation and PWM delay: B.-H. Bae, S.-K. Sul, IEEE Trans. Ind. Appl. 39(3), 2003",
+    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
+)
+def sampling_delay(setting: Setting) -> tuple[Term, ...]:
+    """Reported current is i(t - tau), tau >= 0 [s]."""
+    return (Term("sampling_delay", "delay", "s", DELAY, 0, 1e-6, 0.0, 0.02),)
+
+
+def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"time_constant_us": (values.get("lag", 0.0) * 1e6, "us")}
+
+
+@effect(
+    "sensor_lag", "First-order lag of the current sensors", sign=1, family="linear", sizes=_lag_sizes,
+    signature="phase and a roll-off with the square of frequency at excited lines, no distortion",
+    confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
+    source="anti-alias filter or sensor bandwidth: tau dy/dt = i - y",
+    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
+)
+def sensor_lag(setting: Setting) -> tuple[Term, ...]:
+    """Time constant tau >= 0 [s]."""
+    return (Term("sensor_lag", "lag", "s", LAG, 0, 1e-6, 0.0, 0.02),)
+
+
+
+def _offset_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {f"offset_{p}_a": (values[p], "A") for p in PHASES if p in values}
+
+
+@effect(
+    "sensor_offset", "Offset of the current sensors", sign=0, family="dc", sizes=_offset_sizes,
+    signature="a constant, also with the inverter off; the three need not add up to zero",
+    confounders=("remanence", "shaft_motion"),
+    source="data sheets of open-loop Hall sensors: 0.2 to 1 % of range",
+    split_by="record one second before the inverter is switched on",
+)
+def sensor_offset(setting: Setting) -> tuple[Term, ...]:
+    """Constant [A] per phase."""
+    return tuple(Term("sensor_offset", PHASES[k], "A", OFFSET, k, 1e-3) for k in range(setting.facts.phases))
+
+
+def _drift_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {f"drift_{p}_a_per_min": (values[p], "A/min") for p in PHASES if p in values}
+
+
+@effect(
+    "sensor_drift", "Offset of the current sensors that drifts", sign=0, family="dc", sizes=_drift_sizes,
+    signature="a slow ramp of the mean over the whole recording",
+    confounders=("sensor_offset", "remanence"),
+    source="temperature drift of Hall sensors",
+    split_by="record one second before and after the test with the inverter off",
+)
+def sensor_drift(setting: Setting) -> tuple[Term, ...]:
+    """Ramp [A/min] per phase, zero at the first sample of the recording."""
+    return tuple(Term("sensor_drift", PHASES[k], "A/min", DRIFT, k, 1e-3) for k in range(setting.facts.phases))
+
+
+def _gain_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {f"gain_{p}_over_u": (values[p], "1") for p in PHASES if p in values}
+
+
+@effect(
+    "sensor_gain_mismatch", "Current sensors of unequal gain", sign=0, family="axis", sizes=_gain_sizes,
+    signature="currents that do not add up to zero in proportion to the signal; R and L differ alike with the axis",
+    confounders=("inductance_anisotropy", "resistance_anisotropy", "stator_heating"),
+    source="gain tolerance 0.5 to 2 %; the common gain is not visible from terminals",
+    split_by="three sensors, three or more axes",
+)
+def sensor_gain_mismatch(setting: Setting) -> tuple[Term, ...]:
+    """Relative gain of v (and w) against u."""
+    if setting.facts.phases < 3 and setting.axes < 2:
+        return ()
+    return tuple(
+        Term("sensor_gain_mismatch", PHASES[k], "1", GAIN, k, 1e-3, -0.5, 0.5) for k in range(1, setting.facts.phases)
+    )
+
+
+def _nonlinearity_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    even = [v for k, v in values.items() if k.startswith("even")]
+    odd = [v for k, v in values.items() if k.startswith("odd")]
+    return {
+        "even_at_full_scale": (float(np.mean(even)) if even else 0.0, "1"),
+        "odd_at_full_scale": (float(np.mean(odd)) if odd else 0.0, "1"),
+    }
+
+
+@effect(
+    "sensor_nonlinearity", "Current sensors that are not straight", sign=0, family="even", sizes=_nonlinearity_sizes,
+    signature="even or odd lines that no impedance has filtered, in each sensor by its own current",
+    confounders=("leakage_saturation", "dc_link_sag"),
+    source="reported = i (1 + n2 i/I_fs + n3 (i/I_fs)^2), I_fs twice the rated peak; linearity figures of data sheets",
+    split_by="DC staircase",
+)
+def sensor_nonlinearity(setting: Setting) -> tuple[Term, ...]:
+    """n2 and n3 of each sensor, relative to full scale."""
+    return tuple(
+        Term("sensor_nonlinearity", f"{part}_{PHASES[k]}", "1", kind, k, 1e-3)
+        for part, kind in (("even", EVEN), ("odd", ODD)) for k in range(setting.facts.phases)
+    )
+
+
+def _none(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {}
+
+
+@effect(
+    "quantization", "Coarse steps of the converter", sign=1, family="noise", sizes=_none,
+    signature="currents lie on a grid; flat noise of step / sqrt(12), independent of level",
+    confounders=(), source="B. Widrow, I. Kollar, Quantization Noise, 2008", split_by="look at the histogram",
+)
+def quantization(setting: Setting) -> tuple[Term, ...]:
+    """Found in the audit (step [A]), not by a fit: it has no waveform of its own."""
+    return ()
+
+
+@effect(
+    "clipping", "Current channel at its limit", sign=1, family="odd", sizes=_none,
+    signature="samples pile up at one value; they are masked",
+    confounders=(), source="saturated converter or amplifier", split_by="reduce the level",
+)
+def clipping(setting: Setting) -> tuple[Term, ...]:
+    """Found in the audit (limit [A]); the samples at the limit are left out of every fit."""
+    return ()
+
+
+def _mains_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    out: dict[str, tuple[float, str]] = {}
+    for base in (50, 60):
+        parts = np.array([v for k, v in values.items() if k.startswith(f"mains_{base}_")])
+        if parts.size:
+            out[f"amplitude_{base}_hz_a"] = (float(np.sqrt(2.0 * np.mean(parts**2))), "A")
+    return out
+
+
+@effect(
+    "mains_pickup", "Mains hum in the current channels", sign=0, family="non-periodic", sizes=_mains_sizes,
+    signature="a line at 50 or 60 Hz that does not depend on the excitation",
+    confounders=("dc_link_ripple",), source="a cos wt + b sin wt per channel, frequency refined on the data",
+    split_by="record one second with the inverter off",
+)
+def mains_pickup(setting: Setting) -> tuple[Term, ...]:
+    """Cosine and sine amplitude [A] per channel at the refined mains frequency."""
+    record = setting.record
+    names = [n for n in record.channel_names if n.startswith("mains_")]
+    return tuple(
+        Term("mains_pickup", f"{n}_{PHASES[k]}_{s.uid}", "A", TONE, 3 * record.channel(n) + k, 1e-3, segment=s.uid)
+        for s in record.segments for n in names for k in range(record.facts.phases)
+    )
+
+
+def _clock_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {"drift_ppm": (values.get("drift", 0.0), "ppm")}
+
+
+@effect(
+    "clock_drift", "Current and voltage clocks that run apart", sign=0, family="drifting", sizes=_clock_sizes,
+    signature="a delay that grows with time within the segment",
+    confounders=("stator_heating", "lost_samples"), source="i(t - eps t), eps in ppm; crystal tolerance",
+    split_by="a longer segment",
+)
+def clock_drift(setting: Setting) -> tuple[Term, ...]:
+    """eps [ppm], from the start of each segment."""
+    return (Term("clock_drift", "drift", "ppm", CLOCK, 0, 0.01, -2e4, 2e4),)
+
+
+def _lost_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    return {f"samples_{k}": (v, "1") for k, (_, v) in enumerate(values.items())}
+
+
+@effect(
+    "lost_samples", "Samples lost without a gap in the time stamps", sign=0, family="drifting", sizes=_lost_sizes,
+    signature="the delay jumps by whole samples at one instant",
+    confounders=("clock_drift",), source="i(t + n T) after t_0; found by a scan over t_0",
+    split_by="number the samples in the logger",
+)
+def lost_samples(setting: Setting) -> tuple[Term, ...]:
+    """Number of samples missing from the current channels at each instant the scan found."""
+    shifts = setting.layout.shift_times_s
+    return tuple(
+        Term("lost_samples", f"at_{number}_{at:.4f}", "1", SHIFT, k, 0.1, -50.0, 50.0)
+        for k, (number, at) in enumerate(shifts)
+    )
+
+
+ENTRIES: tuple[Effect, ...] = (
+    sampling_delay, sensor_lag, sensor_offset, sensor_drift, sensor_gain_mismatch, sensor_nonlinearity,
+    quantization, clipping, mains_pickup, clock_drift, lost_samples,
+)

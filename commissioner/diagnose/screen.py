@@ -1,0 +1,137 @@
+"""Score screening: what each absent effect would gain, the nominal and accepted directions projected out.
+
+Lagrange-multiplier test in the local approach (A. Benveniste, M. Basseville, G. Moustakides, IEEE TAC 32(7), 1987)
+with the nuisance directions rejected (M. Basseville, I. Nikiforov, INRIA RR-4438, 2002), bounded by physical signs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.fit import Normal, bounded_step, normal_equations
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import Layout, Model, Term
+from commissioner.diagnose.record import Record
+
+Array = NDArray[np.float64]
+STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER = 40.0, 10.0
+VISIBLE = 1e-7
+"""Share of a direction's power that must be left after projection for it to count as visible."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Gain `delta_chi2` an effect promises to first order, its `step` in theta units, and its direction (unit norm
+
+    in the projected whitened space) for cosines. `limit` is the size of the first quantity that would just be found.
+    """
+
+    name: str
+    delta_chi2: float
+    numbers: int
+    step: Array
+    terms: tuple[Term, ...]
+
+    @property
+    def threshold(self) -> float:
+        return STATISTICAL_FLOOR + STATISTICAL_PER_NUMBER * self.numbers
+
+    @property
+    def net(self) -> float:
+        return self.delta_chi2 - STATISTICAL_PER_NUMBER * self.numbers
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Scores by name, and the projected Gram matrix of every candidate number for cosines."""
+
+    scores: Mapping[str, Score]
+    projected: Array
+    slope: Array
+    columns: Mapping[str, tuple[int, ...]]
+    normal: Normal
+
+    def ranked(self) -> list[Score]:
+        return sorted(self.scores.values(), key=lambda s: -s.net)
+
+    def cosine(self, a: str, b: str) -> float:
+        """Largest cosine between a direction of `a` and the promised direction of `b` (first canonical one)."""
+        ia, ib = list(self.columns[a]), list(self.columns[b])
+        db = self.scores[b].step
+        power_b = float(db @ self.projected[np.ix_(ib, ib)] @ db)
+        if power_b <= 0:
+            return 0.0
+        cross = self.projected[np.ix_(ia, ib)] @ db
+        explained = float(cross @ np.linalg.pinv(self.projected[np.ix_(ia, ia)], rcond=1e-9, hermitian=True) @ cross)
+        return float(np.sqrt(min(max(explained / power_b, 0.0), 1.0)))
+
+
+def screen(
+    model: Model, record: Record, layout: Layout, noise: Noise, setting: Setting, absent: Sequence[str]
+) -> Screening:
+    """Scores of the effects in `absent` at `model`, one pass over the data."""
+    candidates = {name: CATALOGUE[name].terms(setting) for name in absent}
+    candidates = {name: terms for name, terms in candidates.items() if terms}
+    wanted = [*model.terms, *(t for terms in candidates.values() for t in terms)]
+    normal = normal_equations(model, record, layout, wanted, noise, _block(record))
+    return score(model, normal, candidates, setting)
+
+
+def _block(record: Record) -> int:
+    """Samples averaged in a screening: four blocks per period of the highest strong line of the command."""
+    segment = max(record.segments, key=lambda s: float(np.std(s.voltage_axis_v)))
+    spectrum = np.abs(np.fft.rfft(segment.voltage_axis_v - segment.voltage_axis_v.mean()))
+    frequency = np.fft.rfftfreq(segment.count, record.facts.sample_period_s)
+    highest = float(frequency[np.flatnonzero(spectrum > 0.01 * spectrum.max())[-1]])
+    return int(np.clip(0.25 / (record.facts.sample_period_s * max(highest, 1.0)), 1, 4))
+
+
+def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...]], setting: Setting) -> Screening:
+    """Scores from normal equations whose columns are the model's numbers, then the candidates' in order."""
+    gram, slope = normal.total_gram, normal.total_slope
+    active = 4 + len(model.terms)
+    root = _inverse_root(gram[:active, :active])
+    reduced = root @ gram[:active, active:]
+    projected = gram[active:, active:] - reduced.T @ reduced
+    left = slope[active:] - reduced.T @ (root @ slope[:active])
+    power = np.diag(gram)[active:]
+    is_visible = np.diag(projected) > np.maximum(VISIBLE * power, 1e-6)
+    columns, scores, at = {}, {}, 0
+    for name, terms in candidates.items():
+        every = range(at, at + len(terms))
+        at += len(terms)
+        kept = tuple(k for k in every if is_visible[k])
+        if not kept:
+            continue
+        columns[name] = kept
+        own = [terms[k - every.start] for k in kept]
+        scores[name] = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting)
+    return Screening(scores, projected, left, columns, normal)
+
+
+def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting: Setting) -> Score:
+    lower = np.array([t.lower / t.step - t.start / t.step for t in terms])
+    upper = np.array([t.upper / t.step - t.start / t.step for t in terms])
+    step = bounded_step(gram, slope, lower, upper, 1e-9)
+    entry = CATALOGUE[name]
+    if entry.sign:
+        sizes = entry.sizes(setting, {t.symbol: float(x) * t.step for t, x in zip(terms, step, strict=True)})
+        leading = next(iter(sizes.values()))[0] if sizes else 1.0
+        if leading * entry.sign <= 0:
+            return Score(name, 0.0, len(terms), np.zeros(len(terms)), tuple(terms))
+    gain = float(2.0 * step @ slope - step @ gram @ step)
+    return Score(name, max(gain, 0.0), len(terms), step, tuple(terms))
+
+
+def _inverse_root(gram: Array) -> Array:
+    """W with W'W = pseudo-inverse of the Gram matrix."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    keep = values > 1e-11 * values[-1]
+    root: Array = (vectors[:, keep] / np.sqrt(values[keep])).T / scale
+    return root
