@@ -1,0 +1,397 @@
+"""From a standstill recording to the motor's parameters: the same code offline and for the final judgement of a live run.
+
+Per axis: staircase -> R_s and inverter error; online observer over every stretch -> start values; batch fit with the
+extensions the data ask for (delay, inverter error, saturating iron; Bayesian information criterion); observer once more
+with what the batch fit found taken off; agreement and whiteness. Then the axes are combined.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.identify.audit import Audit, Stretch, audit, nameplate_from, tones_in
+from commissioner.identify.batch import (
+    BatchFit,
+    ModelChoice,
+    Segment,
+    extended,
+    fit_segments,
+)
+from commissioner.identify.combine import AxisEstimate, Combined, combine
+from commissioner.identify.compensation import NOTHING, Compensation
+from commissioner.identify.observer import BlockEstimate, ParallelObserver
+from commissioner.identify.resistance import DcLevel, InverterError, Staircase, fit_staircase
+from commissioner.identify.whiteness import Whiteness, whiteness
+from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
+from commissioner.motor.nameplate import Nameplate, ParameterBox, RatedFlux, prior, rated_flux
+from commissioner.motor.standstill import admittance_s
+from commissioner.records import Signal, StandstillRecording
+
+Estimator = Literal["pao", "lyapunov", "nls"]
+Matrix = NDArray[np.float64]
+WORST_RELATIVE_STD = 0.25
+EXTRA_POWERS = 4
+KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.4)
+"""Knots of the leg error, in fractions of the largest current; beyond the last it is constant."""
+COPPER_ZERO_DEGC = -234.5
+
+
+@dataclass(frozen=True)
+class AxisResult:
+    """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard errors."""
+
+    axis_deg: float
+    parameters: InverseGamma
+    covariance: Matrix
+    batch: BatchFit
+    observer_parameters: InverseGamma
+    disagreement_sigmas: float
+    whiteness: Whiteness
+    residual_rms_a: float
+    peak_rotor_flux_wb: float
+    peak_stator_flux_wb: float
+    staircase: Staircase | None
+    energised_s: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The whole answer. Parameters hold for the peak stator flux `holds_for_flux_wb` (secant values of saturating iron)."""
+
+    estimator: Estimator
+    parameters: InverseGamma
+    covariance: Matrix
+    holds_for_flux_wb: float
+    t_model: TModel
+    axes: tuple[AxisResult, ...]
+    combined: Combined
+    rated_flux: RatedFlux
+    inverter: InverterError | None
+    delay_s: tuple[float, float]
+    magnetizing_curve: tuple[tuple[float, float, float], ...]
+    gaps: int
+    lost_samples: int
+    duration_s: float
+    stator_resistance_20degc_ohm: tuple[float, float] | None
+    remarks: tuple[str, ...]
+
+    @property
+    def std(self) -> tuple[float, float, float, float]:
+        a, b, c, d = np.sqrt(np.diag(self.covariance))
+        return float(a), float(b), float(c), float(d)
+
+    def as_json(self) -> dict[str, object]:
+        """The document of the contract (`run` / `identify`), ready for `json.dumps`."""
+        from commissioner.identify.document import document  # noqa: PLC0415  document reads this class
+
+        return document(self)
+
+
+def identify(
+    recording: StandstillRecording,
+    nameplate: Nameplate | None = None,
+    estimator: Estimator = "pao",
+    inverter: InverterError | None = None,
+    start: InverseGamma | None = None,
+    winding_temperature_degc: float | None = None,
+    assumption: str = EQUAL_LEAKAGE,
+) -> Identification:
+    """Everything a standstill recording says about the motor.
+
+    `nameplate` defaults to the recording's metadata. `inverter` (from an earlier staircase) and `start` only give the
+    search a start. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
+    """
+    if estimator not in ("pao", "lyapunov", "nls"):
+        raise UsageError(
+            f"there is no estimator {estimator!r}", step="choose estimator", value=estimator, limit="pao, lyapunov or nls",
+            remedy="give one of these names",
+        )
+    plate = nameplate or nameplate_from(recording.metadata)
+    examined = audit(recording)
+    _require_tones(examined, recording.sample_period_s)
+    tests = _by_test(examined)
+    results: list[AxisResult] = []
+    guess, leg = start, inverter
+    for stretches in tests:
+        result = _identify_axis(stretches, plate, recording.sample_period_s, estimator, guess, leg)
+        guess, leg = result.batch.gamma.as_inverse_gamma(), result.batch.inverter() or leg
+        results.append(result)
+    return _summary(results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption)
+
+
+def _temperature(recording: StandstillRecording) -> float | None:
+    value = recording.metadata.get("winding_temperature_degc")
+    return float(value) if isinstance(value, float | int) else None
+
+
+def _by_test(examined: Audit) -> list[list[Stretch]]:
+    """Stretches of one orientation in a row belong to one test; a return to it later is a test of its own."""
+    tests: list[list[Stretch]] = []
+    for stretch in examined.stretches:
+        if not stretch.is_excited:
+            continue
+        if tests and math.isclose(tests[-1][-1].axis_deg, stretch.axis_deg):
+            tests[-1].append(stretch)
+        else:
+            tests.append([stretch])
+    return tests
+
+
+# -- one axis -----------------------------------------------------------------------------------------------------
+
+
+def _identify_axis(
+    stretches: Sequence[Stretch], plate: Nameplate, period_s: float, estimator: Estimator, guess: InverseGamma | None,
+    leg: InverterError | None,
+) -> AxisResult:
+    box = prior(plate)
+    stairs = _staircase(stretches)
+    first_leg = leg or (stairs.inverter if stairs else None)
+    axis_deg = stretches[0].axis_deg
+    span = 1.5 * max(float(np.max(np.abs(s.current_a))) for s in stretches)
+    first = _first_estimate(stretches, plate, box, period_s, guess, first_leg, span)
+    segments = [Segment(s.voltage_v, s.current_a, s.axis_deg, s.starts_at_rest, s.kind) for s in stretches]
+    batch = _select(segments, period_s, first, first_leg, stairs is not None)
+    _require_conditioned(batch)
+    compensation = batch.compensation(axis_deg, span)
+    law: Literal["fast", "lyapunov"] = "lyapunov" if estimator == "lyapunov" else "fast"
+    blocks, observer = _observe(stretches, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
+    seen = blocks.parameters
+    flux = batch.peak_flux_wb
+    at_flux, covariance = batch.inverse_gamma_at(flux)
+    linear = batch.inverse_gamma_at(0.0)[0]
+    pao = _carry_over(seen, linear, at_flux)
+    chosen = at_flux if estimator == "nls" else pao
+    difference = np.array(pao.as_tuple()) - np.array(at_flux.as_tuple())
+    return AxisResult(
+        axis_deg=axis_deg, parameters=chosen, covariance=covariance, batch=batch, observer_parameters=pao,
+        disagreement_sigmas=float(np.max(np.abs(difference) / np.sqrt(np.diag(covariance)))),
+        whiteness=batch.whiteness() if estimator == "nls" else whiteness(observer.residuals),
+        residual_rms_a=batch.noise_a if estimator == "nls" else observer.residual_rms_a,
+        peak_rotor_flux_wb=observer.peak_rotor_flux_wb, peak_stator_flux_wb=flux, staircase=stairs,
+        energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
+    )
+
+
+@dataclass(frozen=True)
+class _Observed:
+    residuals: tuple[Signal, ...]
+    residual_rms_a: float
+    peak_rotor_flux_wb: float
+
+
+def _observe(
+    stretches: Sequence[Stretch], plate: Nameplate, box: ParameterBox, period_s: float, compensation: Compensation,
+    law: Literal["fast", "lyapunov"], start: InverseGamma | None,
+) -> tuple[BlockEstimate, _Observed]:
+    """The online observer over all stretches in turn; segments are holes of unknown length to it."""
+    observer = ParallelObserver(
+        box, period_s, plate.rated_current_peak_a, law=law, start=start, compensation=compensation,
+        starts_at_rest=stretches[0].starts_at_rest,
+        expected_voltage_v=np.concatenate([s.voltage_v for s in stretches]) if law == "lyapunov" else None,
+    )
+    residuals, rotor, block = [], 0.0, None
+    for k, stretch in enumerate(stretches):
+        lost = max(stretch.lost_before, 1) if k else 0
+        block = observer.advance(stretch.voltage_v, stretch.current_a, lost)
+        residuals.append(stretch.current_a - block.current_a)
+        rotor = max(rotor, float(np.max(np.abs(block.rotor_flux_wb))))
+    assert block is not None
+    observer.lost_samples = sum(s.lost_before for s in stretches)
+    rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
+    return block, _Observed(tuple(residuals), rms, rotor)
+
+
+def _first_estimate(
+    stretches: Sequence[Stretch], plate: Nameplate, box: ParameterBox, period_s: float, guess: InverseGamma | None,
+    leg: InverterError | None, span_a: float,
+) -> InverseGamma:
+    compensation = NOTHING
+    if leg is not None:
+        grid = np.linspace(0.0, span_a, 1025)
+        compensation = Compensation(leg.on_axis(grid, stretches[0].axis_deg), span_a)
+    block, _ = _observe(stretches, plate, box, period_s, compensation, "fast", guess)
+    return block.parameters
+
+
+def _select(
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None, has_stairs: bool
+) -> BatchFit:
+    """Linear machine first, then what the criterion asks for, richest last: delay, inverter error, saturation."""
+    largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
+    flux_scale = max(_flux_range(s, start.stator_resistance_ohm, period_s) for s in segments)
+    knots = tuple(f * largest for f in KNOT_FRACTIONS)
+    best = fit_segments(segments, period_s, start, ModelChoice())
+    candidates = [
+        ModelChoice(0, flux_scale, knots, False), ModelChoice(EXTRA_POWERS, flux_scale, knots, False),
+        ModelChoice(EXTRA_POWERS, flux_scale, (), False), ModelChoice(0, flux_scale, (), True),
+        ModelChoice(0, flux_scale, knots, True), ModelChoice(EXTRA_POWERS, flux_scale, (), True),
+        ModelChoice(EXTRA_POWERS, flux_scale, knots, True),
+    ]
+    for model in candidates:
+        theta = extended(best, model, None if best.model.knots_a else leg)
+        trial = fit_segments(segments, period_s, start, model, theta)
+        if trial.criterion() < best.criterion() - 10.0 and np.all(trial.theta[:4] > 0):
+            best = trial
+    return best
+
+
+def _flux_range(segment: Segment, resistance_ohm: float, period_s: float) -> float:
+    """A scale for the flux: the largest detrended integral of u - R i."""
+    emf = segment.voltage_v - resistance_ohm * segment.current_a
+    integral = np.cumsum(emf - np.mean(emf)) * period_s
+    return float(0.5 * (np.max(integral) - np.min(integral)))
+
+
+def _carry_over(seen: InverseGamma, linear: InverseGamma, at_flux: InverseGamma) -> InverseGamma:
+    """The observer's unsaturated machine taken to the flux level along the batch fit's iron: parameter by parameter."""
+    ratios = zip(seen.as_tuple(), linear.as_tuple(), at_flux.as_tuple(), strict=True)
+    return InverseGamma(*(s * a / b for s, b, a in ratios))
+
+
+def _staircase(stretches: Sequence[Stretch]) -> Staircase | None:
+    """Fit the DC levels of this test's staircase stretches, or None where there are none to fit."""
+    levels = [level for s in stretches if s.kind == "staircase" for level in dc_levels(s.voltage_v, s.current_a)]
+    try:
+        return fit_staircase(levels, stretches[0].axis_deg) if levels else None
+    except DataRefused:
+        return None
+
+
+def dc_levels(voltage_v: Signal, current_a: Signal, tail: float = 0.4) -> list[DcLevel]:
+    """Means over the last `tail` of every stretch of constant voltage that is long enough to settle."""
+    top = float(np.max(np.abs(voltage_v)))
+    edges = np.flatnonzero(np.abs(np.diff(voltage_v)) > 1e-6 * top) + 1
+    bounds = [0, *edges.tolist(), voltage_v.size]
+    longest = max(b - a for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+    levels = []
+    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+        if b - a < max(0.3 * longest, 20) or abs(voltage_v[a]) < 1e-6 * top:
+            continue
+        part = current_a[b - int(tail * (b - a)) : b]
+        levels.append(DcLevel(float(voltage_v[a]), float(np.mean(part)), float(np.std(part) / math.sqrt(part.size))))
+    return levels
+
+
+# -- can it be answered? ------------------------------------------------------------------------------------------
+
+
+def _require_tones(examined: Audit, period_s: float) -> None:
+    """One tone fixes two numbers, not four: say which."""
+    if any(s.kind == "staircase" for s in examined.stretches if s.is_excited):
+        return
+    lines = [tones_in(s.voltage_v, period_s) for s in examined.stretches if s.is_excited]
+    distinct = sorted({round(f, 2) for stretch in lines for f in stretch})
+    groups = [f for k, f in enumerate(distinct) if k == 0 or f > 1.2 * distinct[k - 1]]
+    if len(groups) > 1 or not groups:
+        return
+    stretch = max((s for s in examined.stretches if s.is_excited), key=lambda s: s.voltage_v.size)
+    frequency = groups[0]
+    time = np.arange(stretch.voltage_v.size) * period_s
+    carrier = np.exp(-2j * np.pi * frequency * time) * np.hanning(time.size)
+    impedance = complex(np.sum(stretch.voltage_v * carrier) / np.sum(stretch.current_a * carrier))
+    raise DataRefused(
+        "one tone cannot fix four parameters", step="check the excitation", value=f"one tone of {frequency:.4g} Hz",
+        limit="two tones at least, four for a check of the model",
+        remedy=(
+            f"only this combination can be had: R_s + R_R w^2 L_M^2/(R_R^2 + w^2 L_M^2) = {impedance.real:.5g} ohm and "
+            f"L_sigma + L_M R_R^2/(R_R^2 + w^2 L_M^2) = {impedance.imag / (2 * math.pi * frequency):.5g} H at "
+            f"w = 2 pi {frequency:.4g} 1/s; excite several tones from below 1 Hz to above 20 Hz"
+        ),
+    )
+
+
+def _require_conditioned(batch: BatchFit) -> None:
+    machine, covariance = batch.inverse_gamma_at(0.0)
+    relative = np.sqrt(np.diag(covariance)) / np.array(machine.as_tuple())
+    if not np.all(np.isfinite(relative)) or np.max(relative) > WORST_RELATIVE_STD:
+        names = ("R_s", "R_R", "L_sigma", "L_M")
+        worst = int(np.argmax(np.where(np.isfinite(relative), relative, np.inf)))
+        impedance = 1.0 / admittance_s(machine, np.array([1.0, 10.0]))
+        raise DataRefused(
+            f"the excitation does not fix {names[worst]}", step="identify",
+            value=f"relative standard error {relative[worst]:.0%}", limit=f"{WORST_RELATIVE_STD:.0%}",
+            remedy="excite more tones between the machine's poles, or record longer; the fit's impedance at 1 Hz is "
+            f"{impedance[0]:.4g} ohm, at 10 Hz {impedance[1]:.4g} ohm",
+        )
+
+
+# -- all axes -----------------------------------------------------------------------------------------------------
+
+
+def _summary(
+    results: Sequence[AxisResult], examined: Audit, plate: Nameplate, estimator: Estimator, temperature: float | None,
+    assumption: str,
+) -> Identification:
+    rated = rated_flux(plate, float(np.mean([r.parameters.stator_resistance_ohm for r in results])))
+    flux = min(rated.stator_peak_wb, min(r.peak_stator_flux_wb for r in results))
+    at_flux = [_axis_at(r, flux, estimator) for r in results]
+    combined = combine(at_flux)
+    first = min(results, key=lambda r: float(np.trace(r.covariance)))
+    curve: Sequence[tuple[float, float, float]] = ()
+    if first.batch.model.extra_powers:
+        curve = [(float(a), float(b), float(c)) for a, b, c in zip(*first.batch.magnetizing_curve(), strict=True)]
+    r_s = combined.parameters.stator_resistance_ohm
+    at_20 = None
+    if temperature is not None:
+        factor = (20.0 - COPPER_ZERO_DEGC) / (temperature - COPPER_ZERO_DEGC)
+        at_20 = (r_s * factor, math.sqrt(combined.covariance[0, 0]) * factor)
+    delay = first.batch.delay
+    return Identification(
+        estimator=estimator, parameters=combined.parameters, covariance=combined.covariance, holds_for_flux_wb=flux,
+        t_model=to_t_model(combined.parameters, combined.covariance, assumption), axes=tuple(results), combined=combined,
+        rated_flux=rated, inverter=first.batch.inverter(), delay_s=(delay.value, delay.std),
+        magnetizing_curve=tuple(curve), gaps=examined.gaps, lost_samples=examined.lost_samples,
+        duration_s=examined.duration_s, stator_resistance_20degc_ohm=at_20,
+        remarks=(*examined.remarks, *combined.remarks, *_remarks(results, rated, flux)),
+    )
+
+
+def _axis_at(result: AxisResult, flux_wb: float, estimator: Estimator) -> AxisEstimate:
+    machine, covariance = result.batch.inverse_gamma_at(flux_wb)
+    if estimator != "nls":
+        own = result.batch.inverse_gamma_at(result.peak_stator_flux_wb)[0]
+        machine = _carry_over(result.observer_parameters, own, machine)
+    return AxisEstimate(result.axis_deg, machine, covariance)
+
+
+def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) -> list[str]:
+    remarks = []
+    for result in results:
+        if result.disagreement_sigmas > 3.0:
+            remarks.append(
+                f"axis {result.axis_deg:g} deg: observer and batch fit differ by {result.disagreement_sigmas:.1f} standard "
+                "errors: the model misses something"
+            )
+        if not result.whiteness.is_white:
+            remarks.append(
+                f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.0f}, limit "
+                f"{result.whiteness.limit}); standard errors are widened for it"
+            )
+    if flux_wb < 0.7 * rated.stator_peak_wb:
+        remarks.append(
+            f"the flux reached {flux_wb:.3g} Wb of rated {rated.stator_peak_wb:.3g} Wb: L_M holds there and is not extrapolated"
+        )
+    remarks.append("gain errors of current and DC-link sensors scale all values and are not in the standard errors")
+    return remarks
+
+
+def inverter_json(inverter: InverterError | None, staircase: Staircase | None) -> Mapping[str, object]:
+    """The inverter's part of the document."""
+    if inverter is None:
+        return {"identified": False}
+    out: dict[str, object] = {
+        "identified": True, "leg_error_v": {"value": inverter.plateau_v, "std": inverter.std_v[-1] if inverter.std_v else None},
+        "knee_a": inverter.knee_a, "leg_current_a": list(inverter.current_a), "leg_voltage_v": list(inverter.voltage_v),
+    }
+    if staircase is not None:
+        r = staircase.stator_resistance
+        out["staircase_resistance_ohm"] = {"value": r.value, "std": r.std}
+    return out

@@ -1,0 +1,232 @@
+"""Several axes, one motor: mean, spread, and what the spread says.
+
+A current sensor's gain error scales every resistance and inductance seen along an axis alike, with a 2 theta pattern
+(`standstill_identification` section 3.3); an anisotropic machine changes inductances only; heating changes R_s only, in
+the order of the tests. All three are fitted together to the logarithms of the axes' parameters and named where their
+coefficients are significant.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from commissioner.motor.circuit import InverseGamma
+
+Matrix = NDArray[np.float64]
+NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+SIGNIFICANCE = 0.01
+FLOOR = 2e-4
+"""No axis result is believed better than this, relatively, when axes are compared: what models leave out varies with them."""
+
+
+@dataclass(frozen=True)
+class AxisEstimate:
+    """One orientation's result, in the order tested; `covariance` (4, 4) as `InverseGamma.as_tuple`."""
+
+    axis_deg: float
+    parameters: InverseGamma
+    covariance: Matrix
+
+
+class Cause(enum.Enum):
+    SENSOR_GAIN = "current sensors differ in gain: resistances and inductances change together with the axis"
+    ANISOTROPY = "the machine differs between axes: inductances change with the axis, resistances do not"
+    HEATING = "the stator winding changed temperature: its resistance follows the order of the tests"
+    UNEXPLAINED = "the axes differ by more than their errors, and not as sensors, anisotropy or heating would make them"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """`relative_size`: amplitude over axes (sensor gain, anisotropy) or change from first to last test (heating)."""
+
+    cause: Cause
+    relative_size: float
+    relative_std: float
+    probability_by_chance: float
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Information-weighted mean, its covariance widened by the dispersion where that is larger, relative dispersion `(4,)`."""
+
+    parameters: InverseGamma
+    covariance: Matrix
+    relative_dispersion: tuple[float, float, float, float]
+    findings: tuple[Finding, ...]
+    remarks: tuple[str, ...]
+
+
+def combine(axes: Sequence[AxisEstimate]) -> Combined:
+    """The motor's parameters from one or more axes (ValueError for none)."""
+    logs = np.array([np.log(a.parameters.as_tuple()) for a in axes])
+    covariances = [_log_covariance(a) for a in axes]
+    weights = [np.linalg.inv(c) for c in covariances]
+    bound = np.linalg.inv(np.sum(weights, axis=0))
+    mean = bound @ np.sum([w @ x for w, x in zip(weights, logs, strict=True)], axis=0)
+    spread = np.std(logs, axis=0, ddof=1) if len(axes) > 1 else np.zeros(4)
+    of_mean = spread / math.sqrt(len(axes))
+    std = np.maximum(np.sqrt(np.diag(bound)), of_mean)
+    widen = std / np.sqrt(np.diag(bound))
+    values = np.exp(mean)
+    covariance = bound * np.outer(widen, widen) * np.outer(values, values)
+    findings = _explain(axes, logs, covariances) if len(axes) >= 3 else ()
+    a, b, c, d = map(float, values)
+    s = [float(x) for x in spread]
+    return Combined(InverseGamma(a, b, c, d), covariance, (s[0], s[1], s[2], s[3]), tuple(findings), _remarks(axes))
+
+
+def _log_covariance(axis: AxisEstimate) -> Matrix:
+    values = np.array(axis.parameters.as_tuple())
+    return np.asarray(axis.covariance / np.outer(values, values) + FLOOR**2 * np.eye(4))
+
+
+def _remarks(axes: Sequence[AxisEstimate]) -> tuple[str, ...]:
+    orientations = {round(a.axis_deg % 180.0, 3) for a in axes}
+    remarks = []
+    if len(orientations) < 3:
+        remarks.append(f"{len(orientations)} orientation(s): sensor gain and anisotropy need at least three")
+    if len(orientations) == len(axes) and len(axes) > 1:
+        remarks.append("no orientation was repeated: heating cannot be told from differences between axes")
+    return tuple(remarks)
+
+
+_GROUPS: dict[Cause, tuple[int, ...]] = {Cause.SENSOR_GAIN: (4, 5), Cause.ANISOTROPY: (6, 7), Cause.HEATING: (8,)}
+
+
+def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix]) -> list[Finding]:
+    """Add causes one at a time, the most significant first, as long as they improve chi-square beyond chance."""
+    chosen: list[Cause] = []
+    chi_square, degrees, _, _ = _fit(axes, logs, covariances, chosen)
+    while True:
+        gains = []
+        for cause in _GROUPS:
+            if cause in chosen or (cause is Cause.HEATING and not _order_is_visible(axes)):
+                continue
+            trial, _, _, _ = _fit(axes, logs, covariances, [*chosen, cause])
+            gains.append((float(chi2.sf(max(chi_square - trial, 0.0), len(_GROUPS[cause]))), cause, trial))
+        if not gains or min(gains, key=lambda g: g[0])[0] > SIGNIFICANCE / len(_GROUPS):
+            break
+        _, cause, chi_square = min(gains, key=lambda g: g[0])
+        chosen.append(cause)
+    chi_square, degrees, solution, covariance = _fit(axes, logs, covariances, chosen)
+    findings = [_finding(c, axes, logs, covariances, chosen, solution, covariance) for c in chosen]
+    chance = float(chi2.sf(chi_square, degrees)) if degrees > 0 else 1.0
+    if chance < SIGNIFICANCE / 10.0:
+        rest = math.sqrt(chi_square / degrees)
+        findings.append(Finding(Cause.UNEXPLAINED, rest * FLOOR, FLOOR, chance))
+    return findings
+
+
+def _order_is_visible(axes: Sequence[AxisEstimate]) -> bool:
+    """Heating shows in a repeated orientation, or where there are more tests than a 2 theta pattern can absorb."""
+    return len({round(a.axis_deg % 180.0, 3) for a in axes}) < len(axes) or len(axes) > 3
+
+
+def _fit(
+    axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix], causes: Sequence[Cause]
+) -> tuple[float, int, Matrix, Matrix]:
+    columns = [0, 1, 2, 3, *(k for cause in causes for k in _GROUPS[cause])]
+    normal, right, total = np.zeros((9, 9)), np.zeros(9), 0.0
+    for k, axis in enumerate(axes):
+        design = _design(axis.axis_deg, k / max(len(axes) - 1, 1))
+        weight = np.linalg.inv(covariances[k])
+        normal += design.T @ weight @ design
+        right += design.T @ weight @ logs[k]
+        total += float(logs[k] @ weight @ logs[k])
+    part = np.ix_(columns, columns)
+    covariance = np.linalg.pinv(normal[part])
+    solution = covariance @ right[columns]
+    return total - float(right[columns] @ solution), 4 * len(axes) - len(columns), solution, covariance
+
+
+def _design(axis_deg: float, order: float) -> Matrix:
+    """(4, 9): log parameters over 4 means, sensor gain cos/sin, anisotropy cos/sin, heating."""
+    angle = 2.0 * math.radians(axis_deg)
+    design = np.zeros((4, 9))
+    design[:, :4] = np.eye(4)
+    design[:, 4], design[:, 5] = math.cos(angle), math.sin(angle)
+    design[2:, 6], design[2:, 7] = math.cos(angle), math.sin(angle)
+    design[0, 8] = order
+    return design
+
+
+def _finding(
+    cause: Cause, axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix], chosen: Sequence[Cause],
+    solution: Matrix, covariance: Matrix,
+) -> Finding:
+    offset = 4 + sum(len(_GROUPS[c]) for c in chosen[: chosen.index(cause)])
+    mine = slice(offset, offset + len(_GROUPS[cause]))
+    size = float(np.linalg.norm(solution[mine]))
+    std = float(np.sqrt(np.max(np.diag(covariance)[mine])))
+    without = [c for c in chosen if c is not cause]
+    gain = _fit(axes, logs, covariances, without)[0] - _fit(axes, logs, covariances, chosen)[0]
+    signed = float(solution[mine][0]) if cause is Cause.HEATING else size
+    return Finding(cause, signed, std, float(chi2.sf(max(gain, 0.0), len(_GROUPS[cause]))))
+
+
+# -- the same motor, weeks later ----------------------------------------------------------------------------------
+
+
+class Identity(enum.Enum):
+    SAME = "the same motor: no parameter has changed beyond error and temperature"
+    CHANGED = "the same motor, changed"
+    OTHER = "another motor"
+
+
+@dataclass(frozen=True)
+class Change:
+    parameter: str
+    relative_change: float
+    sigmas: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """`changes` lists every parameter, the most significant first; `verdict` counts those beyond `limit_sigmas`."""
+
+    verdict: Identity
+    changes: tuple[Change, ...]
+    limit_sigmas: float
+    reason: str
+
+
+REPEATABILITY = (0.004, 0.006, 0.006, 0.008)
+"""What a repeated test of an unchanged motor scatters beyond its stated errors (sensor drift, rotor position)."""
+TEMPERATURE_K = 25.0
+"""One standard deviation of the unknown difference in winding temperature between two tests."""
+RESISTANCE_PER_K = 0.0039
+
+
+def compare(before: Combined, after: Combined, temperature_is_known: bool = False, limit_sigmas: float = 3.5) -> Comparison:
+    """Whether two results belong to one motor. Resistances may move together with an unknown temperature; a motor of
+    which both inductances, or three parameters, have moved by more than a tenth is another one."""
+    old, new = np.log(before.parameters.as_tuple()), np.log(after.parameters.as_tuple())
+    covariance = sum(
+        c.covariance / np.outer(c.parameters.as_tuple(), c.parameters.as_tuple()) for c in (before, after)
+    ) + np.diag(np.square(REPEATABILITY))
+    if not temperature_is_known:
+        heat = np.array([1.0, 1.0, 0.0, 0.0]) * RESISTANCE_PER_K * TEMPERATURE_K
+        covariance = covariance + np.outer(heat, heat) + np.diag([0.0, (0.3 * heat[1]) ** 2, 0.0, 0.0])
+    difference = new - old
+    sigmas = np.abs(difference) / np.sqrt(np.diag(covariance))
+    changes = tuple(
+        Change(NAMES[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas)
+    )
+    far = (np.abs(difference) > 0.1) & (sigmas > limit_sigmas)
+    if (far[2] and far[3]) or far.sum() >= 3:
+        return Comparison(Identity.OTHER, changes, limit_sigmas, _sentence(changes, limit_sigmas))
+    if np.any(sigmas > limit_sigmas):
+        return Comparison(Identity.CHANGED, changes, limit_sigmas, _sentence(changes, limit_sigmas))
+    return Comparison(Identity.SAME, changes, limit_sigmas, f"largest difference {changes[0].sigmas:.1f} sigma, {changes[0].parameter}")
+
+
+def _sentence(changes: Sequence[Change], limit: float) -> str:
+    beyond = [c for c in changes if c.sigmas > limit]
+    return ", ".join(f"{c.parameter} {c.relative_change:+.1%} ({c.sigmas:.1f} sigma)" for c in beyond)

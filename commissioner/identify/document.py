@@ -1,0 +1,91 @@
+"""An identification as the contract's JSON document."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from commissioner.identify.analysis import AxisResult, inverter_json
+from commissioner.motor.circuit import InverseGamma, Quantity
+
+if TYPE_CHECKING:
+    from commissioner.identify.analysis import Identification
+
+CONVENTION = "SI, per-phase star equivalent, rotor referred to the stator; std is one standard deviation"
+
+
+def document(result: Identification) -> dict[str, object]:
+    """`run` / `identify` of the contract, plain JSON types only."""
+    return {
+        "outcome": "identified",
+        "reason": "",
+        "convention": CONVENTION,
+        "estimator": result.estimator,
+        "parameters": parameters_json(result.parameters, np.asarray(result.covariance)),
+        "holds_for_stator_flux_wb": result.holds_for_flux_wb,
+        "t_model": {
+            **{name: quantity(getattr(result.t_model, name)) for name in _T_NAMES},
+            "assumption": result.t_model.assumption,
+        },
+        "axes": [_axis(axis) for axis in result.axes],
+        "dispersion": dict(zip(_NAMES, result.combined.relative_dispersion, strict=True)),
+        "findings": [
+            {
+                "cause": f.cause.name.lower(), "sentence": f.cause.value, "relative_size": f.relative_size,
+                "relative_std": f.relative_std, "probability_by_chance": f.probability_by_chance,
+            }
+            for f in result.combined.findings
+        ],
+        "rated_flux_wb": {"stator_rms": result.rated_flux.stator_rms_wb, "stator_peak": result.rated_flux.stator_peak_wb},
+        "inverter": dict(inverter_json(result.inverter, result.axes[0].staircase)),
+        "delay_s": {"value": result.delay_s[0], "std": result.delay_s[1]},
+        "magnetizing_curve": [
+            {"stator_flux_wb": flux, "magnetizing_inductance_h": {"value": value, "std": std}}
+            for flux, value, std in result.magnetizing_curve
+        ],
+        "stator_resistance_20degc_ohm": None
+        if result.stator_resistance_20degc_ohm is None
+        else quantity(Quantity(*result.stator_resistance_20degc_ohm)),
+        "gaps": {"count": result.gaps, "lost_samples": result.lost_samples},
+        "duration_s": result.duration_s,
+        "remarks": list(result.remarks),
+    }
+
+
+_NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+_T_NAMES = (
+    "stator_resistance_ohm", "rotor_resistance_ohm", "stator_leakage_h", "rotor_leakage_h", "magnetizing_inductance_h",
+)
+
+
+def parameters_json(machine: InverseGamma, covariance: np.ndarray) -> dict[str, object]:
+    """The contract's `parameters`: the four and the rotor time constant, each with its standard deviation."""
+    std = np.sqrt(np.diag(covariance))
+    out: dict[str, object] = {
+        name: {"value": value, "std": float(s)} for name, value, s in zip(_NAMES, machine.as_tuple(), std, strict=True)
+    }
+    tau = machine.rotor_time_constant_s
+    gradient = np.array([0.0, -tau / machine.rotor_resistance_ohm, 0.0, tau / machine.magnetizing_inductance_h])
+    out["rotor_time_constant_s"] = {"value": tau, "std": math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))}
+    return out
+
+
+def quantity(value: Quantity) -> dict[str, float]:
+    return {"value": value.value, "std": value.std}
+
+
+def _axis(axis: AxisResult) -> dict[str, object]:
+    return {
+        "axis_deg": axis.axis_deg,
+        "parameters": parameters_json(axis.parameters, np.asarray(axis.covariance)),
+        "batch_parameters": parameters_json(*axis.batch.inverse_gamma_at(axis.peak_stator_flux_wb)),
+        "disagreement_sigmas": axis.disagreement_sigmas,
+        "whiteness": {"statistic": axis.whiteness.statistic, "limit": axis.whiteness.limit, "is_white": axis.whiteness.is_white},
+        "peak_rotor_flux_wb": axis.peak_rotor_flux_wb,
+        "peak_stator_flux_wb": axis.peak_stator_flux_wb,
+        "residual_rms_a": axis.residual_rms_a,
+        "delay_s": quantity(axis.batch.delay),
+        "energised_s": axis.energised_s,
+    }
