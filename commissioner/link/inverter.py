@@ -6,7 +6,6 @@ One owner, no threads: the loop that fetches samples is the loop that feeds the 
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -14,7 +13,6 @@ from commissioner.errors import (
     CheckFailed,
     CommissionerError,
     DriveFault,
-    IdentityMismatch,
     ReplyMismatch,
     ReplyTimeout,
     RequestRefused,
@@ -23,11 +21,12 @@ from commissioner.errors import (
 from commissioner.link.facts import Action, Attempt, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
 from commissioner.link.items import Items, number
 from commissioner.link.port import Port
+from commissioner.link.reading import read_identity, read_nameplate, read_state, read_status
 from commissioner.link.write_back import WriteBack
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
 from commissioner.registers.codec import Value
 from commissioner.registers.profile import DriveProfile, WindowLayout
-from commissioner.registers.status import DriveState, decode_bits, decode_state
+from commissioner.registers.status import DriveState
 from commissioner.registers.window import (
     StreamCursor,
     StreamFormat,
@@ -44,20 +43,6 @@ STATE_DEADLINE_S = 1.0
 POLL_S = 0.002
 FETCH_ATTEMPTS = 2
 AFTER_WATCHDOG_S = 0.1
-
-IDENTITY_ITEMS = (
-    "magic", "map_version", "firmware_version", "serial_number", "drive_type", "rated_drive_current_a",
-    "control_period_s", "switching_frequency_hz",
-)
-STATUS_ITEMS = (
-    "status_word", "fault_code", "trip_cause", "trip_value", "trip_limit", "heartbeat_echo", "session_id",
-    "interlocks", "dc_link_v", "heatsink_degc", "winding_degc", "shaft_speed_rad_per_s", "current_magnitude_a",
-    "present_scale", "samples_produced", "overruns", "test_time_left_s", "present_bias_v",
-)
-NAMEPLATE_ITEMS = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
-    "pole_pairs", "pole_count",
-)
 
 
 class Inverter:
@@ -86,53 +71,15 @@ class Inverter:
     # --- who and how -------------------------------------------------------------------------------------------
     def identify(self) -> DriveIdentity:
         """Who answers. IdentityMismatch: not the drive, map or firmware of the drive file."""
-        seen = self._items.read(IDENTITY_ITEMS)
-        self._check_identity(seen)
-        return DriveIdentity(
-            drive_type=str(seen.get("drive_type", self.profile.name)),
-            serial_number=int(number(seen.get("serial_number", 0))),
-            firmware_version=_version(int(number(seen.get("firmware_version", 0)))),
-            map_version=int(number(seen.get("map_version", 0))),
-            rated_drive_current_a=number(seen.get("rated_drive_current_a", math.nan)),
-            control_period_s=number(seen.get("control_period_s", math.nan)),
-            switching_frequency_hz=number(seen.get("switching_frequency_hz", math.nan)),
-        )
+        return read_identity(self._items)
 
     def read_status(self) -> DriveStatus:
         """The drive's state now. What the drive file does not describe is NaN, 0 or empty."""
-        seen = self._items.read(STATUS_ITEMS)
-        state = self._decode_state(int(number(seen.get("status_word", 0))))
-        fault, trip = (int(number(seen.get(name, 0))) for name in ("fault_code", "trip_cause"))
-        return DriveStatus(
-            state=state.value,
-            is_energised=state.may_be_energised,
-            fault_code=fault,
-            fault_text=self.profile.fault_text(fault),
-            trip_value=_real(seen, "trip_value"),
-            trip_limit=_real(seen, "trip_limit"),
-            interlocks=decode_bits(int(number(seen.get("interlocks", 0))), self.profile.interlock_bits),
-            dc_link_v=_real(seen, "dc_link_v"),
-            heatsink_degc=_real(seen, "heatsink_degc"),
-            winding_degc=_real(seen, "winding_degc"),
-            shaft_speed_rad_per_s=_real(seen, "shaft_speed_rad_per_s"),
-            current_magnitude_a=_real(seen, "current_magnitude_a"),
-            heartbeat_echo=int(number(seen.get("heartbeat_echo", 0))),
-            session=int(number(seen.get("session_id", 0))),
-            trip_cause=trip,
-            trip_text=self.profile.fault_text(trip),
-            present_scale=_real(seen, "present_scale"),
-            present_bias_v=_real(seen, "present_bias_v"),
-            test_time_left_s=_real(seen, "test_time_left_s"),
-            samples_produced=int(number(seen.get("samples_produced", 0))),
-            overruns=int(number(seen.get("overruns", 0))),
-        )
+        return read_status(self._items)
 
     def read_nameplate(self) -> dict[str, float]:
         """The nameplate the drive holds, by the contract's keys; what its file does not describe is left out."""
-        seen = {name: number(value) for name, value in self._items.read(NAMEPLATE_ITEMS).items()}
-        if "pole_count" in seen:
-            seen["pole_pairs"] = seen.pop("pole_count") / 2
-        return seen
+        return read_nameplate(self._items)
 
     def snapshot(self) -> ParameterSnapshot:
         """The motor parameters in use and stored, with the identity of the drive that holds them."""
@@ -296,9 +243,7 @@ class Inverter:
         return self._write_back().restore(snapshot, expected_present)
 
     def _write_back(self) -> WriteBack:
-        return WriteBack(
-            self._items, self.journal, self.identify, self.read_status, sleep=self._sleep, clock=self._clock
-        )
+        return WriteBack(self._items, self.journal, sleep=self._sleep, clock=self._clock)
 
     # --- steps --------------------------------------------------------------------------------------------------
     def _prepare(self, values: Mapping[str, Value], step: str) -> None:
@@ -396,7 +341,7 @@ class Inverter:
     def _blocked_state(self, attempts: list[Attempt]) -> DriveState | None:
         """The state, where the drive's own status says that the output is blocked."""
         try:
-            state = self._decode_state(int(self._items.read_number("status_word")))
+            state = read_state(self._items)
         except CommissionerError as error:
             attempts.append(Attempt("read the status", error.what))
             return None
@@ -408,21 +353,6 @@ class Inverter:
             self.port.read_retries = self._read_retries
         described = state.value if state else "not confirmed by the drive"
         return DisarmReport(state is not None, described, tuple(attempts), waited)
-
-    def _check_identity(self, seen: Mapping[str, Value]) -> None:
-        wanted = self.profile.identity
-        exact = {"magic": wanted.magic, "map_version": wanted.map_version, "drive_type": wanted.drive_type}
-        for name, value in exact.items():
-            if value is not None and seen.get(name) != value:
-                raise _stranger(name, seen.get(name), value, self.profile)
-        firmware = int(number(seen.get("firmware_version", 0)))
-        low, high = wanted.firmware_min or 0, wanted.firmware_max
-        if firmware < low or (high is not None and firmware > high):
-            span = f"{_version(low)} ... {_version(high) if high is not None else 'any'}"
-            raise _stranger("firmware_version", _version(firmware), span, self.profile)
-
-    def _decode_state(self, word: int) -> DriveState:
-        return decode_state(self.profile.status_decoder, word, self.profile.status_bits)
 
     def _window(self) -> WindowLayout:
         self.profile.require("stream")
@@ -444,21 +374,6 @@ def _check_scale(scale: float) -> None:
         )
 
 
-def _real(seen: Mapping[str, Value], name: str) -> float:
-    return number(seen.get(name, math.nan))
-
-
-def _version(word: int) -> str:
-    """major.minor.patch, one byte each below the top byte."""
-    return f"{word >> 16 & 0xFF}.{word >> 8 & 0xFF}.{word & 0xFF}"
-
-
 def _not_ready(what: str, value: object, limit: object, remedy: str) -> CheckFailed:
     return CheckFailed(what, step="check before energising", value=value, limit=limit, remedy=remedy)
 
-
-def _stranger(name: str, seen: object, wanted: object, profile: DriveProfile) -> IdentityMismatch:
-    return IdentityMismatch(
-        f"this is not {profile.name}: {name} differs", step="identify", value=seen, limit=wanted,
-        remedy="check the URL, or name the drive file that fits this drive and firmware",
-    )

@@ -20,7 +20,8 @@ from commissioner.errors import (
 )
 from commissioner.link.facts import Action, Intent, Journal, WriteReport
 from commissioner.link.items import Items, number
-from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, WrittenParameter
+from commissioner.link.reading import read_identity, read_status
+from commissioner.records import DriveIdentity, ParameterSnapshot, WrittenParameter
 from commissioner.registers.codec import Value, crc16_modbus, encode_item
 from commissioner.registers.profile import ParameterGroup, Store
 
@@ -39,25 +40,17 @@ class WriteBack:
     """One write-back or restore on one drive."""
 
     def __init__(
-        self,
-        items: Items,
-        journal: Journal,
-        identify: Callable[[], DriveIdentity],
-        read_status: Callable[[], DriveStatus],
-        *,
-        sleep: Callable[[float], None],
-        clock: Callable[[], float],
+        self, items: Items, journal: Journal, *, sleep: Callable[[float], None], clock: Callable[[], float]
     ) -> None:
         self._items = items
         self._profile = items.profile
         self._journal = journal
-        self._identify, self._read_status = identify, read_status
         self._sleep, self._clock = sleep, clock
 
     def snapshot(self) -> ParameterSnapshot:
         """What the drive holds now. `stored` is empty where the drive cannot show its non-volatile set."""
         return ParameterSnapshot(
-            identity=self._identify(),
+            identity=read_identity(self._items),
             in_use=self._read_in_use(),
             stored=self._read_stored(),
             store_count=self._store_count(),
@@ -72,7 +65,7 @@ class WriteBack:
             self._check_endurance(present.store_count, writes=1)
         try:
             self._bring(target, store=store)
-            return self._report(target, present, is_stored=store)
+            return self._report(target, present, is_stored=store and self._can_store())
         except DriveError as error:
             raise self._after_failure(error, snapshot) from error
 
@@ -119,7 +112,7 @@ class WriteBack:
     def _check_stopped(self) -> None:
         if "status_word" not in self._profile.items:
             return
-        status = self._read_status()
+        status = read_status(self._items)
         if status.is_energised:
             raise CheckFailed(
                 "the drive's output is not blocked", step="write parameters", value=status.state,
@@ -148,9 +141,9 @@ class WriteBack:
         if has_to_store:
             self._check_endurance(self._store_count(), writes=1)
             self._bring(snapshot.stored, store=True)
-        is_direct = not self._group().is_staged
-        self._bring(snapshot.in_use, store=is_direct and self._profile.store is not None)
-        return has_to_store or is_direct
+        stores_while_writing = not self._group().is_staged and self._can_store()
+        self._bring(snapshot.in_use, store=stores_while_writing)
+        return has_to_store or stores_while_writing
 
     def _put_in_use(self, target: Values, *, store: bool) -> None:
         if self._group().is_staged:
@@ -263,10 +256,12 @@ class WriteBack:
         return self._read_set("")
 
     def _read_stored(self) -> dict[str, float]:
-        return self._read_set("stored_") if self._group().is_staged else {}
+        """Empty where the drive cannot show its non-volatile set; its items are then not in the drive file."""
+        return self._read_set("stored_")
 
     def _read_set(self, prefix: str) -> dict[str, float]:
-        names = [prefix + name for name in self._group().order]
+        order = self._profile.parameters.order if self._profile.parameters else ()
+        names = [prefix + name for name in order]
         return {name.removeprefix(prefix): number(value) for name, value in self._items.read(names).items()}
 
     def _store_count(self) -> int:
@@ -274,6 +269,10 @@ class WriteBack:
 
     def _needs_store(self, target: Values) -> bool:
         return not self._group().is_staged or bool(self._differing(target, self._read_stored()))
+
+    def _can_store(self) -> bool:
+        store = self._profile.store
+        return self._group().is_staged or (store is not None and bool(store.writes or store.coil is not None))
 
     def _differing(self, wanted: Values, held: Values) -> dict[str, float]:
         return {n: v for n, v in wanted.items() if not self._items.same_words(n, held[n], v)}

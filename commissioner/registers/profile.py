@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -102,11 +103,11 @@ class WindowLayout:
     data_registers: int
     flags: Mapping[str, int]
 
-    @property
+    @cached_property
     def header_words(self) -> int:
         return sum(WORDS_PER_ELEMENT[kind] for _, kind in self.header)
 
-    @property
+    @cached_property
     def words(self) -> int:
         return self.header_words + self.data_registers
 

@@ -1,5 +1,7 @@
 """The sample window: what to ask, and what an answer is worth. Gaps are counted and marked, never filled.
 
+The check sum runs over the header without itself and the samples the header counts, not over the unused registers.
+
 Asking again for the same index gives the same samples, so a repeated question is harmless and a late answer to an
 older one shows by its session or index.
 """
@@ -69,6 +71,7 @@ class StreamFormat:
 
     @property
     def samples_per_window(self) -> int:
+        """The most samples one fetch can bring."""
         return self.layout.data_registers // self.channels
 
 
@@ -131,16 +134,17 @@ def _decode_header(layout: WindowLayout, packed: bytes) -> dict[str, int]:
 
 def _examine(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:
     stream = cursor.stream
+    used = header["count"] * header["channel_mask"].bit_count()
+    if used > stream.layout.data_registers:
+        return WindowRefusal(Refusal.COUNT, f"{used} data registers", f"at most {stream.layout.data_registers}")
     start = 2 * stream.layout.header_words
-    check_sum = crc16_bytes(packed[: start - 2] + packed[start:])
+    check_sum = crc16_bytes(packed[: start - 2] + packed[start : start + 2 * used])
     if header["crc16"] != check_sum:
         return WindowRefusal(Refusal.CHECK_SUM, f"0x{header['crc16']:04X}", f"0x{check_sum:04X}")
     if header["session_id"] != stream.session:
         return WindowRefusal(Refusal.SESSION, header["session_id"], stream.session)
     if header["channel_mask"] != stream.channel_mask:
         return WindowRefusal(Refusal.CHANNELS, header["channel_mask"], stream.channel_mask)
-    if header["count"] > stream.samples_per_window:
-        return WindowRefusal(Refusal.COUNT, header["count"], f"at most {stream.samples_per_window}")
     if header["count"] and header["first_index"] < cursor.next_index:
         return WindowRefusal(Refusal.INDEX, header["first_index"], f"{cursor.next_index} or later")
     return None

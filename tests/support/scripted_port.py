@@ -198,7 +198,6 @@ class ScriptedDrive:
             flags |= layout["flag_ended"]
         header = struct.pack(">HIHHHh", int(self.get("session_id")), first, len(rows), mask, flags, 11200)
         data = b"".join(struct.pack(f">{channels}h", *row) for row in rows)
-        data = data.ljust(2 * layout["data_registers"], b"\0")
         checked = header + data
-        whole = header + struct.pack(">H", crc16(checked)) + data
+        whole = header + struct.pack(">H", crc16(checked)) + data.ljust(2 * layout["data_registers"], b"\0")
         return list(struct.unpack(f">{len(whole) // 2}H", whole))

@@ -26,7 +26,7 @@ def connect(device: RtuDevice, **changes) -> ModbusPort:
 
 
 class Late:
-    """Holds back the answer to the `nth` request and sends it when `after` further requests have come, before their own."""
+    """Holds back the answer to the `nth` request and sends it `after` requests later, just before theirs."""
 
     def __init__(self, nth: int, after: int = 1) -> None:
         self.nth, self.release = nth, nth + after
