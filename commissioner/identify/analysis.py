@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from commissioner.identify.batch import (
     Segment,
     extended,
     fit_segments,
+    start_theta,
 )
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.compensation import NOTHING, Compensation
@@ -38,6 +39,7 @@ Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
 WORST_RELATIVE_STD = 0.25
 EXTRA_POWERS = 4
+FINAL_REVIEWS = 2
 KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.4)
 """Knots of the leg error, in fractions of the largest current; beyond the last it is constant."""
 COPPER_ZERO_DEGC = -234.5
@@ -158,7 +160,7 @@ def _identify_axis(
     span = 1.5 * max(float(np.max(np.abs(s.current_a))) for s in stretches)
     first = _first_estimate(stretches, plate, box, period_s, guess, first_leg, span)
     segments = [Segment(s.voltage_v, s.current_a, s.axis_deg, s.starts_at_rest, s.kind) for s in stretches]
-    batch = _select(segments, period_s, first, first_leg, stairs is not None)
+    batch = _select(segments, period_s, first, first_leg)
     _require_conditioned(batch)
     compensation = batch.compensation(axis_deg, span)
     law: Literal["fast", "lyapunov"] = "lyapunov" if estimator == "lyapunov" else "fast"
@@ -199,12 +201,14 @@ def _observe(
     )
     residuals, rotor, block = [], 0.0, None
     for k, stretch in enumerate(stretches):
-        lost = max(stretch.lost_before, 1) if k else 0
-        block = observer.advance(stretch.voltage_v, stretch.current_a, lost)
+        lost = stretch.lost_before if stretch.lost_before or stretch.starts_at_rest or not k else 1
+        block = observer.advance(stretch.voltage_v, stretch.current_a, lost, begins_at_rest=stretch.starts_at_rest)
         residuals.append(stretch.current_a - block.current_a)
         rotor = max(rotor, float(np.max(np.abs(block.rotor_flux_wb))))
     assert block is not None
-    observer.lost_samples = sum(s.lost_before for s in stretches)
+    for _ in range(FINAL_REVIEWS if law == "fast" else 0):
+        observer.review()
+    block = replace(block, parameters=observer.parameters, std=observer.std())
     rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
     return block, _Observed(tuple(residuals), rms, rotor)
 
@@ -222,32 +226,36 @@ def _first_estimate(
 
 
 def _select(
-    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None, has_stairs: bool
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None
 ) -> BatchFit:
-    """Linear machine first, then what the criterion asks for, richest last: delay, inverter error, saturation."""
+    """Greedy choice by the Bayesian criterion: whichever of delay, inverter error and saturation helps most is added, then
+    the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start."""
     largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
-    flux_scale = max(_flux_range(s, start.stator_resistance_ohm, period_s) for s in segments)
     knots = tuple(f * largest for f in KNOT_FRACTIONS)
-    best = fit_segments(segments, period_s, start, ModelChoice())
-    candidates = [
-        ModelChoice(0, flux_scale, knots, False), ModelChoice(EXTRA_POWERS, flux_scale, knots, False),
-        ModelChoice(EXTRA_POWERS, flux_scale, (), False), ModelChoice(0, flux_scale, (), True),
-        ModelChoice(0, flux_scale, knots, True), ModelChoice(EXTRA_POWERS, flux_scale, (), True),
-        ModelChoice(EXTRA_POWERS, flux_scale, knots, True),
-    ]
-    for model in candidates:
-        theta = extended(best, model, None if best.model.knots_a else leg)
-        trial = fit_segments(segments, period_s, start, model, theta)
-        if trial.criterion() < best.criterion() - 10.0 and np.all(trial.theta[:4] > 0):
-            best = trial
-    return best
+    model = ModelChoice(knots_a=knots if leg else ())
+    best = fit_segments(segments, period_s, start, model, start_theta(start, model, leg))
+    model = replace(model, flux_scale_wb=best.peak_flux_wb)
+    best, tried = replace(best, model=model), {model}
+    while True:
+        m = best.model
+        toggled = (
+            replace(m, extra_powers=0 if m.extra_powers else EXTRA_POWERS), replace(m, with_delay=not m.with_delay),
+            replace(m, knots_a=() if m.knots_a and not _loses_voltage(best) else knots),
+        )
+        trials = [
+            fit_segments(segments, period_s, start, t, extended(best, t)) for t in toggled if t not in tried
+        ]
+        tried.update(toggled)
+        better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
+        if not better:
+            return best
+        best = min(better, key=lambda t: t.criterion())
 
 
-def _flux_range(segment: Segment, resistance_ohm: float, period_s: float) -> float:
-    """A scale for the flux: the largest detrended integral of u - R i."""
-    emf = segment.voltage_v - resistance_ohm * segment.current_a
-    integral = np.cumsum(emf - np.mean(emf)) * period_s
-    return float(0.5 * (np.max(integral) - np.min(integral)))
+def _loses_voltage(fit: BatchFit) -> bool:
+    """The leg error's plateau is beyond doubt, so that a fit without it need not be tried."""
+    leg = fit.inverter()
+    return leg is not None and abs(leg.plateau_v) > 10.0 * leg.std_v[-1]
 
 
 def _carry_over(seen: InverseGamma, linear: InverseGamma, at_flux: InverseGamma) -> InverseGamma:

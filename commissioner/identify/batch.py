@@ -155,18 +155,18 @@ def fit_segments(
     sample_period_s: float,
     start: InverseGamma,
     model: ModelChoice | None = None,
-    start_theta: Matrix | None = None,
+    theta_start: Matrix | None = None,
     max_iterations: int = 40,
     tolerance: float = 1e-5,
 ) -> BatchFit:
-    """Fit all segments jointly. `start_theta` (in the model's layout) overrides `start`.
+    """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`.
 
     Stops when a step is below `tolerance` standard errors of every shared parameter (or 1e-10 of its value);
     `has_converged` says whether that was reached.
     """
     choice = model or ModelChoice()
     problem = _Problem(segments, sample_period_s, choice)
-    theta = _start_theta(start, choice) if start_theta is None else start_theta.copy()
+    theta = start_theta(start, choice) if theta_start is None else theta_start.copy()
     own = np.zeros((len(segments), OWN))
     present = problem.evaluate(theta, own)
     damping, converged, iteration = 1e-4, False, 0
@@ -316,8 +316,8 @@ class _Problem:
         )
 
 
-def extended(fit: BatchFit, model: ModelChoice, leg_start: InverterError | None = None) -> Matrix:
-    """A start for a richer model from a finished fit: new coefficients zero, or the leg error given."""
+def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
+    """A start for another model from a finished fit: what both have is kept, what is new starts at zero."""
     theta = np.zeros(model.size)
     theta[:SHARED] = fit.theta[:SHARED]
     old, new = fit.model.extra_powers, model.extra_powers
@@ -325,7 +325,7 @@ def extended(fit: BatchFit, model: ModelChoice, leg_start: InverterError | None 
     ratio = model.flux_scale_wb / fit.model.flux_scale_wb
     powers = np.array([ratio ** (2 * m + 3) for m in range(common)])
     theta[SHARED : SHARED + common] = fit.theta[SHARED : SHARED + common] * powers
-    leg = leg_start or fit.inverter()
+    leg = fit.inverter()
     if leg is not None and model.knots_a:
         theta[SHARED + new :] = leg.leg_voltage_v(np.array(model.knots_a))
     return theta
@@ -348,12 +348,15 @@ def cramer_rao(machine: InverseGamma, voltage_v: Signal, sample_period_s: float,
     return np.asarray(noise_a**2 * np.linalg.inv(jacobian.T @ jacobian))
 
 
-def _start_theta(start: InverseGamma, model: ModelChoice) -> Matrix:
+def start_theta(start: InverseGamma, model: ModelChoice, leg: InverterError | None = None) -> Matrix:
+    """The model's parameter vector for a machine and, where it is modelled, a leg error."""
     gamma = Gamma.from_inverse_gamma(start)
     theta = np.zeros(model.size)
     theta[:CIRCUIT] = (
         gamma.stator_resistance_ohm, gamma.rotor_resistance_ohm, gamma.leakage_inductance_h, gamma.stator_inductance_h
     )
+    if leg is not None and model.knots_a:
+        theta[SHARED + model.extra_powers :] = leg.leg_voltage_v(np.array(model.knots_a))
     return theta
 
 

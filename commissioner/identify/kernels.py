@@ -27,13 +27,14 @@ Array = NDArray[np.float64]
 ZHAT, ZETA_U, PHI_Y, PHI_U = 0, 2, 4, 6
 FREE = 8  # dzhat / d(initial zhat), (2, 2) row-major
 NOISE, NOISE_LAG, LAST_ERROR = 12, 13, 14
-LAST_CURRENT, LAST_VOLTAGE, LAST_EXTRA = 15, 16, 17
+LAST_VOLTAGE, LAST_EXTRA = 16, 17
+LOOP = 22  # the loss fed back through the predicted current: per parameter two filter states of y, two of u, (4, 4)
 ABSORBING = 18  # 1 while the unknown initial state is still being estimated
 REJECTED, COUNT, SQUARES = 19, 20, 21
-STATE_SIZE = 22
+STATE_SIZE = 38
 
-# theta_free (initial state) first: dropping it then leaves the factor of the marginal covariance.
-FREE_PARAMETERS, PARAMETERS = 2, 6
+# Initial state first: dropping it then leaves the factor of the marginal covariance. Then the sensor's offset, then theta.
+OFFSET, THETA, PARAMETERS = 2, 3, 7
 
 FAST, LYAPUNOV, FROZEN = 0, 1, 2
 
@@ -94,6 +95,39 @@ def lookup(table: Array, span: float, x: float) -> float:
 
 
 @njit(cache=True)
+def lookup_with_slope(table: Array, span: float, x: float) -> tuple[float, float]:
+    """`lookup` and its derivative."""
+    per = (table.size - 1) / span
+    a = abs(x) * per
+    if a >= table.size - 1:
+        return (table[-1] if x >= 0.0 else -table[-1]), 0.0
+    k = int(a)
+    rise = table[k + 1] - table[k]
+    value = table[k] + (a - k) * rise
+    return (value if x >= 0.0 else -value), rise * per
+
+
+@njit(cache=True)
+def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[float, float]:
+    """(F(i), F'(i)) where i + b F(i) = known, F odd and tabulated as for `lookup`."""
+    size = abs(known)
+    last = table.size - 1
+    step = span / last
+    if b <= 0.0 or step * last + b * table[last] <= size:
+        return lookup_with_slope(table, span, known)
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if step * middle + b * table[middle] <= size:
+            low = middle
+        else:
+            high = middle
+    slope = (table[low + 1] - table[low]) / step
+    value = table[low] + slope * (size - step * low - b * table[low]) / (1.0 + b * slope)
+    return (value if known >= 0.0 else -value), slope
+
+
+@njit(cache=True)
 def advance(
     u: Array, y: Array, f: Array, period: float, law: int, noise_memory: float, dead_zone: float, noise_floor: float,
     delay: float, lost_v: Array, lost_span: float, extra_a: Array, extra_span: float,
@@ -102,7 +136,7 @@ def advance(
 ) -> None:
     """Run the observer over one block of held voltages u and sampled currents y, `(n,)` each, updating all state.
 
-    `upper` (6, 6) and `diagonal` (6,) factor the covariance (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov
+    `theta_in` (5,) is theta and the current offset. `upper` (7, 7) and `diagonal` (7,) factor the covariance (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov
     law. `lost_v` tabulates the inverter's voltage error along the axis over current 0 ... lost_span, `extra_a` the
     magnetizing current beyond the linear one over stator flux 0 ... extra_span; size 1 = none.
     """
@@ -112,10 +146,10 @@ def advance(
     py1, py2, pu1, pu2 = state[4], state[5], state[6], state[7]
     d11, d12, d21, d22 = state[8], state[9], state[10], state[11]
     c0, c1, e_last = state[12], state[13], state[14]
-    i_last, u_last, extra_last = state[15], state[16], state[17]
+    u_last, extra_last = state[16], state[17]
     absorbing = state[18] > 0.5
     rejected, squares = state[19], 0.0
-    t1, t2, t3, t4 = theta_in[0], theta_in[1], theta_in[2], theta_in[3]
+    t1, t2, t3, t4, offset = theta_in[0], theta_in[1], theta_in[2], theta_in[3], theta_in[4]
     theta = np.empty(4)
     ad00, ad01 = flux_gains(machine, period)
     beta = 1.0 / noise_memory
@@ -124,6 +158,9 @@ def advance(
     ff = np.zeros(PARAMETERS)
     k_gain = np.zeros(PARAMETERS)
     has_lost, has_extra = lost_v.size > 1, extra_a.size > 1
+    loop = state[LOOP:].reshape(4, 4)
+    seen = np.zeros(4)  # d(current)/d(theta) with the loop closed
+    slope_now, slope_next = 0.0, 0.0
 
     for k in range(u.size):
         # Present machine, for the flux and for the resistance in the saturation's voltage.
@@ -138,7 +175,7 @@ def advance(
         if has_extra:
             free = t1 * (f1 * z1 + g1 * yl) + t2 * (f2 * z2 + g2 * yl) + t3 * f1 * x1 + t4 * f2 * x2
             extra = lookup(extra_a, extra_span, (free - ad00 * yl) / ad01 + machine[2] * yl)
-        e = y[k] - extra - yl
+        e = y[k] - offset - extra - yl
 
         # Noise level: variance times the (AR(1)) length of its correlation, so that an error of the model, which is
         # coloured, is not taken for information.
@@ -152,7 +189,11 @@ def advance(
             rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)
             rho = 0.0 if rho < 0.0 else (0.999 if rho > 0.999 else rho)
             r = c0 * (1.0 + rho) / (1.0 - rho) + noise_floor
-            psi[2], psi[3], psi[4], psi[5] = py1, py2, pu1, pu2
+            psi[2], psi[3], psi[4], psi[5], psi[6] = 1.0, py1, py2, pu1, pu2
+            if has_lost:
+                for j in range(4):
+                    psi[3 + j] += t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * loop[j, 2] + t4 * loop[j, 3]
+                    seen[j] = psi[3 + j]
             first = 2
             if absorbing:
                 first = 0
@@ -178,13 +219,14 @@ def advance(
                 for j in range(i + 1, PARAMETERS):
                     s += upper[i, j] * v[j]
                 k_gain[i] = s
-            n1, n2 = t1 + k_gain[2] * step, t2 + k_gain[3] * step
+            n1, n2 = t1 + k_gain[3] * step, t2 + k_gain[4] * step
             half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
             a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
             if half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0:
                 t1, t2 = n1, n2
-                t3 += k_gain[4] * step
-                t4 += k_gain[5] * step
+                t3 += k_gain[5] * step
+                t4 += k_gain[6] * step
+                offset += k_gain[2] * step
                 if absorbing:
                     s1, s2 = k_gain[0] * step, k_gain[1] * step
                     z1 += d11 * s1 + d12 * s2
@@ -227,18 +269,25 @@ def advance(
         psi_s = psi_r + machine[2] * yl
         extra = lookup(extra_a, extra_span, psi_s) if has_extra else 0.0
         i_now = yl + extra
-        current[k] = i_now
+        current[k] = i_now + offset
         rotor_flux[k] = psi_r
         stator_flux[k] = psi_s
 
         # The voltage that drives the linear machine over this period.
         drive = u[k] - delay * (u[k] - u_last)
         u_last = u[k]
-        if has_lost:
-            drive -= lookup(lost_v, lost_span, 1.5 * i_now - 0.5 * i_last)
         if has_extra:
             drive -= machine[0] * (1.5 * extra - 0.5 * extra_last)
-        i_last, extra_last = i_now, extra
+        if has_lost:
+            # Mean of the loss at both ends of the period; the far end implicitly, i + b/2 F(i) = known, so that a
+            # current caught at zero does not chatter.
+            lost_now, slope_now = lookup_with_slope(lost_v, lost_span, i_now)
+            b = t3 * g1 + t4 * g2
+            ahead = t1 * (f1 * z1 + g1 * yl) + t2 * (f2 * z2 + g2 * yl) + t3 * f1 * x1 + t4 * f2 * x2
+            known = ahead + b * (drive - 0.5 * lost_now) + 2.0 * extra - extra_last
+            lost_next, slope_next = implicit_loss(lost_v, lost_span, known, 0.5 * b)
+            drive -= 0.5 * (lost_now + lost_next)
+        extra_last = extra
 
         # Filters: regressor, sensitivity, and the response to the unknown initial state.
         p = yl + t1 * py1 + t2 * py2
@@ -247,6 +296,17 @@ def advance(
         x1, x2 = f1 * x1 + g1 * drive, f2 * x2 + g2 * drive
         py1, py2 = f1 * py1 + g1 * p, f2 * py2 + g2 * p
         pu1, pu2 = f1 * pu1 + g1 * q, f2 * pu2 + g2 * q
+        if has_lost and law == FAST:
+            gain = t3 * g1 + t4 * g2
+            for j in range(4):
+                held = t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * loop[j, 2] + t4 * loop[j, 3]
+                loop[j, 0] = f1 * loop[j, 0] + g1 * held
+                loop[j, 1] = f2 * loop[j, 1] + g2 * held
+                free = py1 if j == 0 else (py2 if j == 1 else (pu1 if j == 2 else pu2))
+                free += t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * f1 * loop[j, 2] + t4 * f2 * loop[j, 3]
+                back = -0.5 * (slope_now * seen[j] + slope_next * free) / (1.0 + 0.5 * gain * slope_next)
+                loop[j, 2] = f1 * loop[j, 2] + g1 * back
+                loop[j, 3] = f2 * loop[j, 3] + g2 * back
         if absorbing:
             s1, s2 = t1 * d11 + t2 * d21, t1 * d12 + t2 * d22
             d11, d12 = f1 * d11 + g1 * s1, f1 * d12 + g1 * s2
@@ -258,11 +318,11 @@ def advance(
     state[4], state[5], state[6], state[7] = py1, py2, pu1, pu2
     state[8], state[9], state[10], state[11] = d11, d12, d21, d22
     state[12], state[13], state[14] = c0, c1, e_last
-    state[15], state[16], state[17] = i_last, u_last, extra_last
+    state[16], state[17] = u_last, extra_last
     state[18] = 1.0 if absorbing else 0.0
     state[19] = rejected
     state[20] += u.size
     state[21] = squares
-    theta_in[0], theta_in[1], theta_in[2], theta_in[3] = t1, t2, t3, t4
+    theta_in[0], theta_in[1], theta_in[2], theta_in[3], theta_in[4] = t1, t2, t3, t4, offset
     theta[0], theta[1], theta[2], theta[3] = t1, t2, t3, t4
     machine_from_theta(theta, f, period, machine)

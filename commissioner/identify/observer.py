@@ -31,6 +31,8 @@ Matrix = NDArray[np.float64]
 
 PRIOR_LOG_STD = 0.5
 """Spread of the prior around its typical member: a factor 1.65 either way is one standard deviation."""
+OFFSET_STD = 0.02
+"""Standard deviation of a current sensor's offset, of the current scale, before anything is known."""
 NOISE_MEMORY_S = 0.1
 FIRST_REVIEW_S = 0.3
 LYAPUNOV_TIME_CONSTANT_S = 5.0
@@ -72,6 +74,7 @@ class _Piece:
     voltage_v: Signal
     current_a: Signal
     restarts: bool
+    begins_at_rest: bool = False
     open_loop_v: Signal | None = None
 
 
@@ -113,13 +116,19 @@ class ParallelObserver:
         self._first = True
 
     def advance(
-        self, voltage_v: Signal, current_a: Signal, lost_before: int = 0, lost_voltage_v: Signal | None = None
+        self,
+        voltage_v: Signal,
+        current_a: Signal,
+        lost_before: int = 0,
+        lost_voltage_v: Signal | None = None,
+        begins_at_rest: bool = False,
     ) -> BlockEstimate:
         """Take in one block of `(n,)` voltages along the axis (held over each period) and currents (at its start).
 
         `lost_before` samples are missing between the last block and this one. Where their voltage is known
         (`lost_voltage_v`) the observer runs through the hole open loop with adaptation frozen; otherwise its states
-        restart as unknowns. Either way no sample is invented.
+        restart as unknowns. Either way no sample is invented. `begins_at_rest`: the motor was de-energised before this
+        block and has come to rest; known parameters stay, states start from zero.
         """
         voltage_v = np.ascontiguousarray(voltage_v, dtype=np.float64)
         current_a = np.ascontiguousarray(current_a, dtype=np.float64)
@@ -130,9 +139,10 @@ class ParallelObserver:
         self.lost_samples += lost_before
         bridged = lost_voltage_v if lost_before else None
         restarts = (self._first and not self.starts_at_rest) or (lost_before > 0 and bridged is None)
+        restarts &= not begins_at_rest
         self.restarts += int(restarts and not self._first)
         self._first = False
-        return self._advance_with_reviews(_Piece(voltage_v, current_a, restarts, bridged))
+        return self._advance_with_reviews(_Piece(voltage_v, current_a, restarts, begins_at_rest, bridged))
 
     # -- the parts ------------------------------------------------------------------------------------------------
 
@@ -146,7 +156,7 @@ class ParallelObserver:
             cut = total if self.law != "fast" else min(total, done + max(1, int(self._next_review) - self._samples))
             part = _Piece(
                 piece.voltage_v[done:cut], piece.current_a[done:cut], piece.restarts and done == 0,
-                piece.open_loop_v if done == 0 else None,
+                piece.begins_at_rest and done == 0, piece.open_loop_v if done == 0 else None,
             )
             signals.append(self._run(self._shell, part))
             squares += float(self._shell.state[kernels.SQUARES])
@@ -156,7 +166,7 @@ class ParallelObserver:
         current, rotor, stator = (np.concatenate(parts) for parts in zip(*signals, strict=True))
         return BlockEstimate(
             parameters=self.parameters,
-            std=self._std(),
+            std=self.std(),
             residual_rms_a=math.sqrt(squares / max(total, 1)),
             noise_a=math.sqrt(float(self._shell.state[kernels.NOISE])),
             current_a=current,
@@ -187,12 +197,23 @@ class ParallelObserver:
         if np.all(np.isfinite(fresh.theta)) and self._is_machine(fresh.theta):
             self._shell = fresh
 
+    def predicted(self) -> list[tuple[Signal, Signal, Signal]]:
+        """(current, rotor flux, stator flux) of the stored blocks, simulated with the present parameters held."""
+        held = self._fresh(self.parameters, 0.0)
+        held.theta[4] = self._shell.theta[4]
+        out = []
+        for piece in self._history:
+            if piece.restarts or piece.begins_at_rest:
+                _restart(held, self.current_scale_a, True)
+            out.append(self._kernel(held, piece.voltage_v, piece.current_a, kernels.FROZEN))
+        return out
+
     def _is_machine(self, theta: Matrix) -> bool:
         return bool(kernels.machine_from_theta(theta, self._filter, self.sample_period_s, np.empty(4)))
 
     def _run(self, shell: _Shell, piece: _Piece) -> tuple[Signal, Signal, Signal]:
-        if piece.restarts:
-            _restart(shell, self.current_scale_a)
+        if piece.restarts or piece.begins_at_rest:
+            _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
             self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
         return self._kernel(shell, piece.voltage_v, piece.current_a, self._law)
@@ -225,11 +246,12 @@ class ParallelObserver:
         if self.law != "fast":
             return np.zeros((4, 4))
         back = np.linalg.inv(_jacobian(InverseGamma(*map(float, self._shell.machine)), self._filter, self.sample_period_s))
-        upper, diagonal = self._shell.upper[2:, 2:], self._shell.diagonal[2:]
+        upper, diagonal = self._shell.upper[kernels.THETA :, kernels.THETA :], self._shell.diagonal[kernels.THETA :]
         root = back @ upper * np.sqrt(diagonal)
         return np.asarray(root @ root.T)
 
-    def _std(self) -> tuple[float, float, float, float]:
+    def std(self) -> tuple[float, float, float, float]:
+        """Standard errors of (R_s, R_R, L_sigma, L_M)."""
         a, b, c, d = np.sqrt(np.diag(self.covariance()))
         return float(a), float(b), float(c), float(d)
 
@@ -243,8 +265,9 @@ class ParallelObserver:
         else:
             covariance = _prior_covariance(self.prior, self._filter, self.sample_period_s)
         upper, diagonal = np.eye(kernels.PARAMETERS), np.zeros(kernels.PARAMETERS)
-        upper[2:, 2:], diagonal[2:] = ud_factors(covariance)
-        return _Shell(state, theta, upper, diagonal, np.array(machine.as_tuple()))
+        upper[kernels.THETA :, kernels.THETA :], diagonal[kernels.THETA :] = ud_factors(covariance)
+        diagonal[kernels.OFFSET] = (OFFSET_STD * self.current_scale_a) ** 2
+        return _Shell(state, np.append(theta, 0.0), upper, diagonal, np.array(machine.as_tuple()))
 
     def _gain_matrix(self, voltage_v: Signal) -> Matrix:
         """Gamma = (T / time constant) x (regressor power of the typical machine)^-1: the same speed for every machine."""
@@ -337,11 +360,12 @@ def _regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage
     return np.column_stack(columns)
 
 
-def _restart(shell: _Shell, current_scale_a: float) -> None:
-    """Unknown state: filters at zero, free response as two more parameters, known to a few rated currents."""
+def _restart(shell: _Shell, current_scale_a: float, is_at_rest: bool) -> None:
+    """Filters at zero; unless at rest, the free response becomes two more parameters, known to a few rated currents."""
     shell.state[kernels.ZHAT : kernels.NOISE] = 0.0
     shell.state[kernels.FREE], shell.state[kernels.FREE + 3] = 1.0, 1.0
-    shell.state[kernels.LAST_CURRENT : kernels.ABSORBING] = 0.0
-    shell.state[kernels.ABSORBING] = 1.0
+    shell.state[kernels.LAST_VOLTAGE : kernels.ABSORBING] = 0.0
+    shell.state[kernels.ABSORBING] = 0.0 if is_at_rest else 1.0
+    shell.state[kernels.LOOP :] = 0.0
     shell.upper[:2, :] = np.eye(2, kernels.PARAMETERS)
     shell.diagonal[:2] = (4.0 * current_scale_a) ** 2

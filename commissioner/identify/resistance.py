@@ -68,11 +68,15 @@ IDEAL_INVERTER = InverterError((0.0, 1.0), (0.0, 0.0), (0.0, 0.0))
 
 @dataclass(frozen=True)
 class DcLevel:
-    """One step of the staircase after settling: means over the tail of its dwell time."""
+    """Mean voltage and current of a stretch of nearly constant voltage; `std_a` is that of the mean current.
+
+    `rise_a_per_s` is the current's slope there: zero at a settled level, not while the voltage climbs.
+    """
 
     voltage_v: float
     current_a: float
-    std_a: float  # of the mean
+    std_a: float
+    rise_a_per_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,61 +90,16 @@ class StaircaseLimits:
 
 @dataclass(frozen=True)
 class StaircasePlan:
-    """DC voltages that climb to `top_current_a` from below, for a motor and an inverter not yet known, then mirror.
-
-    `first_v` drives at most `top_current_a` through the smallest resistance the plate allows. Every level is to be held
-    `dwell_s`; its mean is taken over the last `tail` of it.
-    """
+    """What a staircase may reach on a motor of which only the plate is known, and how long a level takes to settle."""
 
     top_current_a: float
-    first_v: float
-    voltage_limit_v: float
-    lowest_resistance_ohm: float
-    dwell_s: float
-    tail: float = 0.4
-    rising_levels: int = 5
+    climb_v_per_s: float
+    longest_dwell_s: float
+    window_s: float
 
-    def next_level(self, history: Sequence[DcLevel]) -> float | None:
-        """The next voltage, given the levels measured so far; None when done."""
-        positive = [level for level in history if level.voltage_v > 0]
-        negative = len(history) - len(positive)
-        if negative == 0 and not self._is_complete(positive):
-            return self._higher(positive)
-        kept = self._mirrored(positive)
-        return -kept[negative] if negative < len(kept) else None
 
-    def _is_complete(self, rising: Sequence[DcLevel]) -> bool:
-        if not rising:
-            return False
-        last = rising[-1]
-        carrying = sum(level.current_a > 0.1 * self.top_current_a for level in rising)
-        reached = last.current_a >= 0.9 * self.top_current_a and carrying >= 3
-        return reached or last.voltage_v >= 0.999 * self.voltage_limit_v or len(rising) >= 24 + self.rising_levels
-
-    def _higher(self, rising: Sequence[DcLevel]) -> float:
-        """A step that adds at most one rung of current, whichever resistance is believable after what was seen."""
-        if not rising:
-            return min(self.first_v, self.voltage_limit_v)
-        rung_a = self.top_current_a / self.rising_levels
-        last = rising[-1]
-        room_a = max(min(rung_a, self.top_current_a - last.current_a), 0.1 * rung_a)
-        step_v = room_a * max(self.lowest_resistance_ohm, self._seen_slope(rising))
-        return min(last.voltage_v + step_v, self.voltage_limit_v)
-
-    def _seen_slope(self, rising: Sequence[DcLevel]) -> float:
-        """dV/dI of the last two levels that carry current; before the knee it is too steep to be trusted whole."""
-        carrying = [level for level in rising if level.current_a > 0.05 * self.top_current_a]
-        if len(carrying) < 2:
-            return 2.0 * self.lowest_resistance_ohm
-        rise_v = carrying[-1].voltage_v - carrying[-2].voltage_v
-        rise_a = carrying[-1].current_a - carrying[-2].current_a
-        return 0.8 * rise_v / rise_a if rise_a > 0.0 else 0.0
-
-    def _mirrored(self, positive: Sequence[DcLevel]) -> list[float]:
-        """At most `rising_levels` voltages, spread over current: the largest, and those nearest equal rungs."""
-        targets = [self.top_current_a * k / self.rising_levels for k in range(1, self.rising_levels + 1)]
-        chosen = {min(positive, key=lambda level: abs(level.current_a - target)).voltage_v for target in targets}
-        return sorted(chosen)
+CLIMB_S = 0.5
+"""The climb drives the top current through the typical resistance in this time, whatever dead time takes before it."""
 
 
 def staircase(nameplate: Nameplate, limits: StaircaseLimits) -> StaircasePlan:
@@ -155,10 +114,9 @@ def staircase(nameplate: Nameplate, limits: StaircaseLimits) -> StaircasePlan:
     slow = -poles_per_s(box.typical)[0]
     return StaircasePlan(
         top_current_a=top_a,
-        first_v=0.3 * top_a * box.lower.stator_resistance_ohm,
-        voltage_limit_v=limits.voltage_v,
-        lowest_resistance_ohm=box.lower.stator_resistance_ohm,
-        dwell_s=min(max(4.0 / slow, 0.3), 3.0),
+        climb_v_per_s=top_a * box.typical.stator_resistance_ohm / CLIMB_S,
+        longest_dwell_s=min(max(4.0 / slow, 0.3), 3.0),
+        window_s=0.5 / slow,
     )
 
 
@@ -174,75 +132,84 @@ class Staircase:
     levels: tuple[DcLevel, ...]
 
 
-KNEE_POINTS = (0.0, 0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.5, 7.0)
+KNEE_POINTS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 5.0, 8.0, 14.0, 25.0)
+CLIMB_WEIGHT = 0.2
+"""A climbing point is worth less than a settled level: its flux lags behind its current."""
 
 
 def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
-    """Least squares of u = R_s i + F(i - offset) over the levels, with f(x) = V (1 - exp(-|x|/knee)) sign(x).
+    """Least squares of u = R_s i + F(i - offset) + L di/dt over the levels.
 
-    Fewer than three levels with current on one side and one on the other cannot separate resistance from lost voltage:
-    DataRefused.
+    A leg loses f(x) = V z / (1 + z^p)^(1/p), z = x / knee: from a long tail (output capacitance) to a sharp corner.
+    L, the inductance seen while climbing, counts only where a level has a slope. Fewer than three levels with current,
+    two of one sign, cannot separate resistance from lost voltage: DataRefused.
     """
-    largest = max((abs(level.current_a) for level in levels), default=0.0)
-    carrying = [level for level in levels if abs(level.current_a) > 0.1 * largest]
-    positive = sum(level.current_a > 0 for level in carrying)
-    if largest <= 0.0 or len(carrying) < 3 or max(positive, len(carrying) - positive) < 2:
-        raise DataRefused(
-            "the DC staircase has too few levels that carry current", step="fit DC staircase",
-            value=f"{len(carrying)} levels above a tenth of the largest current",
-            limit="3 levels, 2 of one sign", remedy="raise the DC levels or the current limit",
-        )
     voltage = np.array([level.voltage_v for level in levels])
     current = np.array([level.current_a for level in levels])
-    has_both_signs = 0 < positive < len(carrying)
-    start, scale, lower = _staircase_start(voltage, current, largest)
+    rise = np.array([level.rise_a_per_s for level in levels])
+    largest = float(np.max(np.abs(current), initial=0.0))
+    _require_levels(current[rise == 0.0], largest)
+    weight = np.where(rise == 0.0, 1.0, CLIMB_WEIGHT)
+    has_both_signs = bool(np.any(current > 0.1 * largest) and np.any(current < -0.1 * largest))
 
     def misfit(p: Signal) -> Signal:
-        offset = p[3] if has_both_signs else 0.0
-        true = current - offset
-        shape = _knee_shape(p[1], p[2])
-        prior_terms = np.array([math.log(p[2] / (0.02 * largest)) / 2.0, p[3] / (0.02 * largest)])
-        return np.concatenate([(voltage - p[0] * true - shape.on_axis(true, axis_deg)) / noise, prior_terms])
+        resistance, plateau, log_knee, log_power, offset, inductance = p
+        true = current - (offset if has_both_signs else 0.0)
+        leg = _knee_shape(plateau, math.exp(log_knee), math.exp(log_power))
+        model = resistance * true + leg.on_axis(true, axis_deg) + inductance * rise
+        prior_terms = [(log_knee - math.log(0.05 * largest)) / 2.0, (log_power - 0.4) / 0.5, offset / (0.02 * largest)]
+        return np.concatenate([weight * (voltage - model) / noise, prior_terms])
 
+    start, scale, low, high = _staircase_start(voltage, current, largest)
     noise = 0.003 * float(np.max(np.abs(voltage)))
-    for _ in range(2):
-        fit = least_squares(misfit, start, bounds=(lower, np.inf), x_scale=scale)
+    for _ in range(3):
+        fit = least_squares(misfit, start, bounds=(low, high), x_scale=scale)
         start = fit.x
         residual = misfit(fit.x)[: voltage.size] * noise
-        noise = max(float(np.sqrt(np.mean(residual**2))), 1e-5 * float(np.max(np.abs(voltage))))
-    covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
-    std = np.sqrt(np.diag(covariance))
-    inverter = _knee_shape(fit.x[1], fit.x[2])
+        noise = max(float(np.sqrt(np.sum(residual**2) / np.sum(weight**2))), 1e-5 * float(np.max(np.abs(voltage))))
+    std = np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)))
+    inverter = _knee_shape(fit.x[1], math.exp(fit.x[2]), math.exp(fit.x[3]))
     return Staircase(
         stator_resistance=Quantity(float(fit.x[0]), float(std[0])),
         error_voltage=Quantity(float(fit.x[1]), float(std[1])),
-        offset_a=float(fit.x[3]) if has_both_signs else 0.0,
+        offset_a=float(fit.x[4]) if has_both_signs else 0.0,
         inverter=InverterError(inverter.current_a, inverter.voltage_v, (float(std[1]),) * len(KNEE_POINTS)),
-        residual_v=float(np.sqrt(np.mean(residual**2))),
+        residual_v=noise,
         levels=tuple(levels),
     )
 
 
-def _knee_shape(plateau_v: float, knee_a: float) -> InverterError:
+def _require_levels(settled_a: Signal, largest_a: float) -> None:
+    carrying = settled_a[np.abs(settled_a) > 0.1 * largest_a]
+    positive = int(np.sum(carrying > 0))
+    if largest_a <= 0.0 or carrying.size < 3 or max(positive, carrying.size - positive) < 2:
+        raise DataRefused(
+            "the DC staircase has too few levels that carry current", step="fit DC staircase",
+            value=f"{carrying.size} levels above a tenth of the largest current",
+            limit="3 levels, 2 of one sign", remedy="raise the DC levels or the current limit",
+        )
+
+
+def _knee_shape(plateau_v: float, knee_a: float, power: float) -> InverterError:
     points = np.array(KNEE_POINTS)
-    values = plateau_v * (1.0 - np.exp(-points))
-    values[-1] = plateau_v
+    values = plateau_v * points / (1.0 + points**power) ** (1.0 / power)
     return InverterError(tuple(map(float, knee_a * points)), tuple(map(float, values)))
 
 
-def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[Signal, Signal, Signal]:
-    """Resistance and plateau from the straight line through the upper levels."""
+def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[Signal, Signal, Signal, Signal]:
+    """Resistance and plateau from the straight line through the upper levels; start, scale, lower and upper bounds."""
     upper = np.abs(current) > 0.4 * largest
     if upper.sum() < 2:
         upper = np.abs(current) > 0.1 * largest
     design = np.column_stack([current[upper], np.sign(current[upper])])
     (resistance, loss), *_ = np.linalg.lstsq(design, voltage[upper], rcond=None)
-    resistance = max(float(resistance), 0.05 * float(np.max(np.abs(voltage))) / largest)
-    plateau = max(0.75 * float(loss), 1e-3 * resistance * largest)
-    start = np.array([resistance, plateau, 0.02 * largest, 0.0])
-    scale = np.array([resistance, resistance * largest, 0.02 * largest, 0.01 * largest])
-    lower = np.array([0.0, -np.inf, 1e-5 * largest, -np.inf])
-    return start, scale, lower
+    top_v = float(np.max(np.abs(voltage)))
+    resistance = max(float(resistance), 0.05 * top_v / largest)
+    start = np.array([resistance, max(0.75 * float(loss), 1e-3 * top_v), math.log(0.05 * largest), 0.4, 0.0, 0.0])
+    scale = np.array([resistance, top_v, 1.0, 0.5, 0.01 * largest, 0.1 * top_v / largest])
+    low = np.array([0.0, -top_v, math.log(1e-4 * largest), math.log(0.7), -0.1 * largest, 0.0])
+    high = np.array([np.inf, top_v, math.log(largest), math.log(8.0), 0.1 * largest, np.inf])
+    return start, scale, low, high
 
 
 def flux_limit_wb(nameplate: Nameplate, fraction: float) -> float:
