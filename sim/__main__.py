@@ -16,7 +16,7 @@ from sim.scenario import Scenario, ScenarioError, build, read_document
 def main(arguments: list[str] | None = None) -> int:
     """Exit code: 0 done, 2 what was asked for cannot be, 5 a port or device cannot be had."""
     options = _parser().parse_args(arguments)
-    from sim.faults import FaultError  # noqa: PLC0415 - after --help
+    from sim.faults import FaultError
 
     try:
         document = read_document(options.scenario)
@@ -74,8 +74,8 @@ def _print_truth(truth: dict[str, object]) -> None:
 
 
 def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
-    from sim.server import Options, serve  # noqa: PLC0415 - the recording needs no server
-    from sim.truth import answer_key  # noqa: PLC0415
+    from sim.server import Options, serve
+    from sim.truth import answer_key
 
     if options.list:
         return _list()
@@ -91,7 +91,7 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
     return 0
 
 
-async def _serve_until_signal(scenario, serving, serve) -> None:  # noqa: ANN001
+async def _serve_until_signal(scenario, serving, serve) -> None:
     stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
@@ -104,7 +104,7 @@ def _announce(text: str) -> None:
 
 
 def _list() -> int:
-    from sim.scenario import names  # noqa: PLC0415
+    from sim.scenario import names
 
     sys.stdout.write("\n".join(names()) + "\n")
     return 0
@@ -126,7 +126,7 @@ def _tls(options: argparse.Namespace) -> ssl.SSLContext:
 
 
 def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
-    from sim.recording import record, write_table  # noqa: PLC0415
+    from sim.recording import record, write_table
 
     columns, metadata, truth = record(scenario, options.seed)
     write_table(options.recording, columns, metadata)
@@ -136,8 +136,8 @@ def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
 
 
 def _record_running(document: dict[str, object], options: argparse.Namespace) -> int:
-    from sim.recording import write_table  # noqa: PLC0415
-    from sim.running_recording import record  # noqa: PLC0415 - another physics, loaded when asked for
+    from sim.recording import write_table
+    from sim.running_recording import record
 
     columns, metadata, truth = record(document, options.seed)
     if options.recording:

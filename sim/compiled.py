@@ -1,4 +1,4 @@
-"""How every kernel here is compiled: cached, IEEE division without Python's zero check, reciprocals and fused adds allowed.
+"""How kernels here are compiled: cached, IEEE division without Python's zero check, fused adds allowed.
 
 Infinities and NaN keep their meaning; the same machine gives the same bits.
 """

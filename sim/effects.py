@@ -74,7 +74,9 @@ def _dead_time(effect, plant, p, s):
     p[at.P_DEAD_PER_A] = 1.0 / effect.details.get("knee_a", 0.02 * plant.nameplate.rated_peak_current_a)
 
 
-@_entry("device_drop", "V", "device threshold per leg; `slope_ohm` adds to R_s", ("root", "tanh", "logarithmic"), 0.05, 2.0)
+@_entry(
+    "device_drop", "V", "device threshold per leg; `slope_ohm` adds to R_s", ("root", "tanh", "logarithmic"), 0.05, 2.0
+)
 def _device_drop(effect, plant, p, s):
     p[at.P_DROP_V] = effect.size
     p[at.P_DROP_SHAPE] = SIGN_SHAPES.index(effect.shape or "root")
@@ -82,7 +84,14 @@ def _device_drop(effect, plant, p, s):
     p[at.P_SLOPE_OHM] = effect.details.get("slope_ohm", 0.0)
 
 
-@_entry("dc_link_sag", "fraction at rated power", "link voltage lost when rated power is drawn", ("linear", "soft"), 0.003, 0.06)
+@_entry(
+    "dc_link_sag",
+    "fraction at rated power",
+    "link voltage lost when rated power is drawn",
+    ("linear", "soft"),
+    0.003,
+    0.06,
+)
 def _dc_link_sag(effect, plant, p, s):
     p[at.P_SAG_V_PER_W] = effect.size * plant.power_stage.link_v / plant.nameplate.rated_power_w
     p[at.P_SAG_TAU] = effect.details.get("time_constant_s", 0.004)
@@ -97,7 +106,14 @@ def _dc_link_ripple(effect, plant, p, s):
     p[at.P_RIPPLE_SHAPE] = _shape(effect)
 
 
-@_entry("sampling_delay", "s", "samples are this old; `alternating` by +-20 % more or less", ("constant", "alternating"), 2e-6, 3e-4)
+@_entry(
+    "sampling_delay",
+    "s",
+    "samples are this old; `alternating` by +-20 % more or less",
+    ("constant", "alternating"),
+    2e-6,
+    3e-4,
+)
 def _sampling_delay(effect, plant, p, s):
     s[at.S_DELAY] = effect.size
 
@@ -107,7 +123,14 @@ def _sensor_lag(effect, plant, p, s):
     return _Lag(effect.size, 1 + _shape(effect))
 
 
-@_entry("magnetizing_saturation", "fraction at rated flux", "extra magnetizing current at rated flux", SATURATION_SHAPES, 0.01, 0.6)
+@_entry(
+    "magnetizing_saturation",
+    "fraction at rated flux",
+    "extra magnetizing current at rated flux",
+    SATURATION_SHAPES,
+    0.01,
+    0.6,
+)
 def _magnetizing_saturation(effect, plant, p, s):
     p[at.P_SAT] = effect.size
     p[at.P_SAT_ORDER] = effect.details.get("order", plant.machine.saturation_order)
@@ -128,7 +151,9 @@ def _remanence(effect, plant, p, s):
     p[at.P_FLUX0_C], p[at.P_FLUX0_S] = effect.size * c, effect.size * q
 
 
-@_entry("leakage_saturation", "fraction at twice rated current", "leakage inductance lost there", LEAKAGE_SHAPES, 0.005, 0.3)
+@_entry(
+    "leakage_saturation", "fraction at twice rated current", "leakage inductance lost there", LEAKAGE_SHAPES, 0.005, 0.3
+)
 def _leakage_saturation(effect, plant, p, s):
     m, peak = plant.machine, 2.0 * plant.nameplate.rated_peak_current_a
     knee = effect.details.get("knee", 0.5)
@@ -138,7 +163,14 @@ def _leakage_saturation(effect, plant, p, s):
     p[at.P_LEAKSAT] = effect.size / (1.0 - effect.size) / reach
 
 
-@_entry("rotor_skin_effect", "fraction at rated frequency", "R_r(f_N)/R_r(0) - 1 of the cage", ("one_cell", "two_cells"), 0.01, 0.6)
+@_entry(
+    "rotor_skin_effect",
+    "fraction at rated frequency",
+    "R_r(f_N)/R_r(0) - 1 of the cage",
+    ("one_cell", "two_cells"),
+    0.01,
+    0.6,
+)
 def _rotor_skin_effect(effect, plant, p, s):
     """Bars as R in series with (R parallel L) cells; the DC leakage stays that of the machine."""
     m, w = plant.machine, 2.0 * math.pi * plant.nameplate.rated_frequency_hz
@@ -166,7 +198,9 @@ def _iron_loss(effect, plant, p, s):
     p[at.P_EDDY_H] = p[at.P_EDDY_OHM] / (2.0 * math.pi * effect.details.get("corner_hz", 400.0))
 
 
-@_entry("stator_heating", "1/min at rated current", "rise of the phase resistances", ("per_phase", "shared"), 0.002, 0.12)
+@_entry(
+    "stator_heating", "1/min at rated current", "rise of the phase resistances", ("per_phase", "shared"), 0.002, 0.12
+)
 def _stator_heating(effect, plant, p, s):
     p[at.P_HEAT_S] = effect.size / (60.0 * plant.nameplate.rated_current_a**2)
     p[at.P_HEAT_S_TAU] = effect.details.get("time_constant_s", 300.0)
@@ -191,13 +225,27 @@ def _sensor_drift(effect, plant, p, s):
     s[at.S_DRIFT_TAU], s[at.S_DRIFT_SHAPE] = effect.details.get("time_s", 60.0), _shape(effect)
 
 
-@_entry("sensor_gain_mismatch", "fraction", "largest gain departure, mean of the three is 1", ("spread", "one_phase"), 5e-4, 0.03)
+@_entry(
+    "sensor_gain_mismatch",
+    "fraction",
+    "largest gain departure, mean of the three is 1",
+    ("spread", "one_phase"),
+    5e-4,
+    0.03,
+)
 def _sensor_gain_mismatch(effect, plant, p, s):
     default = ((1.0, -0.7, -0.3), (1.0, -0.5, -0.5))[_shape(effect)]
     s[at.S_GAIN_U : at.S_GAIN_W + 1] = [1.0 + g for g in _per_phase(effect, default)]
 
 
-@_entry("sensor_nonlinearity", "fraction of full scale", "curvature at full scale", ("cubic", "soft", "kink", "even"), 5e-4, 0.02)
+@_entry(
+    "sensor_nonlinearity",
+    "fraction of full scale",
+    "curvature at full scale",
+    ("cubic", "soft", "kink", "even"),
+    5e-4,
+    0.02,
+)
 def _sensor_nonlinearity(effect, plant, p, s):
     if _shape(effect) == 3:
         s[at.S_QUADRATIC] = effect.size
@@ -213,7 +261,9 @@ def _quantization(effect, plant, p, s):
         s[at.S_OFFSET_U : at.S_OFFSET_W + 1] -= 0.5 * effect.size
 
 
-@_entry("clipping", "fraction of the peak cut off", "sensor's end below the current's peak", ("hard", "soft"), 0.02, 0.4)
+@_entry(
+    "clipping", "fraction of the peak cut off", "sensor's end below the current's peak", ("hard", "soft"), 0.02, 0.4
+)
 def _clipping(effect, plant, p, s):
     s[at.S_CLIP_A] = effect.details.get("limit_a", (1.0 - effect.size) * plant.nameplate.rated_peak_current_a)
     s[at.S_CLIP_SHAPE] = _shape(effect)
@@ -231,7 +281,9 @@ def _clock_drift(effect, plant, p, s):
     """Acts where the recording is sampled."""
 
 
-@_entry("lost_samples", "samples", "current samples missing, unmarked", ("current_only", "whole_rows", "held"), 1.0, 12.0)
+@_entry(
+    "lost_samples", "samples", "current samples missing, unmarked", ("current_only", "whole_rows", "held"), 1.0, 12.0
+)
 def _lost_samples(effect, plant, p, s):
     """Acts where the recording is sampled."""
 
@@ -242,7 +294,14 @@ def _shaft_motion(effect, plant, p, s):
     p[at.P_SPEED_RATE] = effect.details.get("rate_per_s", (0.0, 0.2, 3.7)[_shape(effect)])
 
 
-@_entry("inductance_anisotropy", "fraction", "half the spread of inductance over directions", ("leakage", "main"), 5e-4, 0.06)
+@_entry(
+    "inductance_anisotropy",
+    "fraction",
+    "half the spread of inductance over directions",
+    ("leakage", "main"),
+    5e-4,
+    0.06,
+)
 def _inductance_anisotropy(effect, plant, p, s):
     c, q = _direction(effect)
     c2, s2 = c * c - q * q, 2.0 * c * q
@@ -250,7 +309,9 @@ def _inductance_anisotropy(effect, plant, p, s):
     p[first], p[first + 1] = effect.size * c2, effect.size * s2
 
 
-@_entry("resistance_anisotropy", "fraction", "half the spread of resistance over directions", ("phases", "cage"), 5e-4, 0.06)
+@_entry(
+    "resistance_anisotropy", "fraction", "half the spread of resistance over directions", ("phases", "cage"), 5e-4, 0.06
+)
 def _resistance_anisotropy(effect, plant, p, s):
     c, q = _direction(effect)
     c2, s2 = c * c - q * q, 2.0 * c * q

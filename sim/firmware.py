@@ -95,8 +95,18 @@ def warm_up(plant: Plant, capacity: int = 16) -> None:
     c[at.C_DECIMATION], e[at.E_STEP_V], e[at.E_DURATION], e[at.E_TIME_LIMIT] = 1, 1.0, 1.0, 1.0
     x, ring = fresh_state(p), np.zeros((capacity, CHANNELS), np.int16)
     run_interrupts(
-        1, x, p, e, s, c, np.zeros((1, 4)), np.zeros((HISTORY, at.POINTS, 2)), np.zeros(CHANNELS),
-        ring, np.zeros(capacity, np.uint8), np.zeros(1),
+        1,
+        x,
+        p,
+        e,
+        s,
+        c,
+        np.zeros((1, 4)),
+        np.zeros((HISTORY, at.POINTS, 2)),
+        np.zeros(CHANNELS),
+        ring,
+        np.zeros(capacity, np.uint8),
+        np.zeros(1),
     )
     coast(x, p, 0.001)
     crc16(np.zeros(1, np.int64))
@@ -110,8 +120,14 @@ class Firmware:
     """One powered drive with its motor. `wall_clock` feeds the watchdog instead of motor time when given."""
 
     def __init__(
-        self, plant: Plant, drive_map: DriveMap, setup: Setup, memory: Memory, seed: int,
-        log: StateLog | None = None, wall_clock: Callable[[], float] | None = None,
+        self,
+        plant: Plant,
+        drive_map: DriveMap,
+        setup: Setup,
+        memory: Memory,
+        seed: int,
+        log: StateLog | None = None,
+        wall_clock: Callable[[], float] | None = None,
     ) -> None:
         self.plant, self.map, self.setup, self.memory = plant, drive_map, setup, memory
         self.log = log or StateLog(None)
@@ -212,8 +228,18 @@ class Firmware:
         periods = min(periods, CHUNK, self._periods_to_event())
         white = self.noise.standard_normal((periods, 4))
         run_interrupts(
-            periods, self.x, self.p, self.e, self.s, self.c, white, self.history, self.means,
-            self.ring, self.ring_flags, self.trip_current,
+            periods,
+            self.x,
+            self.p,
+            self.e,
+            self.s,
+            self.c,
+            white,
+            self.history,
+            self.means,
+            self.ring,
+            self.ring_flags,
+            self.trip_current,
         )
         self._supervise()
         self._happen()
@@ -329,14 +355,24 @@ class Firmware:
         until_zero = coast(self.x, self.p, 0.02)
         self._log_peaks()
         self.log.write(
-            "de_energised", self.t, why=why, until_zero_s=until_zero, session=self.session,
-            since_heartbeat_s=self._now() - self.fed_at, watchdog_ms=self.values["watchdog_ms"],
+            "de_energised",
+            self.t,
+            why=why,
+            until_zero_s=until_zero,
+            session=self.session,
+            since_heartbeat_s=self._now() - self.fed_at,
+            watchdog_ms=self.values["watchdog_ms"],
         )
 
     def _log_peaks(self) -> None:
         self.log.write(
-            "peaks", self.t, session=self.session, stator_flux_wb=self.x[at.X_PEAK_S], rotor_flux_wb=self.x[at.X_PEAK_R],
-            current_a=self.x[at.X_PEAK_A], rated_flux_wb=self.plant.nameplate.rated_flux_wb,
+            "peaks",
+            self.t,
+            session=self.session,
+            stator_flux_wb=self.x[at.X_PEAK_S],
+            rotor_flux_wb=self.x[at.X_PEAK_R],
+            current_a=self.x[at.X_PEAK_A],
+            rated_flux_wb=self.plant.nameplate.rated_flux_wb,
         )
 
     def trip(self, cause: Trip, value: float, limit: float) -> None:
@@ -357,13 +393,14 @@ class Firmware:
             "watchdog not set": not self.map.document["watchdog"]["min_ms"] <= v["watchdog_ms"],
             "an interlock is open": self.interlocks != self._all_interlocks(),
             "link out of range": not limits["dc_link_min_v"] <= self.link_now() <= limits["dc_link_max_v"],
-            "no current limit": not 0.0 < v["current_limit_a"],
-            "no test time limit": not 0.0 < v["test_time_limit_s"],
-            "no voltage limit": not 0.0 < v["voltage_limit_v"],
-            "no duration": not 0.0 < v["duration_s"],
+            "no current limit": not v["current_limit_a"] > 0.0,
+            "no test time limit": not v["test_time_limit_s"] > 0.0,
+            "no voltage limit": not v["voltage_limit_v"] > 0.0,
+            "no duration": not v["duration_s"] > 0.0,
             "no channel": not v["channel_mask"] & 0b1111,
             "decimation": not 1 <= v["decimation"] <= 100,
-            "too hot": self.winding_degc > limits["winding_max_degc"] or self.heatsink_degc > limits["heatsink_max_degc"],
+            "too hot": self.winding_degc > limits["winding_max_degc"]
+            or self.heatsink_degc > limits["heatsink_max_degc"],
         }
         return next((reason for reason, holds in reasons.items() if holds), "")
 
@@ -384,8 +421,12 @@ class Firmware:
         for hook in list(self.on_energised):
             hook()
         self.log.write(
-            "energised", self.t, session=self.session, watchdog_ms=self.values["watchdog_ms"],
-            axis_deg=self.values["axis_deg"], current_limit_a=self.values["current_limit_a"],
+            "energised",
+            self.t,
+            session=self.session,
+            watchdog_ms=self.values["watchdog_ms"],
+            axis_deg=self.values["axis_deg"],
+            current_limit_a=self.values["current_limit_a"],
             voltage_limit_v=self.values["voltage_limit_v"],
         )
 
@@ -437,26 +478,45 @@ class Firmware:
         left = self.values["test_time_limit_s"] - self.c[at.C_PERIOD] * self.p[at.P_PERIOD]
         values = {
             "magic": self.setup.magic if self.setup.magic is not None else identity["magic"],
-            "map_version": identity["map_version"], "firmware_version": self.setup.firmware,
-            "serial_number": self.setup.serial, "drive_type": self.setup.drive_type or identity["drive_type"],
+            "map_version": identity["map_version"],
+            "firmware_version": self.setup.firmware,
+            "serial_number": self.setup.serial,
+            "drive_type": self.setup.drive_type or identity["drive_type"],
             "rated_drive_current_a": self.setup.rated_current_a,
             "control_period_s": round(self.p[at.P_PERIOD] / self.map.items["control_period_s"].scale),
             "switching_frequency_hz": self.plant.power_stage.switching_frequency_hz,
-            "status_word": self.status_word, "fault_code": int(self.fault), "trip_cause": int(self.trip_cause),
-            "trip_value": self.trip_value, "trip_limit": self.trip_limit, "heartbeat_echo": self.heartbeat_echo,
-            "session_id": self.session, "interlocks": self.interlocks, "dc_link_v": self.link_now(),
+            "status_word": self.status_word,
+            "fault_code": int(self.fault),
+            "trip_cause": int(self.trip_cause),
+            "trip_value": self.trip_value,
+            "trip_limit": self.trip_limit,
+            "heartbeat_echo": self.heartbeat_echo,
+            "session_id": self.session,
+            "interlocks": self.interlocks,
+            "dc_link_v": self.link_now(),
             "heatsink_degc": self.heatsink_degc,
             "winding_degc": self.winding_degc if self.setup.has_winding_sensor else math.nan,
-            "shaft_speed_rad_per_s": self.setup.shaft_speed_rad_per_s, "current_magnitude_a": magnitude,
-            "present_scale": self.e[at.E_SCALE] if self.is_energised else 0.0, "samples_produced": self.produced,
-            "overruns": min(self.overruns, 0xFFFF), "test_time_left_s": max(left, 0.0) if self.is_energised else 0.0,
+            "shaft_speed_rad_per_s": self.setup.shaft_speed_rad_per_s,
+            "current_magnitude_a": magnitude,
+            "present_scale": self.e[at.E_SCALE] if self.is_energised else 0.0,
+            "samples_produced": self.produced,
+            "overruns": min(self.overruns, 0xFFFF),
+            "test_time_left_s": max(left, 0.0) if self.is_energised else 0.0,
             "present_bias_v": self.e[at.E_BIAS] if self.is_energised else 0.0,
-            "current_scale_a": self.current_scale_a, "voltage_scale_v": VOLTAGE_STEP_V, "dc_link_scale_v": LINK_STEP_V,
-            "ring_capacity": self.setup.ring_capacity, "current_full_scale_a": self.plant.sensors.full_scale_a,
-            "rated_power_w": plate.rated_power_w, "rated_voltage_v": plate.rated_voltage_v,
-            "rated_frequency_hz": plate.rated_frequency_hz, "rated_current_a": plate.rated_current_a,
-            "rated_speed_rpm": plate.rated_speed_rpm, "power_factor": plate.power_factor, "pole_pairs": plate.pole_pairs,
-            "commit_result": self.commit_result, "store_result": self.store_result,
+            "current_scale_a": self.current_scale_a,
+            "voltage_scale_v": VOLTAGE_STEP_V,
+            "dc_link_scale_v": LINK_STEP_V,
+            "ring_capacity": self.setup.ring_capacity,
+            "current_full_scale_a": self.plant.sensors.full_scale_a,
+            "rated_power_w": plate.rated_power_w,
+            "rated_voltage_v": plate.rated_voltage_v,
+            "rated_frequency_hz": plate.rated_frequency_hz,
+            "rated_current_a": plate.rated_current_a,
+            "rated_speed_rpm": plate.rated_speed_rpm,
+            "power_factor": plate.power_factor,
+            "pole_pairs": plate.pole_pairs,
+            "commit_result": self.commit_result,
+            "store_result": self.store_result,
             "store_count": self.memory.content["store_count"],
         }
         for j, name in enumerate(PARAMETERS):
@@ -561,7 +621,9 @@ class Firmware:
     def _finish_commit(self) -> None:
         self.values["commit"] = 0
         staged = self._staged()
-        words = [w for name, v in zip(PARAMETERS, staged, strict=True) for w in self.map.items["staged_" + name].encode(v)]
+        words = [
+            w for name, v in zip(PARAMETERS, staged, strict=True) for w in self.map.items["staged_" + name].encode(v)
+        ]
         if crc16(np.array(words)) != self.values["staged_crc"]:
             self.commit_result = 3
         elif not all(lo <= v <= hi for v, (lo, hi) in zip(staged, PARAMETER_RANGE, strict=True)):
@@ -580,8 +642,13 @@ class Firmware:
         else:
             self.memory.store(list(self.in_use))
             self.store_result = 2
-        self.log.write("store", self.t, result=self.store_result, stored=self.memory.content["parameters"],
-                       store_count=self.memory.content["store_count"])
+        self.log.write(
+            "store",
+            self.t,
+            result=self.store_result,
+            stored=self.memory.content["parameters"],
+            store_count=self.memory.content["store_count"],
+        )
 
     # --- sample window ----------------------------------------------------------------------------------------------
 

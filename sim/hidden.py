@@ -1,7 +1,7 @@
 """Blind cases: a random motor, random causes with random sizes and shapes, and the excitation, all from one seed.
 
 Strata: `null`, `one`, `two`, `three`, `four` causes; `wrong_form` (one or two causes in their least usual shape);
-`absent` (a cause no catalogue names); `tie` (causes the data cannot tell apart). The answer key has the names and sizes.
+`absent` (a cause no catalogue names); `tie` (causes the data cannot tell apart). The answer key has names and sizes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,25 @@ CURRENT_SHARES = (0.55, 0.35, 0.25, 0.22, 0.12, 0.06)
 HARMLESS = ("quantization", "clipping", "lost_samples", "mains_pickup")
 """Names a data audit finds; drawn, but not into mixtures where they would drown the others."""
 UNUSUAL = {
-    "dead_time": "clamped", "device_drop": "logarithmic", "dc_link_sag": "soft", "dc_link_ripple": "sawtooth",
-    "magnetizing_saturation": "steel", "magnetic_hysteresis": "widening", "leakage_saturation": "closed_slot",
-    "rotor_skin_effect": "two_cells", "iron_loss": "eddy", "stator_heating": "shared", "rotor_heating": "slow",
-    "sensor_drift": "warm_up", "sensor_nonlinearity": "kink", "shaft_motion": "pendulum",
-    "inductance_anisotropy": "main", "resistance_anisotropy": "cage", "mains_pickup": "distorted",
-    "sensor_lag": "second_order", "clock_drift": "wandering",
+    "dead_time": "clamped",
+    "device_drop": "logarithmic",
+    "dc_link_sag": "soft",
+    "dc_link_ripple": "sawtooth",
+    "magnetizing_saturation": "steel",
+    "magnetic_hysteresis": "widening",
+    "leakage_saturation": "closed_slot",
+    "rotor_skin_effect": "two_cells",
+    "iron_loss": "eddy",
+    "stator_heating": "shared",
+    "rotor_heating": "slow",
+    "sensor_drift": "warm_up",
+    "sensor_nonlinearity": "kink",
+    "shaft_motion": "pendulum",
+    "inductance_anisotropy": "main",
+    "resistance_anisotropy": "cage",
+    "mains_pickup": "distorted",
+    "sensor_lag": "second_order",
+    "clock_drift": "wandering",
 }
 
 
@@ -42,7 +55,9 @@ def draw(seed: int, stratum: str = "one", excitation: str = "rich", only: str = 
     random = np.random.default_rng([seed, STRATA.index(stratum), 11])
     plate, machine = _motor(random)
     document: dict[str, Any] = {
-        "name": f"hidden-{stratum}-{seed}", "nameplate": plate, "machine": machine,
+        "name": f"hidden-{stratum}-{seed}",
+        "nameplate": plate,
+        "machine": machine,
         "power_stage": {"dead_time_s": 0.0, "threshold_v": 0.0, "slope_ohm": 0.0, "link_ripple": 0.0},
         "sensors": _sensors(plate, random),
         "heating": {"stator_per_min": 0.0, "rotor_per_min": 0.0},
@@ -87,8 +102,13 @@ def _sensors(plate: dict[str, Any], random: np.random.Generator) -> dict[str, An
     """An ideal chain but for noise, 50 to 66 dB below the rated peak current."""
     peak = math.sqrt(2.0) * plate["rated_current_a"]
     return {
-        "noise_a": peak * 10.0 ** (-random.uniform(50.0, 66.0) / 20.0), "bits": 0, "full_scale_a": 3.0 * peak,
-        "offset_a": [0.0, 0.0, 0.0], "gain": [1.0, 1.0, 1.0], "delay_s": 0.0, "lag_s": 0.0,
+        "noise_a": peak * 10.0 ** (-random.uniform(50.0, 66.0) / 20.0),
+        "bits": 0,
+        "full_scale_a": 3.0 * peak,
+        "offset_a": [0.0, 0.0, 0.0],
+        "gain": [1.0, 1.0, 1.0],
+        "delay_s": 0.0,
+        "lag_s": 0.0,
     }
 
 
@@ -155,13 +175,16 @@ def tone_voltages(plate: dict[str, Any], machine: Machine, shares: dict[float, f
     rated = plate["rated_voltage_v"] * math.sqrt(2.0 / 3.0) / (2.0 * math.pi * plate["rated_frequency_hz"])
     volts = {f: share * peak * abs(impedance(machine, f)) for f, share in shares.items()}
     flux = sum(
-        v * abs(1.0 - machine.stator_resistance_ohm / impedance(machine, f)) / (2.0 * math.pi * f) for f, v in volts.items()
+        v * abs(1.0 - machine.stator_resistance_ohm / impedance(machine, f)) / (2.0 * math.pi * f)
+        for f, v in volts.items()
     )
     factor = min(1.0, 0.9 * rated / flux)
     return [(v * factor, f) for f, v in volts.items()]
 
 
-def segments(plate: dict[str, Any], machine: dict[str, Any], excitation: str, random: np.random.Generator) -> list[dict]:
+def segments(
+    plate: dict[str, Any], machine: dict[str, Any], excitation: str, random: np.random.Generator
+) -> list[dict]:
     """`rich`: axes 0, 60, 120 and 0 again at two levels, with and without bias. `poor`: one axis, two tones."""
     model = Machine(**machine)
     chosen = FREQUENCIES_HZ if excitation == "rich" else FREQUENCIES_HZ[1:4:2]
@@ -174,7 +197,14 @@ def segments(plate: dict[str, Any], machine: dict[str, Any], excitation: str, ra
     entry = {"tones": tones, "ramp_s": 0.3, "zero_s": 0.5}
     if excitation == "poor":
         return [{**entry, "axis_deg": 0.0, "duration_s": 8.0, "scale": 1.0}]
-    plan = [(0.0, 1.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.35, bias), (60.0, 1.0, 0.0), (60.0, 0.5, 0.0),
-            (120.0, 1.0, 0.0), (120.0, 0.35, bias), (0.0, 1.0, 0.0)]
+    plan = [
+        (0.0, 1.0, 0.0),
+        (0.0, 0.5, 0.0),
+        (0.0, 0.35, bias),
+        (60.0, 1.0, 0.0),
+        (60.0, 0.5, 0.0),
+        (120.0, 1.0, 0.0),
+        (120.0, 0.35, bias),
+        (0.0, 1.0, 0.0),
+    ]
     return [{**entry, "axis_deg": a, "scale": s, "bias_v": b, "duration_s": 6.0} for a, s, b in plan]
-

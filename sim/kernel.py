@@ -15,9 +15,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from sim.compiled import kernel, piece
 
 from sim import layout as at
+from sim.compiled import kernel, piece
 from sim.laws import leakage_excess, saturation_excess, sign_law
 
 HALF_SQRT3 = 0.5 * math.sqrt(3.0)

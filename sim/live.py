@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from sim.compiled import kernel
-
 from sim import layout as at
+from sim.compiled import kernel
 from sim.kernel import advance_period, scratch
 from sim.sensing import between, convert, phase_of, sense
 
@@ -49,7 +48,7 @@ def _has_ended(e, t):
 @kernel
 def _delayed(history, k, delay_periods):
     """Sensed alpha-beta current `delay_periods` before the start of period `k`."""
-    back = int(math.floor(delay_periods))
+    back = math.floor(delay_periods)
     place = 1.0 - (delay_periods - back)
     which = k - 1 - back
     if which < 0:
@@ -64,7 +63,7 @@ def _delayed(history, k, delay_periods):
 def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip):
     """Up to `n` control periods; returns how many ran. Stops early by itself with the reason in c[C_STOP].
 
-    x, p machine; e excitation; s sensing; c int64 counters; white (n, 4) standard normals; history (HISTORY, POINTS, 2);
+    x, p machine; e excitation; s sensing; c int64 counters; white (n, 4) normals; history (HISTORY, POINTS, 2);
     means (CHANNELS,) sums of the sample in the making; ring (capacity, CHANNELS) int16; flags (capacity,) uint8;
     trip (1,) the measured current that tripped.
     """

@@ -116,7 +116,7 @@ class Plant:
 
 def pack(plant: Plant, *, accuracy: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """(p, s): machine and sensing arrays of `layout`; `accuracy` 2 halves the integration step."""
-    from sim import effects  # noqa: PLC0415 - effects builds on the facts above
+    from sim import effects
 
     p, s = np.zeros(at.P_COUNT), np.zeros(at.S_COUNT)
     _pack_machine(plant, p)
@@ -173,7 +173,7 @@ def _pack_sensors(plant: Plant, s: np.ndarray) -> None:
 
 
 def _substeps(p: np.ndarray, accuracy: float) -> float:
-    """Even number of Runge-Kutta steps that keeps step times fastest pole below 0.4 (local error about 1e-4 of that mode).
+    """Even number of Runge-Kutta steps that keeps step times fastest pole below 0.4 (error about 1e-4 of that mode).
 
     The fastest pole is (leg slope near zero current + R_s + R_r) over the leakage inductance.
     """
@@ -257,7 +257,7 @@ def _magnetizing_current(plant: Plant, flux_wb: float) -> float:
 
 def saturated(plant: Plant) -> Machine:
     """The machine with a `magnetizing_saturation` effect, if any, written into its saturation fields."""
-    from dataclasses import replace  # noqa: PLC0415
+    from dataclasses import replace
 
     m = plant.machine
     for effect in plant.effects:

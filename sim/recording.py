@@ -1,4 +1,4 @@
-"""Standstill recordings: excite the simulated machine segment by segment, sample it as a logger would, write the table."""
+"""Standstill recordings: excite the simulated machine segment by segment, sample it as a logger would."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sim.sensing import between, convert, phase_of, sense
 from sim.truth import answer_key
 
 ACCURACY = 4.0
-"""Integration steps are this much finer than the live drive's: the solver's error stays far below the sensor's noise."""
+"""Integration steps are this much finer than the live drive's: the solver's error stays far below the noise."""
 
 Columns = dict[str, np.ndarray]
 UNLISTED = ("voltage_curvature", "sensor_slew", "echo")
@@ -91,7 +91,7 @@ def command_voltage(segment: Segment, period_s: float) -> np.ndarray:
     t = np.arange(round(segment.duration_s / period_s)) * period_s
     ramp = np.clip((t - segment.zero_s) / max(segment.ramp_s, period_s), 0.0, 1.0)
     tones = sum(a * np.cos(2.0 * math.pi * f * t + phase) for a, f, phase in segment.tones)
-    return ramp * (segment.bias_v + segment.scale * tones)
+    return ramp * (segment.bias_v + segment.scale * tones) + 0.0
 
 
 def _unlisted(scenario: Scenario) -> dict[str, float]:
@@ -125,8 +125,9 @@ def _named(plant: Plant, name: str) -> Effect | None:
     return next((e for e in plant.effects if e.name == name), None)
 
 
-def _sample(stretch: _Stretch, number: int, plant: Plant, scenario: Scenario, s: np.ndarray,
-            random: np.random.Generator) -> Columns:
+def _sample(
+    stretch: _Stretch, number: int, plant: Plant, scenario: Scenario, s: np.ndarray, random: np.random.Generator
+) -> Columns:
     """What the logger writes down of one segment."""
     n, period = stretch.command_v.size, plant.control_period_s
     places = _sampling_places(n, plant, s, random, period)
@@ -138,9 +139,14 @@ def _sample(stretch: _Stretch, number: int, plant: Plant, scenario: Scenario, s:
     _spoil(currents, scenario, period)
     link = np.round((stretch.link_v + s[at.S_LINK_NOISE_V] * random.standard_normal(n)) / s[at.S_LINK_LSB_V])
     columns = {
-        "time_s": t, "segment": np.full(n, number, np.int64), "axis_deg": np.full(n, stretch.axis_deg),
-        "voltage_axis_v": stretch.command_v, "current_u_a": currents[:, 0], "current_v_a": currents[:, 1],
-        "current_w_a": currents[:, 2], "dc_link_v": link * s[at.S_LINK_LSB_V],
+        "time_s": t,
+        "segment": np.full(n, number, np.int64),
+        "axis_deg": np.full(n, stretch.axis_deg),
+        "voltage_axis_v": stretch.command_v,
+        "current_u_a": currents[:, 0],
+        "current_v_a": currents[:, 1],
+        "current_w_a": currents[:, 2],
+        "dc_link_v": link * s[at.S_LINK_LSB_V],
     }
     return _lose_rows(columns, plant, random)
 
@@ -204,7 +210,7 @@ def _noise(entry: dict[str, Any], shape: tuple[int, int], random: np.random.Gene
     white = random.standard_normal(shape)
     kind = entry.get("kind", "white")
     if kind == "red":
-        from scipy.signal import lfilter  # noqa: PLC0415
+        from scipy.signal import lfilter
 
         return lfilter([math.sqrt(1.0 - 0.49)], [1.0, -0.7], white, axis=0)
     if kind == "flicker":
@@ -238,9 +244,12 @@ def _limit_slew(currents, step):
 
 def _peaks(stretches: list[_Stretch], s: np.ndarray, plant: Plant) -> dict[str, Any]:
     """True flux peaks per segment and, where it clips, the limit."""
-    out: dict[str, Any] = {"segments": [
-        {"axis_deg": q.axis_deg, "stator_flux_wb": q.stator_flux_wb, "rotor_flux_wb": q.rotor_flux_wb} for q in stretches
-    ]}
+    out: dict[str, Any] = {
+        "segments": [
+            {"axis_deg": q.axis_deg, "stator_flux_wb": q.stator_flux_wb, "rotor_flux_wb": q.rotor_flux_wb}
+            for q in stretches
+        ]
+    }
     if _named(plant, "clipping"):
         out["clip_a"] = float(s[at.S_CLIP_A])
     return out
@@ -266,6 +275,7 @@ def write_table(path: Path, columns: Columns, metadata: dict[str, Any]) -> None:
         return
     if path.suffix not in (".csv", ".gz"):
         raise ValueError(f"{path}: a recording is .csv, .csv.gz or .parquet")
-    with (gzip.open(path, "wb") if path.suffix == ".gz" else path.open("wb")) as file:
+    with gzip.open(path, "wb") if path.suffix == ".gz" else path.open("wb") as file:
         file.write("".join(f"# {k}: {v}\n" for k, v in metadata.items()).encode())
-        pa_csv.write_csv(table, file, pa_csv.WriteOptions(quoting_style="none"))
+        file.write((",".join(columns) + "\n").encode())
+        pa_csv.write_csv(table, file, pa_csv.WriteOptions(include_header=False, quoting_style="none"))

@@ -17,12 +17,43 @@ from sim.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, 
 
 FOLDER = Path(__file__).parent / "scenarios"
 MACHINE_TABLE = FOLDER / "machines.csv"
-TOP = {"name", "kind", "description", "machine", "nameplate", "power_stage", "sensors", "heating", "effects", "drive",
-       "interlocks", "faults", "recording", "firmware_map", "noise", "unlisted"}
+TOP = {
+    "name",
+    "kind",
+    "description",
+    "machine",
+    "nameplate",
+    "power_stage",
+    "sensors",
+    "heating",
+    "effects",
+    "drive",
+    "interlocks",
+    "faults",
+    "recording",
+    "firmware_map",
+    "noise",
+    "unlisted",
+}
 SIGNED = {"offset_a", "shaft_speed_rad_per_s", "heatsink_degc", "winding_degc", "saturation_at_rated_flux"}
 CHOICES = {"saturation_shape": SATURATION_SHAPES, "dead_time_shape": SIGN_SHAPES, "threshold_shape": SIGN_SHAPES}
-MAY_BE_ZERO = {"noise_a", "bits", "delay_s", "lag_s", "link_noise_v", "threshold_v", "slope_ohm", "dead_time_s",
-               "link_ripple", "stator_per_min", "rotor_per_min", "fault_at_start", "serial", "magic", "firmware"}
+MAY_BE_ZERO = {
+    "noise_a",
+    "bits",
+    "delay_s",
+    "lag_s",
+    "link_noise_v",
+    "threshold_v",
+    "slope_ohm",
+    "dead_time_s",
+    "link_ripple",
+    "stator_per_min",
+    "rotor_per_min",
+    "fault_at_start",
+    "serial",
+    "magic",
+    "firmware",
+}
 
 
 class ScenarioError(Exception):
@@ -72,13 +103,27 @@ def find(name: str) -> Path:
     raise ScenarioError(f"there is no scenario {name!r}: give a file, or one of {', '.join(names())}")
 
 
-def read_document(name: str) -> dict[str, Any]:
-    """The TOML of a scenario as it stands; ScenarioError where it is not TOML."""
+def read_document(name: str, depth: int = 0) -> dict[str, Any]:
+    """The TOML of a scenario; `extends` names one it builds on. ScenarioError where it is not TOML or extends itself."""
     path = find(name)
     try:
-        return {"name": path.stem, **tomllib.loads(path.read_text())}
+        document = tomllib.loads(path.read_text())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: not TOML: {error}") from error
+    base = document.pop("extends", None)
+    if base is not None and depth > 4:
+        raise ScenarioError(f"{path}: extends = {base!r} goes in circles")
+    below = read_document(str(base), depth + 1) if base is not None else {}
+    return _laid_over(below, {"name": path.stem, **document})
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """`above` wins key by key; tables are merged, lists replaced."""
+    merged = dict(below)
+    for key, value in above.items():
+        both = isinstance(value, dict) and isinstance(below.get(key), dict)
+        merged[key] = _laid_over(below[key], value) if both else value
+    return merged
 
 
 def load(name: str) -> Scenario:
@@ -95,19 +140,29 @@ def build(document: dict[str, Any], source: str = "scenario") -> Scenario:
     drive = dict(document.get("drive", {}))
     plate, machine = _machine(document, source)
     plant = Plant(
-        plate, machine, _table(PowerStage, document.get("power_stage", {}), source, "power_stage"),
+        plate,
+        machine,
+        _table(PowerStage, document.get("power_stage", {}), source, "power_stage"),
         _table(Sensors, document.get("sensors", {}), source, "sensors"),
         _table(Heating, document.get("heating", {}), source, "heating"),
-        _effects(document.get("effects", {}), source), _positive(drive.pop("control_period_s", 2e-4), source, "drive.control_period_s"),
+        _effects(document.get("effects", {}), source),
+        _positive(drive.pop("control_period_s", 2e-4), source, "drive.control_period_s"),
     )
     recording = document.get("recording", {})
     _check_noise(document, source)
     _known(recording, {"segments", "link_column", "w_column", "pause_s"}, source, "recording.")
     return Scenario(
-        str(document.get("name", "scenario")), kind, plant, _setup(drive, document.get("interlocks", {}), source),
-        tuple(document.get("faults", ())), _segments(recording.get("segments", []), source),
-        bool(recording.get("link_column", True)), bool(recording.get("w_column", True)),
-        float(recording.get("pause_s", 1.0)), int(document.get("firmware_map", {}).get("shift", 0)), document,
+        str(document.get("name", "scenario")),
+        kind,
+        plant,
+        _setup(drive, document.get("interlocks", {}), source),
+        tuple(document.get("faults", ())),
+        _segments(recording.get("segments", []), source),
+        bool(recording.get("link_column", True)),
+        bool(recording.get("w_column", True)),
+        float(recording.get("pause_s", 1.0)),
+        int(document.get("firmware_map", {}).get("shift", 0)),
+        document,
     )
 
 
@@ -180,7 +235,9 @@ def table_rows() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def table_machine(row_id: str, saturation: float, source: str = "machines.csv") -> tuple[dict[str, Any], dict[str, Any]]:
+def table_machine(
+    row_id: str, saturation: float, source: str = "machines.csv"
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """(nameplate, Gamma machine) of a row; the row's inductance is taken as the secant value at rated flux.
 
     Gamma from T: g = L_s/L_m; L_leak = g L_ls + g^2 L_lr, R_r' = g^2 R_r.
@@ -194,13 +251,17 @@ def table_machine(row_id: str, saturation: float, source: str = "machines.csv") 
     g = ls / value["Lm_mH"]
     speed = 60.0 * value["f_Hz"] / (value["poles"] / 2)
     plate = {
-        "rated_power_w": 1e3 * value["P_kW"], "rated_voltage_v": value["V_LL"], "rated_frequency_hz": value["f_Hz"],
+        "rated_power_w": 1e3 * value["P_kW"],
+        "rated_voltage_v": value["V_LL"],
+        "rated_frequency_hz": value["f_Hz"],
         "rated_current_a": value.get("I_n_A", value["I_calc_A"]),
         "rated_speed_rpm": value.get("n_n_rpm", speed * (1.0 - value["slip_calc"])),
-        "power_factor": value.get("pf_n", value["pf_calc"]), "pole_pairs": round(value["poles"] / 2),
+        "power_factor": value.get("pf_n", value["pf_calc"]),
+        "pole_pairs": round(value["poles"] / 2),
     }
     machine = {
-        "stator_resistance_ohm": value["Rs_ohm"], "rotor_resistance_ohm": g * g * value["Rr_ohm"],
+        "stator_resistance_ohm": value["Rs_ohm"],
+        "rotor_resistance_ohm": g * g * value["Rr_ohm"],
         "leakage_inductance_h": 1e-3 * (g * value["Lls_mH"] + g * g * value["Llr_mH"]),
         "inductance_h": 1e-3 * ls * (1.0 + saturation),
     }
@@ -264,9 +325,13 @@ def _segments(entries: Any, source: str) -> tuple[Segment, ...]:
         _known(entry, allowed, source, f"recording.segments[{j}].")
         tones = tuple(tuple(float(v) for v in tone) for tone in entry.get("tones", ()))
         if any(len(tone) != 3 for tone in tones):
-            raise ScenarioError(f"{source}: recording.segments[{j}].tones must be [amplitude_v, frequency_hz, phase_rad]")
+            raise ScenarioError(
+                f"{source}: recording.segments[{j}].tones must be [amplitude_v, frequency_hz, phase_rad]"
+            )
         segment = Segment(**{**entry, "tones": tones})
         if not 0.0 < segment.duration_s <= 3600.0:
-            raise ScenarioError(f"{source}: recording.segments[{j}].duration_s = {segment.duration_s} must be in (0, 3600]")
+            raise ScenarioError(
+                f"{source}: recording.segments[{j}].duration_s = {segment.duration_s} must be in (0, 3600]"
+            )
         segments.append(segment)
     return tuple(segments)

@@ -69,8 +69,13 @@ class Drive:
             for name, value in zip(self.map.document["parameters"]["order"], setup.parameters, strict=True)
         ]
         self.firmware = Firmware(
-            scenario.plant, self.map, setup, Memory(options.nvm, factory), options.seed,
-            StateLog(options.state_log), time.monotonic if options.speed == 0.0 else None,
+            scenario.plant,
+            self.map,
+            setup,
+            Memory(options.nvm, factory),
+            options.seed,
+            StateLog(options.state_log),
+            time.monotonic if options.speed == 0.0 else None,
         )
         self.firmware.before_command = lambda command: self.plan.before_command(command, self.firmware)
         self.plan.arm(self.firmware)
@@ -129,7 +134,9 @@ def _exception(answer: Answer) -> ExcCodes | None:
 
 def sim_device(drive: Drive) -> SimDevice:
     """pymodbus's description of the register space: one block per run of mapped addresses."""
-    addresses = sorted({*drive.map.by_address, *range(drive.map.window_address, drive.map.window_address + drive.map.window_words)})
+    addresses = sorted(
+        {*drive.map.by_address, *range(drive.map.window_address, drive.map.window_address + drive.map.window_words)}
+    )
     blocks: list[list[int]] = []
     for address in addresses:
         if blocks and address == blocks[-1][-1] + 1:
@@ -333,19 +340,45 @@ class PtyTransport(asyncio.Transport):
 def _lines(drive: Drive, options: Options) -> list[Line]:
     lines = []
     if options.tcp_port >= 0:
-        lines.append(Line(drive, "tcp", lambda port=options.tcp_port: ModbusTcpServer(
-            sim_device(drive), address=("127.0.0.1", port))))
+        lines.append(
+            Line(
+                drive,
+                "tcp",
+                lambda port=options.tcp_port: ModbusTcpServer(sim_device(drive), address=("127.0.0.1", port)),
+            )
+        )
     if options.tls_port >= 0:
-        lines.append(Line(drive, "tls", lambda port=options.tls_port: ModbusTlsServer(
-            sim_device(drive), address=("127.0.0.1", port), sslctx=options.tls_context)))
+        lines.append(
+            Line(
+                drive,
+                "tls",
+                lambda port=options.tls_port: ModbusTlsServer(
+                    sim_device(drive), address=("127.0.0.1", port), sslctx=options.tls_context
+                ),
+            )
+        )
     if options.rtu:
-        lines.append(Line(drive, "rtu", lambda: ModbusSerialServer(
-            sim_device(drive), framer=FramerType.RTU, port=options.rtu, baudrate=options.baud, parity=options.parity)))
+        lines.append(
+            Line(
+                drive,
+                "rtu",
+                lambda: ModbusSerialServer(
+                    sim_device(drive),
+                    framer=FramerType.RTU,
+                    port=options.rtu,
+                    baudrate=options.baud,
+                    parity=options.parity,
+                ),
+            )
+        )
     return lines
 
 
 async def serve(
-    scenario: Scenario, options: Options, announce: Callable[[str], None], stop: asyncio.Event | None = None,
+    scenario: Scenario,
+    options: Options,
+    announce: Callable[[str], None],
+    stop: asyncio.Event | None = None,
     ready: Callable[[Drive], None] | None = None,
 ) -> None:
     """Serve until `stop` is set or the task is cancelled; `announce` gets one `listening KIND ADDRESS` per line."""
@@ -366,6 +399,7 @@ async def serve(
     finally:
         for line in lines:
             await line.close()
+        drive.firmware.log.close()
 
 
 async def _tick(drive: Drive, stop: asyncio.Event) -> None:
@@ -410,7 +444,7 @@ def run_in_thread(scenario: Scenario, options: Options) -> Iterator[Running]:
     def target() -> None:
         try:
             asyncio.run(main())
-        except BaseException as error:  # noqa: BLE001 - handed to the caller below
+        except BaseException as error:
             failure.append(error)
         finally:
             started.set()

@@ -19,3 +19,8 @@ class StateLog:
             return
         line = {"event": event, "wall": time.time(), "t": round(motor_time_s, 6), **facts}
         self.file.write(json.dumps(line, default=float) + "\n")
+
+    def close(self) -> None:
+        if self.file is not None:
+            self.file.close()
+            self.file = None

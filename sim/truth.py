@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from sim import effects
 from sim import layout as at
@@ -40,10 +41,13 @@ def answer_key(scenario: Scenario, seed: int = 0) -> dict[str, Any]:
         "sensors": dataclasses.asdict(plant.sensors),
         "heating": dataclasses.asdict(plant.heating),
         "effects": effect_list(plant),
-        "drive_parameters": dict(zip(
-            ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"),
-            scenario.setup.parameters, strict=True,
-        )),
+        "drive_parameters": dict(
+            zip(
+                ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"),
+                scenario.setup.parameters,
+                strict=True,
+            )
+        ),
     }
 
 
@@ -75,15 +79,31 @@ def leg_error_v(plant: Plant, current_a: float) -> float:
 
 
 def axis_error_v(plant: Plant, axis_deg: float, current_a: float) -> float:
-    """Voltage error (V) along a test axis that carries this DC current: the three legs projected onto the axis."""
+    """Voltage error (V) along a test axis that carries this DC current.
+
+    Off the multiples of 30 degrees the legs also push across the axis; the cross current that answers is found first.
+    """
+    resistance = plant.machine.stator_resistance_ohm
+    cross = brentq(lambda c: resistance * c + _leg_errors(plant, axis_deg, current_a, c)[1], -20.0, 20.0)
+    return _leg_errors(plant, axis_deg, current_a, float(cross))[0]
+
+
+def _leg_errors(plant: Plant, axis_deg: float, along_a: float, across_a: float) -> tuple[float, float]:
+    """Leg errors (V) projected along and across the axis, for a current with both components."""
     angles = np.radians(axis_deg) - np.array([0.0, 2.0, -2.0]) * np.pi / 3.0
-    return float(2.0 / 3.0 * sum(np.cos(a) * leg_error_v(plant, current_a * float(np.cos(a))) for a in angles))
+    errors = [leg_error_v(plant, float(along_a * np.cos(a) - across_a * np.sin(a))) for a in angles]
+    return float(2.0 / 3.0 * np.dot(errors, np.cos(angles))), float(-2.0 / 3.0 * np.dot(errors, np.sin(angles)))
 
 
 def effect_list(plant: Plant) -> list[dict[str, Any]]:
     """Names, sizes in engineering units and shapes of the named effects that were put in."""
     return [
-        {"name": e.name, "size": e.size, "unit": effects.CATALOGUE[e.name].unit,
-         "shape": e.shape or effects.CATALOGUE[e.name].shapes[0], **e.details}
+        {
+            "name": e.name,
+            "size": e.size,
+            "unit": effects.CATALOGUE[e.name].unit,
+            "shape": e.shape or effects.CATALOGUE[e.name].shapes[0],
+            **e.details,
+        }
         for e in plant.effects
     ]
