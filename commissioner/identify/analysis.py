@@ -39,7 +39,9 @@ Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
 WORST_RELATIVE_STD = 0.25
 EXTRA_POWERS = 4
-FINAL_REVIEWS = 2
+FINAL_REVIEWS = 6
+BLOCK = 500
+COARSE = 0.03  # of a standard error, while models are compared
 KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.4)
 """Knots of the leg error, in fractions of the largest current; beyond the last it is constant."""
 COPPER_ZERO_DEGC = -234.5
@@ -120,11 +122,9 @@ def identify(
     _require_tones(examined, recording.sample_period_s)
     tests = _by_test(examined)
     results: list[AxisResult] = []
-    guess, leg = start, inverter
     for stretches in tests:
-        result = _identify_axis(stretches, plate, recording.sample_period_s, estimator, guess, leg)
-        guess, leg = result.batch.gamma.as_inverse_gamma(), result.batch.inverter() or leg
-        results.append(result)
+        like = results[0].batch if results else None
+        results.append(_identify_axis(stretches, plate, recording.sample_period_s, estimator, start, inverter, like))
     return _summary(results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption)
 
 
@@ -151,21 +151,23 @@ def _by_test(examined: Audit) -> list[list[Stretch]]:
 
 def _identify_axis(
     stretches: Sequence[Stretch], plate: Nameplate, period_s: float, estimator: Estimator, guess: InverseGamma | None,
-    leg: InverterError | None,
+    leg: InverterError | None, like: BatchFit | None,
 ) -> AxisResult:
     box = prior(plate)
     stairs = _staircase(stretches)
     first_leg = leg or (stairs.inverter if stairs else None)
     axis_deg = stretches[0].axis_deg
     span = 1.5 * max(float(np.max(np.abs(s.current_a))) for s in stretches)
-    first = _first_estimate(stretches, plate, box, period_s, guess, first_leg, span)
     segments = [Segment(s.voltage_v, s.current_a, s.axis_deg, s.starts_at_rest, s.kind) for s in stretches]
-    batch = _select(segments, period_s, first, first_leg)
+    if like is None:
+        first = _first_estimate(stretches, plate, box, period_s, guess, first_leg, span)
+        batch = _select(segments, period_s, first, first_leg)
+    else:
+        batch = fit_segments(segments, period_s, like.gamma.as_inverse_gamma(), like.model, like.theta)
     _require_conditioned(batch)
     compensation = batch.compensation(axis_deg, span)
     law: Literal["fast", "lyapunov"] = "lyapunov" if estimator == "lyapunov" else "fast"
-    blocks, observer = _observe(stretches, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
-    seen = blocks.parameters
+    seen, observer = _observe(stretches, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
     flux = batch.peak_flux_wb
     at_flux, covariance = batch.inverse_gamma_at(flux)
     linear = batch.inverse_gamma_at(0.0)[0]
@@ -192,25 +194,57 @@ class _Observed:
 def _observe(
     stretches: Sequence[Stretch], plate: Nameplate, box: ParameterBox, period_s: float, compensation: Compensation,
     law: Literal["fast", "lyapunov"], start: InverseGamma | None,
-) -> tuple[BlockEstimate, _Observed]:
+) -> tuple[InverseGamma, _Observed]:
     """The online observer over all stretches in turn; segments are holes of unknown length to it."""
     observer = ParallelObserver(
         box, period_s, plate.rated_current_peak_a, law=law, start=start, compensation=compensation,
         starts_at_rest=stretches[0].starts_at_rest,
         expected_voltage_v=np.concatenate([s.voltage_v for s in stretches]) if law == "lyapunov" else None,
     )
-    residuals, rotor, block = [], 0.0, None
+    average = _Average(sum(s.voltage_v.size for s in stretches))
     for k, stretch in enumerate(stretches):
         lost = stretch.lost_before if stretch.lost_before or stretch.starts_at_rest or not k else 1
-        block = observer.advance(stretch.voltage_v, stretch.current_a, lost, begins_at_rest=stretch.starts_at_rest)
-        residuals.append(stretch.current_a - block.current_a)
-        rotor = max(rotor, float(np.max(np.abs(block.rotor_flux_wb))))
-    assert block is not None
-    for _ in range(FINAL_REVIEWS if law == "fast" else 0):
-        observer.review()
-    block = replace(block, parameters=observer.parameters, std=observer.std())
+        at_rest = stretch.starts_at_rest
+        for a in range(0, stretch.voltage_v.size, BLOCK if law == "lyapunov" else stretch.voltage_v.size):
+            part = slice(a, a + BLOCK if law == "lyapunov" else None)
+            block = observer.advance(stretch.voltage_v[part], stretch.current_a[part], lost, begins_at_rest=at_rest)
+            average.add(block)
+            lost, at_rest = 0, False
+    if law == "fast":
+        _review_until_still(observer)
+    signals = observer.predicted(None if law == "fast" else average.parameters)
+    residuals = tuple(r.current_a - c for r, (c, _, _) in zip(observer.history, signals, strict=True))
+    rotor = max(float(np.max(np.abs(flux))) for _, flux, _ in signals)
     rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
-    return block, _Observed(tuple(residuals), rms, rotor)
+    parameters = observer.parameters if law == "fast" else average.parameters
+    return parameters, _Observed(residuals, rms, rotor)
+
+
+class _Average:
+    """The seed's result of the gradient law: the mean of its estimates over the last sixth of the run (150-180 s of 180)."""
+
+    def __init__(self, total: int) -> None:
+        self._from = total * 5 // 6
+        self._sum, self._count = np.zeros(4), 0
+
+    def add(self, block: BlockEstimate) -> None:
+        if block.samples >= self._from:
+            self._sum += block.parameters.as_tuple()
+            self._count += 1
+
+    @property
+    def parameters(self) -> InverseGamma:
+        a, b, c, d = map(float, self._sum / self._count)
+        return InverseGamma(a, b, c, d)
+
+
+def _review_until_still(observer: ParallelObserver) -> None:
+    """Nothing more will come: go over the data until the estimate moves by less than a twentieth of its errors."""
+    for _ in range(FINAL_REVIEWS):
+        before = np.array(observer.parameters.as_tuple())
+        observer.review()
+        if np.all(np.abs(np.array(observer.parameters.as_tuple()) - before) < 0.05 * np.array(observer.std())):
+            return
 
 
 def _first_estimate(
@@ -221,8 +255,7 @@ def _first_estimate(
     if leg is not None:
         grid = np.linspace(0.0, span_a, 1025)
         compensation = Compensation(leg.on_axis(grid, stretches[0].axis_deg), span_a)
-    block, _ = _observe(stretches, plate, box, period_s, compensation, "fast", guess)
-    return block.parameters
+    return _observe(stretches, plate, box, period_s, compensation, "fast", guess)[0]
 
 
 def _select(
@@ -233,7 +266,7 @@ def _select(
     largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
     knots = tuple(f * largest for f in KNOT_FRACTIONS)
     model = ModelChoice(knots_a=knots if leg else ())
-    best = fit_segments(segments, period_s, start, model, start_theta(start, model, leg))
+    best = fit_segments(segments, period_s, start, model, start_theta(start, model, leg), tolerance=COARSE)
     model = replace(model, flux_scale_wb=best.peak_flux_wb)
     best, tried = replace(best, model=model), {model}
     while True:
@@ -243,12 +276,13 @@ def _select(
             replace(m, knots_a=() if m.knots_a and not _loses_voltage(best) else knots),
         )
         trials = [
-            fit_segments(segments, period_s, start, t, extended(best, t)) for t in toggled if t not in tried
+            fit_segments(segments, period_s, start, t, extended(best, t), tolerance=COARSE)
+            for t in toggled if t not in tried
         ]
         tried.update(toggled)
         better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
         if not better:
-            return best
+            return fit_segments(segments, period_s, start, best.model, best.theta)
         best = min(better, key=lambda t: t.criterion())
 
 

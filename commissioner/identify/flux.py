@@ -29,6 +29,7 @@ BACK_OFF_ABOVE = 0.99
 ABORT_ABOVE = 1.01
 MAX_RAISE = 2.0
 AGREEMENT = 0.12
+SURE_LOSS = 0.8
 
 
 class FluxAdvice(enum.Enum):
@@ -75,9 +76,15 @@ class FluxGuard:
 
     @property
     def safe_scale(self) -> float:
-        """The scale at which no motor whatever can pass the limit."""
+        """The scale at which no motor whatever can pass the limit, beyond what the inverter keeps to itself.
+
+        Below the measured dead band no current flows and no flux builds; `SURE_LOSS` of it is counted on.
+        """
         bias = 1.0 if self.excitation.dc_bias_v == 0.0 else 0.5
-        return min(1.0, bias * self.limit_wb / max(self._bound_wb(), 1e-12))
+        command_v = sum(t.amplitude_v for t in self.excitation.tones)
+        lost_v = SURE_LOSS * max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
+        beyond = bias * self.limit_wb / max(self._bound_wb(), 1e-12)
+        return min(1.0, beyond + lost_v / max(command_v, 1e-12))
 
     def advance(
         self, voltage_v: Signal, current_a: Signal, estimate: BlockEstimate, present_scale: float, lost_before: int = 0

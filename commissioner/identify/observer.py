@@ -70,7 +70,9 @@ class _Shell:
 
 
 @dataclass(frozen=True)
-class _Piece:
+class StoredBlock:
+    """A block as `advance` took it in (or a part of one)."""
+
     voltage_v: Signal
     current_a: Signal
     restarts: bool
@@ -94,7 +96,7 @@ class ParallelObserver:
     start: InverseGamma | None = None
     compensation: Compensation = NOTHING
     starts_at_rest: bool = True
-    memory_s: float = 120.0
+    memory_s: float = 240.0
     dead_zone_a: float = 0.0
     expected_voltage_v: Signal | None = None
     lost_samples: int = field(default=0, init=False)
@@ -110,7 +112,7 @@ class ParallelObserver:
             if self.expected_voltage_v is not None:
                 self._gamma = self._gain_matrix(self.expected_voltage_v)
         self._shell = self._fresh(first, self.current_scale_a**2)
-        self._history: list[_Piece] = []
+        self._history: list[StoredBlock] = []
         self._samples = 0
         self._next_review = max(FIRST_REVIEW_S / self.sample_period_s, 100.0)
         self._first = True
@@ -142,11 +144,11 @@ class ParallelObserver:
         restarts &= not begins_at_rest
         self.restarts += int(restarts and not self._first)
         self._first = False
-        return self._advance_with_reviews(_Piece(voltage_v, current_a, restarts, begins_at_rest, bridged))
+        return self._advance_with_reviews(StoredBlock(voltage_v, current_a, restarts, begins_at_rest, bridged))
 
     # -- the parts ------------------------------------------------------------------------------------------------
 
-    def _advance_with_reviews(self, piece: _Piece) -> BlockEstimate:
+    def _advance_with_reviews(self, piece: StoredBlock) -> BlockEstimate:
         """Split the block where the stored data have doubled, and go over them again there."""
         signals: list[tuple[Signal, Signal, Signal]] = []
         squares = 0.0
@@ -154,7 +156,7 @@ class ParallelObserver:
         done = 0
         while done < total or not signals:
             cut = total if self.law != "fast" else min(total, done + max(1, int(self._next_review) - self._samples))
-            part = _Piece(
+            part = StoredBlock(
                 piece.voltage_v[done:cut], piece.current_a[done:cut], piece.restarts and done == 0,
                 piece.begins_at_rest and done == 0, piece.open_loop_v if done == 0 else None,
             )
@@ -177,18 +179,18 @@ class ParallelObserver:
             restarts=self.restarts,
         )
 
-    def _remember(self, part: _Piece) -> None:
-        if self.law != "fast" or self._next_review * self.sample_period_s > self.memory_s:
+    def _remember(self, part: StoredBlock) -> None:
+        if self._samples * self.sample_period_s > self.memory_s:
             self._history.clear()
             return
         self._history.append(part)
-        if self._samples >= int(self._next_review):
+        if self.law == "fast" and self._samples >= int(self._next_review):
             self.review()
             self._next_review *= 2.0
 
     def review(self) -> None:
         """Go over the stored data once more from the present estimate (one Gauss-Newton step of the recursion)."""
-        if not self._history:
+        if not self._history or self.law != "fast":
             return
         # The noise of the last pass includes the model's error, which the new pass starts without.
         fresh = self._fresh(self.parameters, float(self._shell.state[kernels.NOISE]), around_start=True)
@@ -197,9 +199,14 @@ class ParallelObserver:
         if np.all(np.isfinite(fresh.theta)) and self._is_machine(fresh.theta):
             self._shell = fresh
 
-    def predicted(self) -> list[tuple[Signal, Signal, Signal]]:
-        """(current, rotor flux, stator flux) of the stored blocks, simulated with the present parameters held."""
-        held = self._fresh(self.parameters, 0.0)
+    @property
+    def history(self) -> tuple[StoredBlock, ...]:
+        """The blocks still stored, as they came in."""
+        return tuple(self._history)
+
+    def predicted(self, machine: InverseGamma | None = None) -> list[tuple[Signal, Signal, Signal]]:
+        """(current, rotor flux, stator flux) of the stored blocks, simulated with a machine (the present one) held."""
+        held = self._fresh(machine or self.parameters, 0.0)
         held.theta[4] = self._shell.theta[4]
         out = []
         for piece in self._history:
@@ -211,7 +218,7 @@ class ParallelObserver:
     def _is_machine(self, theta: Matrix) -> bool:
         return bool(kernels.machine_from_theta(theta, self._filter, self.sample_period_s, np.empty(4)))
 
-    def _run(self, shell: _Shell, piece: _Piece) -> tuple[Signal, Signal, Signal]:
+    def _run(self, shell: _Shell, piece: StoredBlock) -> tuple[Signal, Signal, Signal]:
         if piece.restarts or piece.begins_at_rest:
             _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
