@@ -1,4 +1,4 @@
-"""Configuration files in, frozen dataclasses out. A file that says something impossible names file, key, value, remedy."""
+"""Configuration files in, frozen dataclasses out. What is impossible is refused with file, key, value and remedy."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_motor(name_or_path: str) -> Nameplate:
-    """The nameplate in `config/motors/NAME.toml` or in a file. Raises ConfigurationError where the plate is impossible."""
+    """The nameplate in `config/motors/NAME.toml` or in a file. ConfigurationError: the plate is impossible."""
     path = _resolve(name_or_path, "motors")
     model = _load(path, MotorFile)
     nameplate = Nameplate(**model.model_dump(exclude={"name"}))

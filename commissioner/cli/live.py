@@ -51,6 +51,11 @@ class LiveView:
                     f"    R_s {record.stator_resistance_ohm:.4g} ± {record.stator_resistance_std_ohm:.2g} Ω, "
                     f"inverter loses {record.error_voltage_v:.3g} V on the axis"
                 )
+            case told.FirstLook(parameters=(r_s, r_r, l_s, l_m)):
+                self._line(
+                    f"    first look: R_s {r_s:.4g}, R_R {r_r:.4g} Ω, L_σ {1e3 * l_s:.4g}, L_M {1e3 * l_m:.4g} mH, "
+                    f"a leg loses {record.leg_error_v:.3g} V"
+                )
             case told.ExcitationChosen():
                 tones = ", ".join(f"{f:g} Hz {a:.3g} V" for a, f, _ in record.tones)
                 self._line(f"    {record.seconds:g} s of {tones}")

@@ -28,7 +28,7 @@ TARGET = 0.96
 BACK_OFF_ABOVE = 0.99
 ABORT_ABOVE = 1.01
 MAX_RAISE = 2.0
-AGREEMENT = 0.12
+AGREEMENT = 0.3
 SURE_LOSS = 0.8
 
 
@@ -81,10 +81,14 @@ class FluxGuard:
         Below the measured dead band no current flows and no flux builds; `SURE_LOSS` of it is counted on.
         """
         bias = 1.0 if self.excitation.dc_bias_v == 0.0 else 0.5
+        return min(1.0, bias * self.limit_wb / max(self._bound_wb(), 1e-12) + self._lost_scale)
+
+    @property
+    def _lost_scale(self) -> float:
+        """The part of the scale that the inverter surely keeps to itself."""
         command_v = sum(t.amplitude_v for t in self.excitation.tones)
-        lost_v = SURE_LOSS * max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
-        beyond = bias * self.limit_wb / max(self._bound_wb(), 1e-12)
-        return min(1.0, beyond + lost_v / max(command_v, 1e-12))
+        lost_v = max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
+        return SURE_LOSS * lost_v / max(command_v, 1e-12)
 
     def advance(
         self, voltage_v: Signal, current_a: Signal, estimate: BlockEstimate, present_scale: float, lost_before: int = 0
@@ -183,21 +187,23 @@ class FluxGuard:
             stator_resistance_ohm=max(r_s - 3.0 * s[0], 0.5 * r_s),
             magnetizing_inductance_h=l_m + min(3.0 * s[3], l_m),
         )
-        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12)
+        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12) + self._lost_scale
         self._granted = max(safe, min(1.0, by_model, MAX_RAISE * max(scale, safe)))
         return self._granted
 
     def _confirms(self, estimate: BlockEstimate, current_a: Signal) -> bool:
-        """Both flux estimates have agreed over a quarter of the lowest tone, and the observer explains the current."""
+        """Both flux estimates have agreed over a quarter of the lowest tone, and the observer explains the current.
+
+        The larger of the two is what is limited, so they need not agree better than one raise may be wrong by.
+        """
         if len(self._recent) < 2 or self._recent[-1][0] - self._recent[0][0] < 0.8 * self._window_s:
             return False
-        reached = max(r[2] for r in self._recent)
         difference = max(r[1] for r in self._recent)
         rms = float(np.sqrt(np.mean(current_a**2)))
         explained = estimate.residual_rms_a < max(0.2 * rms, 3.0 * estimate.noise_a)
         certain = estimate.std[0] < 0.1 * estimate.parameters.stator_resistance_ohm
         certain &= estimate.std[3] < 0.2 * estimate.parameters.magnetizing_inductance_h
-        return bool(difference < AGREEMENT * max(reached, 0.05 * self.limit_wb) and explained and certain)
+        return bool(difference < AGREEMENT * self.limit_wb and explained and certain)
 
     def _advise(self, fraction: float, reached: float, scale: float, permitted: float) -> tuple[FluxAdvice, float]:
         if fraction <= BACK_OFF_ABOVE:

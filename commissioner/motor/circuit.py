@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +38,9 @@ class InverseGamma:
 
     def as_tuple(self) -> tuple[float, float, float, float]:
         """(R_s, R_R, L_sigma, L_M)."""
-        return astuple(self)
+        return (
+            self.stator_resistance_ohm, self.rotor_resistance_ohm, self.leakage_inductance_h, self.magnetizing_inductance_h
+        )
 
 
 @dataclass(frozen=True)

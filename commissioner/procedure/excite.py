@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from commissioner.errors import Aborted
 from commissioner.identify import excitation, resistance
+from commissioner.identify.analysis import identify
 from commissioner.identify.compensation import Compensation
 from commissioner.identify.convergence import Settling, settled
 from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
@@ -18,11 +19,12 @@ from commissioner.identify.observer import BlockEstimate, ParallelObserver
 from commissioner.identify.resistance import DcLevel, InverterError, StaircaseLimits
 from commissioner.motor.nameplate import prior
 from commissioner.motor.space_vector import axis_current_a
-from commissioner.motor.standstill import poles_per_s
+from commissioner.procedure.assembly import assemble
 from commissioner.procedure.findings import (
     AxisFinished,
     EstimateUpdated,
     ExcitationChosen,
+    FirstLook,
     GuardActed,
     StaircaseFitted,
     StepProgress,
@@ -36,12 +38,13 @@ TELL_EVERY_S = 0.1
 """Motor time between two estimates in the journal."""
 BIAS_RAMP_PER_S = 4.0
 """The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
-CLIMB_S = 0.5
 CLIMB_STEP_S = 0.02
 RUNGS = (1.0, 0.6, 0.3)
 """DC levels of one sign, of the top current."""
 SETTLED = 0.006
 COMPENSATION_ROWS = 1025
+OFFSET_S = 0.1
+"""Enabled without voltage before each test: what the current sensors show then is their offset."""
 FIRST_LOOK = 0.25
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
@@ -56,6 +59,7 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     yield LoadExcitation(axis_deg, (), BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
     yield Enable("DC staircase")
     findings.segment += 1
+    yield from stair.zero()
     voltages = findings.dc_voltages_v or (yield from stair.climb())
     for voltage_v in (*voltages, *(-v for v in reversed(voltages))):
         yield from stair.hold(voltage_v)
@@ -80,6 +84,7 @@ class _Stair:
     axis_deg: float
     levels: list[DcLevel] = field(default_factory=list)
     seconds: float = 0.0
+    offset_a: float = 0.0
 
     def __post_init__(self) -> None:
         job = self.job
@@ -87,25 +92,24 @@ class _Stair:
             job.test_current_a, job.flux_limit_wb(self.findings.resistance_ohm(job)), job.test_voltage_v
         )
         self._plan = resistance.staircase(job.nameplate, limits)
-        self._window_s = 0.5 / -poles_per_s(prior(job.nameplate).typical)[0]
+
+    def zero(self) -> Generator[Command, Any, None]:
+        """Before any voltage: what the sensors show is offset."""
+        self.offset_a = yield from _measure_offset(self.findings, "DC staircase", self.axis_deg)
+        self.seconds += OFFSET_S
 
     def climb(self) -> Generator[Command, Any, tuple[float, ...]]:
-        """Raise the bias slowly until the top current flows; the voltages of a few rungs below it, largest first.
-
-        The rate drives the top current through the typical resistance in `CLIMB_S`, whatever dead time adds before.
-        """
-        top_a = self._plan.top_current_a
-        rate = top_a * prior(self.job.nameplate).typical.stator_resistance_ohm / CLIMB_S
-        voltage_v, asked_s, path = 0.0, 0.0, [(0.0, 0.0)]
-        while path[-1][1] < top_a and voltage_v < self.job.test_voltage_v:
-            if self.seconds >= asked_s:
-                voltage_v = min(voltage_v + rate * CLIMB_STEP_S, self.job.test_voltage_v)
-                asked_s = self.seconds + CLIMB_STEP_S
-                yield SetBias(voltage_v)
-            block = yield from self._fetch()
-            path.append((float(block.voltage_axis_v[-1]), float(np.mean(_along_axis(block)))))
-        volts, amperes = np.array(path).T
-        reached = np.maximum.accumulate(amperes)
+        """Raise the bias slowly until the top current flows; the voltages of a few rungs below it, largest first."""
+        top_a, volts, reached = self._plan.top_current_a, [0.0], [0.0]
+        while reached[-1] < top_a and volts[-1] < self.job.test_voltage_v:
+            volts.append(min(volts[-1] + self._plan.climb_v_per_s * CLIMB_STEP_S, self.job.test_voltage_v))
+            yield SetBias(volts[-1])
+            step_s, current = 0.0, np.zeros(0)
+            while step_s < CLIMB_STEP_S:
+                block = yield from self._fetch()
+                current = self._current(block)
+                step_s += block.count * block.sample_period_s
+            reached.append(max(reached[-1], float(np.mean(current))))
         if reached[-1] < 0.3 * top_a:
             raise Aborted(
                 "no current flows", step=f"DC staircase, axis {self.axis_deg:g} deg", value=f"{reached[-1]:.3g} A",
@@ -118,10 +122,10 @@ class _Stair:
         """Hold a level until its current has settled; keep the means of the last window."""
         yield SetBias(voltage_v)
         voltage, current, passed_s = np.zeros(0), np.zeros(0), 0.0
-        while passed_s < self._plan.dwell_s and not self._has_settled(current):
+        while passed_s < self._plan.longest_dwell_s and not self._has_settled(current):
             block = yield from self._fetch()
             voltage = np.append(voltage, block.voltage_axis_v)
-            current = np.append(current, _along_axis(block))
+            current = np.append(current, self._current(block))
             passed_s += block.count * block.sample_period_s
         tail = slice(-self._window_samples, None)
         spread = float(np.std(current[tail])) / np.sqrt(self._window_samples)
@@ -130,7 +134,7 @@ class _Stair:
     @property
     def _window_samples(self) -> int:
         assert self.findings.identity is not None
-        return max(8, round(self._window_s / self.findings.identity.control_period_s))
+        return max(8, round(self._plan.window_s / self.findings.identity.control_period_s))
 
     def _has_settled(self, current: Signal) -> bool:
         """The means of the last three windows differ by less than `SETTLED` of the top current."""
@@ -139,6 +143,9 @@ class _Stair:
             return False
         means = [float(np.mean(current[current.size - k * n : current.size - (k - 1) * n])) for k in (1, 2, 3)]
         return max(means) - min(means) < SETTLED * self._plan.top_current_a
+
+    def _current(self, block: SampleBlock) -> Signal:
+        return _along_axis(block) - self.offset_a
 
     def _fetch(self) -> Generator[Command, Any, SampleBlock]:
         block = yield from _next_block(self.findings, "DC staircase", self.axis_deg)
@@ -161,19 +168,30 @@ def excite(job: Job, findings: Findings) -> Step:
     axis_deg = job.plan.tests_deg[findings.tests_done]
     seconds = job.plan.excitation.seconds * job.stretch
     limits = _excitation_limits(job, findings)
-    inverter = findings.staircases[-1].inverter
-    resistance_ohm = findings.resistance_ohm(job)
-    if findings.estimate is None:
-        guess = excitation.first_guess(job.nameplate, resistance_ohm, limits)
+    if findings.first_look is None:
+        guess = excitation.first_guess(job.nameplate, findings.resistance_ohm(job), limits)
         yield from _test(job, findings, axis_deg, guess, FIRST_LOOK * seconds)
+        yield from _look_closer(job, findings)
     assert findings.estimate is not None
-    assert findings.identity is not None
     chosen = excitation.design(
-        job.nameplate, findings.estimate, limits, findings.identity.control_period_s, inverter, seconds
+        job.nameplate, findings.estimate, limits, _period_s(findings), findings.inverter, seconds
     )
     yield from _test(job, findings, axis_deg, chosen, seconds)
     findings.tests_done += 1
     return Event.AXES_DONE if findings.tests_done == len(job.plan.tests_deg) else Event.AXIS_DONE
+
+
+def _look_closer(job: Job, findings: Findings) -> Generator[Command, Any, None]:
+    """Batch fit of the staircase and the first look together, the motor de-energised meanwhile.
+
+    It separates resistance from the inverter's lost voltage, which design, observer and guard need from here on.
+    """
+    recording = assemble(findings.blocks, {}, "first look")
+    assert recording is not None
+    look = identify(recording, job.nameplate, "nls", findings.inverter, findings.estimate)
+    findings.first_look, findings.estimate = look, look.parameters
+    error = look.inverter.plateau_v if look.inverter else 0.0
+    yield Tell(FirstLook(look.parameters.as_tuple(), look.std, error, look.delay_s[0]))
 
 
 def _excitation_limits(job: Job, findings: Findings) -> ExcitationLimits:
@@ -196,7 +214,8 @@ def _test(
     yield LoadExcitation(axis_deg, tones, BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
     yield Enable("multitone test")
     findings.segment += 1
-    under_test = _UnderTest(job, findings, axis_deg, chosen, seconds)
+    offset_a = yield from _measure_offset(findings, "multitone test", axis_deg)
+    under_test = _UnderTest(job, findings, axis_deg, chosen, seconds, offset_a)
     yield SetScale(under_test.scale)
     while not under_test.is_done():
         block = yield from _next_block(findings, "multitone test", axis_deg)
@@ -219,21 +238,23 @@ class _UnderTest:
     """Observer, guard and amplitude of one session."""
 
     def __init__(
-        self, job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float
-    ) -> None:
-        assert findings.identity is not None
-        staircase = findings.staircases[-1]
-        period_s = findings.identity.control_period_s
+        self, job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float,
+        offset_a: float,
+    ) -> None:  # fmt: skip
+        period_s, resistance_ohm = _period_s(findings), findings.resistance_ohm(job)
         self._job, self._findings, self._axis_deg, self._seconds = job, findings, axis_deg, seconds
+        box = prior(job.nameplate)
+        known = replace(box.typical, stator_resistance_ohm=resistance_ohm)
         self._observer = ParallelObserver(
-            prior(job.nameplate), period_s, job.nameplate.rated_current_peak_a, start=findings.estimate,
-            compensation=_compensation(staircase.inverter, axis_deg, job.trip_current_a),
+            box, period_s, job.nameplate.rated_current_peak_a, start=findings.estimate or known,
+            compensation=_compensation(findings.inverter, axis_deg, job.trip_current_a),
         )  # fmt: skip
         self._guard = FluxGuard(
-            job.flux_limit_wb(staircase.stator_resistance.value), job.link_latency_s, chosen.excitation, period_s,
-            staircase.stator_resistance.value, staircase.inverter, axis_deg,
+            job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, period_s, resistance_ohm,
+            findings.inverter, axis_deg,
         )  # fmt: skip
         self.scale = min(job.plan.excitation.first_scale, self._guard.safe_scale)
+        self._offset_a = offset_a
         self._present_scale = 0.0
         self.time_s = 0.0
         self._told_s = 0.0
@@ -241,11 +262,11 @@ class _UnderTest:
         self._peak_fraction = 0.0
         self._history: list[tuple[float, BlockEstimate]] = []
         self._estimate: BlockEstimate | None = None
-        self._limit_wb = self._guard.limit_wb
+        self._limit_wb = findings.flux_limit_wb = self._guard.limit_wb
 
     def take(self, block: SampleBlock) -> FluxReading:
         """Observer first, guard second, on the same block."""
-        current = _along_axis(block)
+        current = _along_axis(block) - self._offset_a
         self._estimate = self._observer.advance(block.voltage_axis_v, current, block.lost_before)
         taken_s = (block.count + block.lost_before) * block.sample_period_s
         self.time_s += taken_s
@@ -327,6 +348,20 @@ def _next_block(findings: Findings, step: str, axis_deg: float) -> Generator[Com
         )  # fmt: skip
     findings.blocks.append((findings.segment, block))
     return block
+
+
+def _measure_offset(findings: Findings, step: str, axis_deg: float) -> Generator[Command, Any, float]:
+    """Mean current along the axis while the drive is enabled and commands nothing."""
+    seen = np.zeros(0)
+    while (seen.size + 1) * _period_s(findings) < OFFSET_S:
+        block = yield from _next_block(findings, step, axis_deg)
+        seen = np.append(seen, _along_axis(block))
+    return float(np.mean(seen))
+
+
+def _period_s(findings: Findings) -> float:
+    assert findings.identity is not None
+    return findings.identity.control_period_s
 
 
 def _ramp_down(findings: Findings, step: str, axis_deg: float, seconds: float) -> Generator[Command, Any, None]:

@@ -36,6 +36,16 @@ class StaircaseFitted:
 
 
 @dataclass(frozen=True)
+class FirstLook:
+    """(R_s, R_R, L_sigma, L_M) and their standard errors from the first, small test; what one leg loses; the delay."""
+
+    parameters: tuple[float, float, float, float]
+    std: tuple[float, float, float, float]
+    leg_error_v: float
+    delay_s: float
+
+
+@dataclass(frozen=True)
 class ExcitationChosen:
     """Amplitudes in volts along the axis at scale 1; `predicted` in per cent relative standard error."""
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from commissioner.errors import CheckFailed
 from commissioner.identify.analysis import Identification, identify
-from commissioner.identify.resistance import Staircase
+from commissioner.identify.resistance import IDEAL_INVERTER, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble
@@ -20,7 +20,7 @@ from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
 from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
-from commissioner.procedure.verdict import Decision, Evidence, Verdict, as_inverse_gamma, decide
+from commissioner.procedure.verdict import Decision, Verdict, decide, evidence_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
     ArmWatchdog,
@@ -102,17 +102,28 @@ class Findings:
     tests_done: int = 0
     dc_voltages_v: tuple[float, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
+    first_look: Identification | None = None
     estimate: InverseGamma | None = None
     blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)
     segment: int = -1
     peak_flux_fraction: float = 0.0
     guard_acted: bool = False
+    flux_limit_wb: float | None = None
     identification: Identification | None = None
     verdict: Verdict | None = None
     written: tuple[WrittenParameter, ...] = ()
 
+    @property
+    def inverter(self) -> InverterError:
+        """The newest inverter error: of the first look, else of the last staircase, else none."""
+        if self.first_look is not None and self.first_look.inverter is not None:
+            return self.first_look.inverter
+        return self.staircases[-1].inverter if self.staircases else IDEAL_INVERTER
+
     def resistance_ohm(self, job: Job) -> float:
-        """The newest stator resistance: from the last staircase, else the plate's typical value."""
+        """The best stator resistance so far: first look, else last staircase, else the plate's typical value."""
+        if self.first_look is not None:
+            return self.first_look.parameters.stator_resistance_ohm
         if self.staircases:
             return self.staircases[-1].stator_resistance.value
         return prior(job.nameplate).typical.stator_resistance_ohm
@@ -158,12 +169,7 @@ def judge(job: Job, findings: Findings) -> Step:
     assert recording is not None
     identification = identify(recording, job.nameplate)
     findings.identification = identification
-    evidence = Evidence(
-        combined=identification.parameters,
-        axes=tuple((axis.axis_deg, axis.parameters) for axis in identification.axes),
-        disagreements=tuple(identification.disagreements),
-    )
-    verdict = decide(evidence, prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
+    verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict
     first = verdict.objections[0] if verdict.objections else None
     yield Tell(
@@ -183,6 +189,6 @@ def judge(job: Job, findings: Findings) -> Step:
 def write(job: Job, findings: Findings) -> Step:
     """The accepted values into the drive, verified; the runner restores the snapshot where that fails."""
     assert findings.identification is not None
-    values = asdict(as_inverse_gamma(findings.identification.parameters))
+    values = asdict(findings.identification.parameters)
     findings.written = yield WriteParameters({name: values[part] for name, part in job.parameter_names.items()})
     return Event.VERIFIED

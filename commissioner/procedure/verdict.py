@@ -6,9 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
+from commissioner.identify.analysis import Identification
 from commissioner.motor.circuit import InverseGamma, Quantity
 from commissioner.motor.nameplate import ParameterBox
 from commissioner.procedure.plan import Acceptance
+from commissioner.records import Signal
 
 
 class Decision(Enum):
@@ -53,23 +57,39 @@ _LIMIT = {
 }
 
 
+Values = Mapping[str, Quantity]
+
+
 @dataclass(frozen=True)
 class Evidence:
-    """What the verdict is reached from: combined values, each axis's values, warnings that forbid writing."""
+    """What the verdict is reached from: combined values, each test's values, and each test's batch fit beside them."""
 
-    combined: Mapping[str, Quantity]
-    axes: tuple[tuple[float, Mapping[str, Quantity]], ...]
-    disagreements: tuple[str, ...] = ()
+    combined: Values
+    axes: tuple[tuple[float, Values], ...]
+    batch: tuple[tuple[float, Values], ...] = ()
+
+
+def evidence_of(identification: Identification) -> Evidence:
+    """The values of an identification that the verdict is reached from, each with its standard deviation."""
+    axes = identification.axes
+    std = [np.sqrt(np.diag(axis.covariance)) for axis in axes]
+    batch = [axis.batch.inverse_gamma_at(axis.peak_stator_flux_wb)[0] for axis in axes]
+    return Evidence(
+        combined=_values(identification.parameters, np.sqrt(np.diag(identification.covariance))),
+        axes=tuple((axis.axis_deg, _values(axis.parameters, s)) for axis, s in zip(axes, std, strict=True)),
+        batch=tuple((axis.axis_deg, _values(b, s)) for axis, b, s in zip(axes, batch, std, strict=True)),
+    )
+
+
+def _values(parameters: InverseGamma, std: Signal) -> Values:
+    return {name: Quantity(v, float(s)) for name, v, s in zip(PARAMETERS, parameters.as_tuple(), std, strict=True)}
 
 
 def decide(evidence: Evidence, box: ParameterBox, acceptance: Acceptance, *, write_back: bool) -> Verdict:
     """WRITE_BACK or KEEP where nothing objects, else REJECT with every objection, gravest first."""
     objections = (
         *_outside(evidence.combined, box),
-        *(
-            Objection(text, "disagreement", "agreement", "see the residual in the report; repeat the run")
-            for text in evidence.disagreements
-        ),
+        *_disagreements(evidence, acceptance),
         *_uncertain(evidence.combined, acceptance),
         *_spread(evidence, acceptance),
     )
@@ -88,6 +108,21 @@ def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Ob
                 f"{low:.4g} ... {high:.4g}",
                 "check the motor's connection and that --motor is the motor at the drive",
             )
+
+
+def _disagreements(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
+    """Observer and batch fit apart by more than three standard errors and by more than the parameter may be uncertain."""
+    for (axis_deg, online), (_, batch) in zip(evidence.axes, evidence.batch, strict=False):
+        for name in PARAMETERS:
+            apart, limit = abs(online[name].value - batch[name].value), getattr(acceptance, _LIMIT[name])
+            percent = 100 * apart / abs(batch[name].value)
+            if apart > 3 * batch[name].std and percent > limit:
+                yield Objection(
+                    f"observer and batch fit disagree on {name} at axis {axis_deg:g} deg",
+                    f"{percent:.2g} %",
+                    f"{limit:g} %",
+                    "the model misses something there: see the residual in the report, and `commissioner diagnose`",
+                )
 
 
 def _uncertain(combined: Mapping[str, Quantity], acceptance: Acceptance) -> Iterator[Objection]:
@@ -116,8 +151,3 @@ def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
                 f"{acceptance.axis_spread_percent:g} %",
                 "compare the current sensors' gains and the three phases' resistances",
             )
-
-
-def as_inverse_gamma(combined: Mapping[str, Quantity]) -> InverseGamma:
-    """The combined values without their uncertainty."""
-    return InverseGamma(**{name: combined[name].value for name in PARAMETERS})

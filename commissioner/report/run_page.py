@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.steps import Findings
+from commissioner.records import Signal
 from commissioner.report import figures
 from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
 
@@ -135,15 +139,31 @@ def _flux_parts(tests: Sequence[Sequence[Mapping[str, Any]]], limit_wb: float | 
 
 
 def _current_parts(findings: Findings) -> Iterator[Picture]:
-    identification = findings.identification
-    if identification is None:
+    """The longest stretch of each test: what was measured and what the batch fit leaves of it."""
+    if findings.identification is None:
         return
-    for trace in identification.traces:
+    segments = _axis_currents(findings)
+    for axis in findings.identification.axes:
+        residuals = axis.batch.residuals
+        currents, segments = segments[: len(residuals)], segments[len(residuals) :]
+        longest = max(range(len(residuals)), key=lambda k: residuals[k].size)
+        if longest >= len(currents) or currents[longest].size != residuals[longest].size:
+            continue
+        time_s = np.arange(residuals[longest].size) * axis.batch.sample_period_s
         yield picture(
-            figures.currents(trace.time_s, trace.current_a, trace.residual_a, trace.title),
+            figures.currents(time_s, currents[longest], residuals[longest], f"axis {axis.axis_deg:g}°"),
             "Measured current along the axis, and what the identified model leaves of it.",
             raster=True,
         )
+
+
+def _axis_currents(findings: Findings) -> list[Signal]:
+    """The current along the axis, one array per session, in order."""
+    sessions: dict[int, list[Signal]] = {}
+    for segment, block in findings.blocks:
+        current = axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
+        sessions.setdefault(segment, []).append(current)
+    return [np.concatenate(parts) for parts in sessions.values()]
 
 
 def _check_parts(result: Mapping[str, Any]) -> Iterator[Table]:

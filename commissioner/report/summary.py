@@ -31,7 +31,11 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
     if identification is not None:
         document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
         document["duration_s"] = ended.energised_s
-    document["flux_guard"] = {"peak_fraction": findings.peak_flux_fraction, "acted": findings.guard_acted}
+    document["flux_guard"] = {
+        "peak_fraction": findings.peak_flux_fraction,
+        "acted": findings.guard_acted,
+        "limit_wb": findings.flux_limit_wb,
+    }
     return document
 
 

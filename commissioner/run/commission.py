@@ -32,6 +32,8 @@ from commissioner.safety.watch import WatchLimits
 
 LOST_SAMPLES_S = 0.05
 """The stream may lose this much motor time at once before the run stops."""
+FLUX_FRACTION = 1.1
+"""Of the guard's own limit: the guard acts first, the watch is the second line."""
 LATENCY_PROBES = 20
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
@@ -109,7 +111,7 @@ def commission(
             },
         )
         ended = _carry_out(url, profile, nameplate, plan, write_back, folder, findings, present)
-        result = _close(folder, nameplate, findings, ended)
+        result = _close(folder, nameplate, findings, ended, _parameter_names(profile))
     finally:
         folder.close()
     return Commissioned(ended, folder.path, result)
@@ -129,6 +131,7 @@ def _carry_out(
         with _port(url, profile, plan) as port:
             inverter = Inverter(port, profile, lambda intent: folder.journal("about_to", intent, durable=True))
             job = _job(profile, nameplate, plan, port, write_back=write_back)
+            folder.journal("job", job, durable=True)
             runner = Runner(inverter, folder, _bounds(job, profile), _watch(job, profile), present)
             ended = runner.perform(course(job, findings))
             folder.journal("link", port.stats.as_dict())
@@ -140,13 +143,15 @@ def _carry_out(
         return ended
 
 
-def _close(folder: RunFolder, nameplate: Nameplate, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
+def _close(
+    folder: RunFolder, nameplate: Nameplate, findings: Findings, ended: RunEnded, parameter_names: Mapping[str, str]
+) -> Mapping[str, Any]:
     """Recording, result and report, in that order: each needs only the one before."""
     metadata: dict[str, float | str] = {
         key: value for key, value in dataclasses.asdict(nameplate).items() if value is not None
     }
     write_recording(folder.path, metadata)
-    result = plain(summarise(findings, ended, folder.path.name))
+    result = plain(summarise(findings, ended, folder.path.name, parameter_names))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
@@ -173,10 +178,15 @@ def _job(
         plan=plan,
         nameplate=nameplate,
         drive_limits=_drive_limits(profile),
-        parameter_names=dict(zip(profile.parameters.order, PARAMETERS, strict=True)) if profile.parameters else {},
+        parameter_names=_parameter_names(profile),
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
     )
+
+
+def _parameter_names(profile: DriveProfile) -> dict[str, str]:
+    """The drive's name of each circuit parameter -> the contract's."""
+    return dict(zip(profile.parameters.order, PARAMETERS, strict=True)) if profile.parameters else {}
 
 
 def _drive_limits(profile: DriveProfile) -> DriveLimits:
@@ -208,7 +218,7 @@ def _watch(job: Job, profile: DriveProfile) -> WatchLimits:
     limits = job.drive_limits
     return WatchLimits(
         current_a=job.trip_current_a,
-        flux_fraction=1.0,
+        flux_fraction=FLUX_FRACTION,
         axis_time_s=job.axis_time_s,
         lost_samples_s=LOST_SAMPLES_S,
         dc_link_v=(limits.dc_link_min_v, limits.dc_link_max_v),

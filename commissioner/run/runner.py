@@ -17,7 +17,7 @@ from typing import Any
 
 from commissioner.errors import Aborted, CommissionerError, DriveFault
 from commissioner.link.inverter import Inverter
-from commissioner.procedure.findings import EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
+from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
 from commissioner.run.archive import RunFolder
@@ -32,6 +32,8 @@ EMPTY_FETCH_PAUSE_S = 0.002
 STALL_S = 2.0
 """Wall time without any new sample after which the stream counts as dead."""
 
+JUDGED_REPLIES = (ask.Identify, ask.ReadNameplate, ask.ReadStatus, ask.TakeSnapshot, ask.WriteParameters)
+"""What a course decides upon besides the samples: kept, so that `replay` can decide again."""
 CHANNELS = ("voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
 
 Course = Generator[ask.Command, Any, RunEnded]
@@ -123,6 +125,8 @@ class Runner:
                 remedy=refusal.remedy,
             )
         reply = self._send(command)
+        if isinstance(command, JUDGED_REPLIES):
+            self._folder.journal("reply", {"command": type(command).__name__, "reply": reply})
         self._progress.facts = after(command, self._progress.facts)
         return reply
 
@@ -228,9 +232,12 @@ class Runner:
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):
             self._progress.flux_fraction = record.flux_fraction
+        if isinstance(record, ChecksJudged):
+            passed = all(result.has_passed for result in record.results)
+            self._progress.facts = replace(self._progress.facts, checks_passed=passed)
         if isinstance(record, VerdictReached):
             self._progress.facts = replace(self._progress.facts, writing_allowed=record.decision == "write back")
-        self._folder.journal(_kind(record), record)
+        self._folder.journal(kind_of(record), record)
         self._present(record)
 
     def _stop_if(self, reason: StopReason | None) -> None:
@@ -252,7 +259,7 @@ class Runner:
         return RunEnded(error.outcome, error.what, self.energised_s, error.as_dict())
 
 
-def _kind(record: object) -> str:
+def kind_of(record: object) -> str:
     """`EstimateUpdated` -> `estimate_updated`"""
     name = type(record).__name__
     return "".join("_" + c.lower() if c.isupper() else c for c in name).lstrip("_")
