@@ -130,9 +130,11 @@ class WriteBack:
     # --- act ----------------------------------------------------------------------------------------------------
     def _bring(self, target: Values, *, store: bool) -> None:
         """`target` in use and, if asked, stored; verified; only what differs."""
-        if self._differing(target, self._read_in_use()):
+        has_changed = bool(self._differing(target, self._read_in_use()))
+        if has_changed:
             self._put_in_use(target, store=store)
-        if store and self._needs_store(target):
+        is_unstored = bool(self._differing(target, self._read_stored())) if self._group().is_staged else has_changed
+        if store and is_unstored:
             self._put_in_memory(target)
 
     def _bring_back(self, snapshot: ParameterSnapshot) -> bool:
@@ -266,9 +268,6 @@ class WriteBack:
 
     def _store_count(self) -> int:
         return int(number(self._items.read(["store_count"]).get("store_count", 0)))
-
-    def _needs_store(self, target: Values) -> bool:
-        return not self._group().is_staged or bool(self._differing(target, self._read_stored()))
 
     def _can_store(self) -> bool:
         store = self._profile.store

@@ -4,7 +4,8 @@ It knows the map from the file alone (parsed here, not by the product). What it 
 
     drive = ScriptedDrive()
     drive.deaf_to.add("amplitude_scale")        # acknowledges the write, does not do it
-    drive.failures.append(ReplyTimeout(...))    # the next request fails with this, before the drive sees it
+    drive.failures.append(ReplyTimeout(...))    # the next request fails with this, before the drive sees it,
+    drive.fails_after_acting = True             # or after the drive did what a write asked for
     drive.on_write = lambda name, words: ...    # anything else
 """
 
@@ -56,6 +57,7 @@ class ScriptedDrive:
         self.deaf_to: set[str] = set()
         self.refuses: dict[str, int] = {}
         self.failures: deque[CommissionerError | None] = deque()
+        self.fails_after_acting = False
         self.on_write: Callable[[str, tuple[int, ...]], None] = lambda name, words: None
         self.log: list[tuple[str, str]] = []
         self.is_closed = False
@@ -69,12 +71,16 @@ class ScriptedDrive:
         return tuple(self.words[address : address + count])
 
     def write(self, address: int, values: Sequence[int]) -> None:
-        self._fail()
+        failure = self.failures.popleft() if self.failures else None
+        if failure is not None and not self.fails_after_acting:
+            raise failure
         for name, item in self.items.items():
             length = item.get("length", 1) * WORDS[item["type"]]
             if address <= item["address"] < address + len(values):
                 start = item["address"] - address
                 self._take(name, tuple(values[start : start + length]))
+        if failure is not None:
+            raise failure
 
     def exchange(
         self, write_address: int, values: Sequence[int], read_address: int, count: int, *, proves_itself: bool = False
