@@ -40,6 +40,7 @@ Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in c
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
 ]
+Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
 
 
@@ -126,7 +127,7 @@ def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
 
 @runs_app.command("show")
 def runs_show(
-    run: Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")],
+    run: Run = "last",
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
@@ -134,6 +135,57 @@ def runs_show(
     from commissioner.cli.runs import show_run
 
     show_run(runs, run, as_json=json)
+
+
+@runs_app.command("report")
+def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
+    """Where the HTML report of a run is; made again from its archive where it is missing."""
+    from commissioner.cli.runs import report_run
+
+    report_run(runs, run, as_json=json)
+
+
+@runs_app.command("export")
+def runs_export(
+    run: Run,
+    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The samples of a run as one recording; works for runs that were cut off, too."""
+    from commissioner.cli.runs import export_run
+
+    export_run(runs, run, out, as_json=json)
+
+
+@runs_app.command("compare")
+def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
+    """Two runs: same motor, changed (which parameter, how significant), or another motor."""
+    from commissioner.cli.runs import compare_runs
+
+    compare_runs(runs, before, after, as_json=json)
+
+
+@app.command()
+def restore(
+    run: Run,
+    drive: Annotated[str | None, typer.Option("--drive", help="Drive URL; the run's own if not given.")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Write back the parameter set a run found in the drive, verified and stored."""
+    from commissioner.cli.archive import restore_run
+
+    restore_run(runs, run, drive, yes=yes, as_json=json)
+
+
+@app.command()
+def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
+    """Feed the archived blocks through the pure layers; decisions must come out identical."""
+    from commissioner.cli.archive import replay_run
+
+    replay_run(runs, run, as_json=json)
 
 
 def main() -> None:

@@ -66,7 +66,12 @@ def _port(process: subprocess.Popen[str]) -> int:
     assert process.stdout is not None
     assert process.stderr is not None
     stdout = process.stdout
-    threading.Thread(target=lambda: [lines.put(line) for line in stdout], daemon=True).start()
+
+    def collect() -> None:
+        for line in stdout:
+            lines.put(line)
+
+    threading.Thread(target=collect, daemon=True).start()
     deadline = time.monotonic() + START_S
     while time.monotonic() < deadline:
         try:

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from commissioner.cli import screen
+from commissioner.errors import DataRefused, UsageError
+from commissioner.identify.combine import Combined, compare
+from commissioner.motor.circuit import InverseGamma
+from commissioner.procedure.assembly import assemble, columns
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.recordings.table import write_table
+from commissioner.run.archive import read_blocks
 from commissioner.run.catalogue import RunSummary, find_run, read_runs
 
 
@@ -44,3 +54,67 @@ def _print(summary: RunSummary, result: dict[str, Any] | None) -> None:
     screen.out.print(f"  parameters  {summary.written}\n  folder      {summary.folder}")
     if result is not None:
         screen.result(result)
+
+
+def report_run(folder: Path, name: str, *, as_json: bool) -> None:
+    """The path of the run's report."""
+    summary = find_run(folder, name)
+    report = Path(summary.folder) / "report.html"
+    if not report.is_file():
+        raise DataRefused(
+            f"{summary.run} has no report", step="archive", value=summary.outcome, limit="a run that ended",
+            remedy=f"`commissioner runs export {summary.run} x.parquet`, then `commissioner identify x.parquet`",
+        )  # fmt: skip
+    if as_json:
+        screen.emit({"run": summary.run, "report": str(report)})
+    else:
+        screen.out.print(str(report), soft_wrap=True)
+
+
+def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
+    """The run's whole samples as a recording in the contract's format."""
+    summary = find_run(folder, name)
+    if not out.name.endswith((".csv", ".csv.gz", ".parquet")):
+        raise UsageError(
+            f"{out.name} is not a recording's name", step="export", value=out.suffix, limit=".csv, .csv.gz or .parquet",
+            remedy="choose one of these endings",
+        )  # fmt: skip
+    source = Path(summary.folder)
+    request = json.loads((source / "request.json").read_text("utf-8"))
+    plate = {key: value for key, value in request["nameplate"].items() if value is not None}
+    recording = assemble(read_blocks(source / "blocks.bin"), plate, summary.run)
+    if recording is None:
+        raise DataRefused(
+            f"{summary.run} holds no samples", step="export", value=0, limit="at least one block",
+            remedy="the motor was never energised in it",
+        )  # fmt: skip
+    write_table(out, columns(recording), plate | {"sample_period_s": recording.sample_period_s, "run": summary.run})
+    if as_json:
+        screen.emit({"run": summary.run, "recording": str(out), "samples": int(recording.time_s.size)})
+    else:
+        screen.out.print(f"{recording.time_s.size} samples in {out}", soft_wrap=True)
+
+
+def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> None:
+    """Same motor, changed, or another one."""
+    first, second = find_run(folder, before), find_run(folder, after)
+    comparison = compare(_combined(first), _combined(second))
+    if as_json:
+        screen.emit({"before": first.run, "after": second.run, "comparison": comparison})
+        return
+    rows = [(c.parameter, f"{100 * c.relative_change:+.2f} %", f"{c.sigmas:.1f}") for c in comparison.changes]
+    screen.out.print(f"[bold]{comparison.verdict.value}[/]\n  {comparison.reason}")
+    screen.out.print(screen.table("", ("parameter", "change", "standard errors"), rows, right=(1, 2)))
+
+
+def _combined(run: RunSummary) -> Combined:
+    """A run's combined result as its document holds it."""
+    parameters = (run.result or {}).get("parameters") or {}
+    if not parameters:
+        raise DataRefused(
+            f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
+            remedy="compare runs that ended as commissioned or rejected",
+        )  # fmt: skip
+    values = [parameters[name]["value"] for name in PARAMETERS]
+    std = np.array([parameters[name]["std"] for name in PARAMETERS])
+    return Combined(InverseGamma(*values), np.diag(std**2), (0.0, 0.0, 0.0, 0.0), (), ())

@@ -24,7 +24,8 @@ def assemble(
             continue
         if segment != current:
             offset, current = end, segment
-        times.append(offset + (block.first_index + np.arange(block.count)) * block.sample_period_s)
+        index = np.arange(block.first_index, block.first_index + block.count, dtype=np.float64)
+        times.append(offset + index * block.sample_period_s)
         end = float(times[-1][-1]) + block.sample_period_s
         rows.append((segment, block))
     if not rows:

@@ -196,7 +196,9 @@ def _look_closer(job: Job, findings: Findings) -> Generator[Command, Any, None]:
 
 def _excitation_limits(job: Job, findings: Findings) -> ExcitationLimits:
     return ExcitationLimits(
-        flux_wb=job.flux_limit_wb(findings.resistance_ohm(job)), current_a=job.test_current_a, voltage_v=job.test_voltage_v
+        flux_wb=job.flux_limit_wb(findings.resistance_ohm(job)),
+        current_a=job.test_current_a,
+        voltage_v=job.test_voltage_v,
     )
 
 
@@ -312,8 +314,8 @@ class _UnderTest:
         return EstimateUpdated(
             axis_deg=self._axis_deg, time_s=self.time_s, planned_s=self._seconds,
             parameters=self._estimate.parameters.as_tuple(), std=self._estimate.std, scale=self._present_scale,
-            flux_fraction=reading.fraction, observer_flux_wb=reading.observer_wb, model_free_flux_wb=reading.model_free_wb,
-            residual_rms_a=self._estimate.residual_rms_a,
+            flux_fraction=reading.fraction, observer_flux_wb=reading.observer_wb,
+            model_free_flux_wb=reading.model_free_wb, residual_rms_a=self._estimate.residual_rms_a,
         )  # fmt: skip
 
     def finished(self) -> AxisFinished:

@@ -105,7 +105,7 @@ class VerdictReached:
 
 @dataclass(frozen=True)
 class RunEnded:
-    """`outcome` is commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy."""
+    """`outcome`: commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy."""
 
     outcome: str
     reason: str

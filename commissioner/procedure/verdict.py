@@ -111,7 +111,7 @@ def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Ob
 
 
 def _disagreements(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
-    """Observer and batch fit apart by more than three standard errors and by more than the parameter may be uncertain."""
+    """Observer and batch fit apart by more than three standard errors and more than the parameter may be uncertain."""
     for (axis_deg, online), (_, batch) in zip(evidence.axes, evidence.batch, strict=False):
         for name in PARAMETERS:
             apart, limit = abs(online[name].value - batch[name].value), getattr(acceptance, _LIMIT[name])

@@ -153,7 +153,7 @@ def sample_period(table: Table, segment: Signal) -> float:
             "sort the rows by time and number the segments",
         )
     named = table.metadata.get("sample_period_s")
-    period = float(named) if named not in (None, "") else float(np.median(steps))  # type: ignore[arg-type]
+    period = float(named) if named not in (None, "") else float(np.median(steps))
     multiple = steps / period
     deviation = np.abs(multiple - np.maximum(np.round(multiple), 1.0))
     worst = int(np.argmax(deviation))
@@ -220,7 +220,10 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
 
 
 _KNOWN = frozenset(
-    ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v", "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s"]
+    (
+        "time_s segment axis_deg voltage_axis_v current_u_a current_v_a current_w_a dc_link_v voltage_u_v voltage_v_v "
+        "voltage_w_v voltage_uv_v voltage_vw_v voltage_wu_v speed_rad_per_s"
+    ).split()
 )
 
 

@@ -33,8 +33,8 @@ def run_page(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], fi
             tone=_TONES.get(outcome, "bad"),
             facts=list(_facts(result)),
             sections=[section for section in _sections(result, journal, findings) if section.parts],
-            footer="SI units; per-phase star equivalent, rotor quantities referred to the stator; inverse-Gamma circuit. "
-            "Intervals are 95 %.",
+            footer="SI units; per-phase star equivalent, rotor quantities referred to the stator; inverse-Gamma "
+            "circuit. Intervals are 95 %.",
         )
     )
 
@@ -83,7 +83,7 @@ def _result_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
     if error:
         yield Table(
             ("What", "Seen"),
-            [(name, str(error[name])) for name in ("step", "value", "limit", "remedy") if error.get(name) not in (None, "")],
+            [(name, str(error[name])) for name in ("step", "value", "limit", "remedy") if error.get(name)],
         )
     parameters = result.get("parameters") or {}
     if not parameters:
@@ -149,7 +149,7 @@ def _current_parts(findings: Findings) -> Iterator[Picture]:
         longest = max(range(len(residuals)), key=lambda k: residuals[k].size)
         if longest >= len(currents) or currents[longest].size != residuals[longest].size:
             continue
-        time_s = np.arange(residuals[longest].size) * axis.batch.sample_period_s
+        time_s: Signal = np.arange(residuals[longest].size, dtype=np.float64) * axis.batch.sample_period_s
         yield picture(
             figures.currents(time_s, currents[longest], residuals[longest], f"axis {axis.axis_deg:g}°"),
             "Measured current along the axis, and what the identified model leaves of it.",
@@ -171,12 +171,20 @@ def _check_parts(result: Mapping[str, Any]) -> Iterator[Table]:
     if checks:
         yield Table(
             ("Check", "Seen", "Wanted", "Result"),
-            [(c["name"], str(c["value"]), str(c["limit"]), "passed" if c["has_passed"] else c["remedy"]) for c in checks],
+            [_check_row(check) for check in checks],
             tones=["good" if c["has_passed"] else "bad" for c in checks],
         )
 
 
-_TOLD = ("state_entered", "staircase_fitted", "guard_acted", "axis_finished", "verdict_reached", "parameters_written", "error", "disarmed")
+def _check_row(check: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    result = "passed" if check["has_passed"] else str(check["remedy"])
+    return check["name"], str(check["value"]), str(check["limit"]), result
+
+
+_TOLD = (
+    "state_entered", "staircase_fitted", "first_look", "guard_acted", "axis_finished", "verdict_reached",
+    "parameters_written", "error", "disarmed",
+)  # fmt: skip
 
 
 def _course(journal: Sequence[Mapping[str, Any]]) -> Table:

@@ -92,8 +92,8 @@ def _written(records: list[dict[str, Any]]) -> str:
     kinds = [r["kind"] for r in records]
     if "parameters_written" in kinds:
         return "new, read back and stored"
-    began = any(r["kind"] == "about_to" and r["record"]["command"] == "WriteParameters" for r in records)
-    if not began:
+    announced = {r["record"]["action"] for r in records if r["kind"] == "about_to"}
+    if not announced & {"stage", "commit", "store"}:
         return "as before"
     if "snapshot_restored" in kinds:
         return "as before (restored)"

@@ -151,7 +151,7 @@ def _close(
         key: value for key, value in dataclasses.asdict(nameplate).items() if value is not None
     }
     write_recording(folder.path, metadata)
-    result = plain(summarise(findings, ended, folder.path.name, parameter_names))
+    result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))

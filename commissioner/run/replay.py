@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ class Replayed:
         return self.difference is None
 
 
-class _ArchiveEnds(Exception):  # noqa: N818 - how a run that was cut short ends
+class _ArchiveEnds(Exception):
     pass
 
 
@@ -63,11 +63,11 @@ def replay(folder: Path) -> Replayed:
 
 
 _DECISIONS = frozenset(
-    (
-        "state_entered drive_identified checks_judged staircase_fitted first_look excitation_chosen estimate_updated guard_acted "
-        "axis_finished verdict_reached step_progress"
-    ).split()
-)
+    {
+        "state_entered", "drive_identified", "checks_judged", "staircase_fitted", "first_look", "excitation_chosen",
+        "estimate_updated", "guard_acted", "axis_finished", "verdict_reached", "step_progress",
+    }
+)  # fmt: skip
 
 
 def _decision(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,9 +115,9 @@ def _job(record: Mapping[str, Any]) -> Job:
     plan = record["plan"]
     return Job(
         plan=ProcedurePlan(
-            axes_deg=tuple(plan["axes_deg"]), repeat_first=plan["repeat_first"], supervision=Supervision(**plan["supervision"]),
-            limits=Limits(**plan["limits"]), excitation=ExcitationPlan(**plan["excitation"]),
-            acceptance=Acceptance(**plan["acceptance"]),
+            axes_deg=tuple(plan["axes_deg"]), repeat_first=plan["repeat_first"],
+            supervision=Supervision(**plan["supervision"]), limits=Limits(**plan["limits"]),
+            excitation=ExcitationPlan(**plan["excitation"]), acceptance=Acceptance(**plan["acceptance"]),
         ),
         nameplate=Nameplate(**record["nameplate"]),
         drive_limits=DriveLimits(
@@ -146,7 +146,7 @@ def read_snapshot(path: Path) -> ParameterSnapshot:
     return _snapshot(json.loads(path.read_text("utf-8")))
 
 
-_READ = {
+_READ: dict[str, Callable[[Any], Any]] = {
     "Identify": lambda record: DriveIdentity(**record),
     "ReadNameplate": dict,
     "ReadStatus": _status,

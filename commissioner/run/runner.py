@@ -131,16 +131,11 @@ class Runner:
         return reply
 
     def _send(self, command: ask.Command) -> object:
+        """What the drive answers; None for a command that only acts."""
         inverter = self._inverter
         match command:
             case ask.Fetch():
                 return self._fetch()
-            case ask.Tell(record=record):
-                return self._tell(record)
-            case ask.SetScale(scale=scale):
-                return inverter.set_scale(scale)
-            case ask.SetBias(bias_v=bias):
-                return inverter.set_bias(bias)
             case ask.Identify():
                 return inverter.identify()
             case ask.ReadNameplate():
@@ -149,31 +144,46 @@ class Runner:
                 return inverter.read_status()
             case ask.TakeSnapshot():
                 return self._take_snapshot()
-            case ask.Wait(seconds=seconds):
-                return time.sleep(seconds)
-            case ask.ArmWatchdog(timeout_s=timeout):
-                return inverter.set_watchdog(1000 * timeout)
-            case ask.SetDriveLimits(current_a=current, voltage_v=voltage, time_s=limit):
-                return inverter.set_limits(current_a=current, voltage_v=voltage, time_s=limit)
-            case ask.LoadExcitation():
-                return inverter.load_excitation(
-                    axis_deg=command.axis_deg,
-                    tones=command.tones,
-                    bias_v=0.0,
-                    bias_ramp_v_per_s=command.bias_ramp_v_per_s,
-                    scale=0.0,
-                    scale_ramp_per_s=command.scale_ramp_per_s,
-                    duration_s=command.duration_s,
-                    channels=CHANNELS,
-                )
-            case ask.Enable():
-                return self._enable()
-            case ask.Disarm(reason=reason):
-                return self._disarm(reason)
             case ask.WriteParameters(values=values):
                 return self._write(values)
+        self._act(command)
+        return None
+
+    def _act(self, command: ask.Command) -> None:
+        inverter = self._inverter
+        match command:
+            case ask.Tell(record=record):
+                self._tell(record)
+            case ask.SetScale(scale=scale):
+                inverter.set_scale(scale)
+            case ask.SetBias(bias_v=bias):
+                inverter.set_bias(bias)
+            case ask.Wait(seconds=seconds):
+                time.sleep(seconds)
+            case ask.ArmWatchdog(timeout_s=timeout):
+                inverter.set_watchdog(1000 * timeout)
+            case ask.SetDriveLimits(current_a=current, voltage_v=voltage, time_s=limit):
+                inverter.set_limits(current_a=current, voltage_v=voltage, time_s=limit)
+            case ask.LoadExcitation():
+                self._load(command)
+            case ask.Enable():
+                self._enable()
+            case ask.Disarm(reason=reason):
+                self._disarm(reason)
             case _:
                 raise TypeError(f"no such command: {command!r}")
+
+    def _load(self, command: ask.LoadExcitation) -> None:
+        self._inverter.load_excitation(
+            axis_deg=command.axis_deg,
+            tones=command.tones,
+            bias_v=0.0,
+            bias_ramp_v_per_s=command.bias_ramp_v_per_s,
+            scale=0.0,
+            scale_ramp_per_s=command.scale_ramp_per_s,
+            duration_s=command.duration_s,
+            channels=CHANNELS,
+        )
 
     def _take_snapshot(self) -> ParameterSnapshot:
         self._snapshot = self._inverter.snapshot()
@@ -246,12 +256,11 @@ class Runner:
         kind = DriveFault if reason.is_fault else Aborted
         raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
-    def _disarm(self, reason: str) -> object:
+    def _disarm(self, reason: str) -> None:
         """The one place that de-energises. It tries every path and says what it verified."""
         verified = self._inverter.disarm()
         self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
         self._folder.journal("disarmed", {"because": reason, "verified": verified}, durable=True)
-        return verified
 
     def _failed(self, error: CommissionerError | None) -> RunEnded:
         assert error is not None

@@ -1,0 +1,50 @@
+"""`commissioner restore` and `commissioner replay`: what an archived run is good for afterwards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commissioner.cli import screen
+from commissioner.errors import DataRefused
+from commissioner.run.catalogue import find_run
+from commissioner.run.replay import replay
+from commissioner.run.restore import restore
+
+
+def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool) -> None:
+    """Write the run's snapshot back, after asking."""
+    import typer
+
+    summary = find_run(runs, run)
+    if not yes and not as_json:
+        screen.out.print(f"The parameters that [bold]{summary.run}[/] found will be written into the drive and stored.")
+        typer.confirm("Write?", abort=True)
+    done = restore(summary, drive)
+    if as_json:
+        screen.emit({"outcome": "restored", "reason": "snapshot written, read back and stored"} | vars(done))
+        return
+    rows = [(w.name, f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
+    if rows:
+        screen.out.print(screen.table("", ("parameter", "before", "written", "read back"), rows, right=(1, 2, 3)))
+    screen.out.print(
+        "[green]snapshot restored, read back and stored[/]" if rows else "the drive held the snapshot's values already"
+    )
+
+
+def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
+    """Decide the run again from its archive; exit 3 where a decision comes out otherwise."""
+    summary = find_run(runs, run)
+    done = replay(Path(summary.folder))
+    if as_json:
+        screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
+                     "difference": done.difference})  # fmt: skip
+        if not done.is_identical:
+            raise SystemExit(DataRefused.exit_code)
+        return
+    if done.difference is not None:
+        raise DataRefused(
+            f"decision {done.difference.number} of {summary.run} comes out otherwise", step="replay",
+            value=done.difference.replayed, limit=done.difference.archived,
+            remedy="the run was made by another version of commissioner, or its folder was changed",
+        )  # fmt: skip
+    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]")

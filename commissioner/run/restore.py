@@ -1,0 +1,56 @@
+"""Write back the parameter set that a run found in the drive."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.errors import DataRefused
+from commissioner.link.drive_file import load_profile
+from commissioner.link.inverter import Inverter
+from commissioner.link.modbus import open_port
+from commissioner.link.url import parse_url
+from commissioner.records import WrittenParameter
+from commissioner.run.archive import RunFolder
+from commissioner.run.catalogue import RunSummary
+from commissioner.run.replay import read_snapshot
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What `restore` changed; empty where the drive held the snapshot's values already."""
+
+    run: str
+    written: tuple[WrittenParameter, ...]
+    store_count: int
+    wear_fraction: float | None
+
+
+def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> Restored:
+    """The snapshot of `run` into the drive it was taken from, verified and stored.
+
+    DataRefused: the run took no snapshot. IdentityMismatch: another drive or firmware answers. What is restored is
+    added to the run's own journal before and after.
+    """
+    folder = Path(run.folder)
+    if not (folder / "snapshot.json").is_file():
+        raise DataRefused(
+            f"{run.run} holds no snapshot", step="restore", value="no snapshot.json",
+            limit="a run that reached the pre-energise checks",
+            remedy="choose an earlier run of this drive: `commissioner runs list`",
+        )  # fmt: skip
+    request = json.loads((folder / "request.json").read_text("utf-8"))
+    profile = load_profile(request["profile"])
+    journal = RunFolder(folder)
+    try:
+        port = open_port(parse_url(url or request["url"]), profile, reply_timeout_s=reply_timeout_s)
+        try:
+            inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
+            report = inverter.restore(read_snapshot(folder / "snapshot.json"))
+        finally:
+            port.close()
+        journal.journal("snapshot_restored", report, durable=True)
+    finally:
+        journal.close()
+    return Restored(run.run, report.written, report.store_count_after, report.wear_fraction)
