@@ -111,8 +111,7 @@ def design(
     amplitudes = _scaled(estimate, frequencies, shares, limits)
     information = _information(estimate, frequencies, amplitudes) * time_s / (2.0 * sample_period_s * limits.noise_a**2)
     relative = np.sqrt(np.diag(np.linalg.inv(information)))
-    lost_v = _fundamental_loss(inverter, limits.current_a)
-    commanded = amplitudes + lost_v * amplitudes / max(float(np.sum(amplitudes)), 1e-12)
+    commanded = amplitudes * np.abs(1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a))
     top = min(1.0, limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
     tones = tuple(Tone(float(a * top), float(f), float(p)) for a, f, p in zip(commanded, frequencies, phases, strict=True))
     excitation = Excitation(tones, dc_bias_v, time_s)
@@ -253,7 +252,15 @@ def _schroeder_phases(shares: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([-2.0 * math.pi * float(np.sum((k - np.arange(k)) * power[:k])) for k in range(n)]) % (2.0 * math.pi)
 
 
-def _fundamental_loss(inverter: InverterError, current_a: float) -> float:
-    """4/pi x axis plateau: the fundamental of the square wave a sinusoidal current makes of the lost voltage."""
-    plateau = float(inverter.on_axis(np.array([current_a]), 0.0)[0])
-    return 4.0 / math.pi * max(plateau, 0.0)
+def _lost_resistance(
+    machine: InverseGamma, frequencies: Sequence[float], amplitudes: Signal, inverter: InverterError, current_a: float
+) -> NDArray[np.complex128]:
+    """R_eq Y per tone: what the inverter takes, seen as a resistance in series.
+
+    A constant voltage that follows the sign of a many-toned current acts on each tone like sqrt(2/pi) V / sigma_i
+    (random-input describing function; A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, ch. 2).
+    """
+    admittance = admittance_s(machine, np.asarray(frequencies))
+    sigma_a = math.sqrt(0.5 * float(np.sum((amplitudes * np.abs(admittance)) ** 2)))
+    plateau_v = max(float(inverter.on_axis(np.array([current_a]), 0.0)[0]), 0.0)
+    return np.asarray(math.sqrt(2.0 / math.pi) * plateau_v / max(sigma_a, 1e-12) * admittance)

@@ -87,8 +87,11 @@ class FluxGuard:
     def _lost_scale(self) -> float:
         """The part of the scale that the inverter surely keeps to itself."""
         command_v = sum(t.amplitude_v for t in self.excitation.tones)
-        lost_v = max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
-        return SURE_LOSS * lost_v / max(command_v, 1e-12)
+        return SURE_LOSS * self._plateau_v / max(command_v, 1e-12)
+
+    @property
+    def _plateau_v(self) -> float:
+        return max(float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0]), 0.0)
 
     def advance(
         self, voltage_v: Signal, current_a: Signal, estimate: BlockEstimate, present_scale: float, lost_before: int = 0
@@ -169,10 +172,19 @@ class FluxGuard:
         )
 
     def _peak_at_full_scale(self, machine: InverseGamma) -> float:
-        """Sum over tones of the machine's flux amplitudes: no phase relation can exceed it."""
+        """Sum over tones of the machine's flux amplitudes behind the inverter: no phase relation can exceed it.
+
+        Below full scale the inverter takes a larger share, so that flux falls faster than the scale.
+        """
         f = np.array([t.frequency_hz for t in self.excitation.tones])
-        amplitude = np.array([t.amplitude_v for t in self.excitation.tones])
-        flux = np.abs((1.0 - machine.stator_resistance_ohm * admittance_s(machine, f)) / (2j * np.pi * f))
+        commanded = np.array([t.amplitude_v for t in self.excitation.tones])
+        admittance = admittance_s(machine, f)
+        flux = np.abs((1.0 - machine.stator_resistance_ohm * admittance) / (2j * np.pi * f))
+        lost = SURE_LOSS * math.sqrt(2.0 / math.pi) * self._plateau_v
+        amplitude = commanded
+        for _ in range(6):  # the inverter's equivalent resistance, see excitation.design
+            sigma = math.sqrt(0.5 * float(np.sum(np.abs(amplitude * admittance) ** 2)))
+            amplitude = commanded / np.abs(1.0 + lost / max(sigma, 1e-12) * admittance)
         return float(np.sum(flux * amplitude))
 
     def _permit(self, estimate: BlockEstimate, scale: float, time_s: float, current_a: Signal) -> float:
@@ -187,7 +199,7 @@ class FluxGuard:
             stator_resistance_ohm=max(r_s - 3.0 * s[0], 0.5 * r_s),
             magnetizing_inductance_h=l_m + min(3.0 * s[3], l_m),
         )
-        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12) + self._lost_scale
+        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12)
         self._granted = max(safe, min(1.0, by_model, MAX_RAISE * max(scale, safe)))
         return self._granted
 

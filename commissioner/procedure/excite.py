@@ -42,6 +42,8 @@ CLIMB_STEP_S = 0.02
 RUNGS = (1.0, 0.6, 0.3)
 """DC levels of one sign, of the top current."""
 SETTLED = 0.006
+KNEE_STEP, KNEE_TOP = 0.02, 0.3
+"""Points kept from the climb, of the top current: their distance and how far up."""
 COMPENSATION_ROWS = 1025
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
@@ -68,7 +70,8 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     yield from _ramp_down(findings, "DC staircase", axis_deg, 1.0 / BIAS_RAMP_PER_S)
     yield Disarm("staircase measured")
     findings.dc_voltages_v = voltages
-    fitted = resistance.fit_staircase(stair.levels, axis_deg)
+    findings.knee = findings.knee or tuple(stair.knee)
+    fitted = resistance.fit_staircase((*stair.levels, *findings.knee), axis_deg)
     findings.staircases.append(fitted)
     value, std = fitted.stator_resistance
     yield Tell(StaircaseFitted(axis_deg, value, std, fitted.error_voltage.value, stair.seconds))
@@ -83,6 +86,7 @@ class _Stair:
     findings: Findings
     axis_deg: float
     levels: list[DcLevel] = field(default_factory=list)
+    knee: list[DcLevel] = field(default_factory=list)
     seconds: float = 0.0
     offset_a: float = 0.0
 
@@ -109,6 +113,7 @@ class _Stair:
                 block = yield from self._fetch()
                 current = self._current(block)
                 step_s += block.count * block.sample_period_s
+            self._note_climb(volts[-1], float(np.mean(current)), (float(np.mean(current)) - reached[-1]) / step_s)
             reached.append(max(reached[-1], float(np.mean(current))))
         if reached[-1] < 0.3 * top_a:
             raise Aborted(
@@ -117,6 +122,15 @@ class _Stair:
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip
         return tuple(float(np.interp(rung * reached[-1], reached, volts)) for rung in RUNGS)
+
+    def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
+        """Points on the knee of the inverter's error, which no settled level shows; the iron's lag taken off."""
+        step_a, top_a = KNEE_STEP * self._plan.top_current_a, KNEE_TOP * self._plan.top_current_a
+        last_a = self.knee[-1].current_a if self.knee else 0.0
+        if last_a + step_a <= current_a <= top_a:
+            typical = prior(self.job.nameplate).typical
+            inductance_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
+            self.knee.append(DcLevel(voltage_v - inductance_h * rise_a_per_s, current_a, 0.0))
 
     def hold(self, voltage_v: float) -> Generator[Command, Any, None]:
         """Hold a level until its current has settled; keep the means of the last window."""
@@ -170,13 +184,13 @@ def excite(job: Job, findings: Findings) -> Step:
     limits = _excitation_limits(job, findings)
     if findings.first_look is None:
         guess = excitation.first_guess(job.nameplate, findings.resistance_ohm(job), limits)
-        yield from _test(job, findings, axis_deg, guess, FIRST_LOOK * seconds)
+        yield from _test(job, findings, axis_deg, guess, FIRST_LOOK * seconds, FIRST_LOOK * seconds)
         yield from _look_closer(job, findings)
     assert findings.estimate is not None
     chosen = excitation.design(
         job.nameplate, findings.estimate, limits, _period_s(findings), findings.inverter, seconds
     )
-    yield from _test(job, findings, axis_deg, chosen, seconds)
+    yield from _test(job, findings, axis_deg, chosen, seconds, job.axis_time_s)
     findings.tests_done += 1
     return Event.AXES_DONE if findings.tests_done == len(job.plan.tests_deg) else Event.AXIS_DONE
 
@@ -203,9 +217,12 @@ def _excitation_limits(job: Job, findings: Findings) -> ExcitationLimits:
 
 
 def _test(
-    job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float
+    job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float, longest_s: float
 ) -> Generator[Command, Any, None]:
-    """One energised multitone session: start small, raise as the guard permits, end when the time is up and settled."""
+    """One energised multitone session: start small, raise as the guard permits, end when the time is up and settled.
+
+    An estimate that has not settled after `seconds` gets more time, up to `longest_s`.
+    """
     tones = tuple((t.amplitude_v, t.frequency_hz, t.phase_rad) for t in chosen.excitation.tones)
     yield Tell(
         ExcitationChosen(
@@ -219,7 +236,7 @@ def _test(
     offset_a = yield from _measure_offset(findings, "multitone test", axis_deg)
     under_test = _UnderTest(job, findings, axis_deg, chosen, seconds, offset_a)
     yield SetScale(under_test.scale)
-    while not under_test.is_done():
+    while not under_test.is_done(longest_s):
         block = yield from _next_block(findings, "multitone test", axis_deg)
         reading = under_test.take(block)
         wanted = under_test.answer(reading)
@@ -296,10 +313,10 @@ class _UnderTest:
         self.scale = min(1.0, reading.permitted_scale)
         return self.scale
 
-    def is_done(self) -> bool:
+    def is_done(self, longest_s: float) -> bool:
         """The planned time is up and the estimate at rest, or no more time is allowed."""
         margin_s = 1.0 / self._job.scale_ramp_per_s + 0.2
-        if self.time_s >= self._job.axis_time_s - margin_s:
+        if self.time_s >= min(longest_s, self._job.axis_time_s - margin_s):
             return True
         return self.time_s >= self._seconds and self._settling().has_settled
 

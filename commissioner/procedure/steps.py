@@ -12,7 +12,7 @@ from typing import Any
 
 from commissioner.errors import CheckFailed
 from commissioner.identify.analysis import Identification, identify
-from commissioner.identify.resistance import IDEAL_INVERTER, InverterError, Staircase
+from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble
@@ -101,6 +101,7 @@ class Findings:
     checks: tuple[CheckResult, ...] = ()
     tests_done: int = 0
     dc_voltages_v: tuple[float, ...] = ()
+    knee: tuple[DcLevel, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
     first_look: Identification | None = None
     estimate: InverseGamma | None = None
