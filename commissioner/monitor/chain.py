@@ -20,15 +20,13 @@ from commissioner.monitor.proof import Proof, prove
 from commissioner.monitor.supply import TurningFrame, Vector, quietest, turning_frame
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.running import from_nameplate, slip_at_power
+from commissioner.motor.running import TCircuit, from_nameplate, slip_at_power
 from commissioner.records import RunningRecording, Signal
 
 SLIP_TRUST = 0.25
 """Relative standard deviation of the slip that the plate and the measured power suggest: plate tolerance and warmth."""
 LEAST_TURNS = 30
 LEAST_LOAD_PERIODS = 8
-SIGNIFICANT_ORDER = 7.0
-"""|Omega|^2 over its variance from which a harmonic counts: P = e^-7 on noise. Leaving a real one out costs more."""
 POINTS_PER_TURN = 360
 MOST_POINTS = 7200
 FM_MATTERS_RAD = 0.02
@@ -230,33 +228,46 @@ MOST_TURNS = 6
 def _estimate(
     lines: Lines, mains: int, start: Start, pairs: int, speed: float, speed_std: float
 ) -> tuple[Lines, Problem, Fitted]:
-    """Trim to the orders that the speed shows, fit with the mains harmonics, pose the waveform problem without them."""
-    trimmed = _trim(lines, mains, start, pairs, speed)
+    """Fit on the orders that the speed shows and the mains harmonics; the waveform's problem leaves out the mains."""
+    trimmed = _trim(lines, mains, start.circuit, pairs)
     fitted = fitting.fit(
         fitting.pose(keep(trimmed, fitting.informative(trimmed, mains)), start.circuit, pairs, speed, speed_std), start
     )
+    trimmed = _trim(lines, mains, fitted.circuit, pairs)
     loads_only = keep(trimmed, trimmed.comb < mains)
     return trimmed, fitting.pose(loads_only, fitted.circuit, pairs, speed, speed_std), fitted
 
 
-def _trim(lines: Lines, mains: int, start: Start, pairs: int, speed: float) -> Lines:
+def _trim(lines: Lines, mains: int, circuit: TCircuit, pairs: int) -> Lines:
     """Each comb up to its last significant order whose two side bands agree on a real speed."""
     wanted = np.ones(lines.comb.size, dtype=np.bool_)
     for comb in range(mains):
         own = keep(lines, (lines.comb == comb) | (lines.comb < 0))
         on = inversion.torus(own)
-        _, upper, lower = inversion.complex_speed(start.circuit, pairs, own, on)
-        _, up, low = inversion.speed_noise(start.circuit, pairs, own, on)
+        _, upper, lower = inversion.complex_speed(circuit, pairs, own, on)
+        _, up, low = inversion.speed_noise(circuit, pairs, own, on)
         variance_up, variance_low = np.sum(np.abs(up) ** 2, axis=0), np.sum(np.abs(low) ** 2, axis=0)
         weight = variance_low / (variance_up + variance_low)
         value = weight * upper + (1 - weight) * lower
         variance = variance_up * variance_low / (variance_up + variance_low)
         is_real = np.abs(upper - lower) < np.abs(upper + lower) + 3 * np.sqrt(variance_up + variance_low)
-        counts = (np.abs(value) ** 2 > SIGNIFICANT_ORDER * variance) & is_real
-        orders = own.order[on.positive]
-        last = max(int(orders[counts].max(initial=0)), 4)
+        last = _last_order(own.order[on.positive], np.abs(value) ** 2 * is_real, variance)
         wanted &= ~((lines.comb == comb) & (np.abs(lines.order) > last))
     return keep(lines, wanted)
+
+
+def _last_order(orders: NDArray[np.int64], power: Signal, variance: Signal) -> int:
+    """The cut with the least expected error of the acceleration: the sum of order^2 (|Omega|^2 - 3 var) is largest there.
+
+    Mallows' C_p with 3 for 2, because the cut is the best of many. At least `LEAST_ORDERS`.
+    """
+    rank = np.argsort(orders)
+    gain = np.cumsum((orders[rank] ** 2) * (power[rank] - SELECTION_PRICE * variance[rank]))
+    return max(int(orders[rank][int(np.argmax(gain))]), LEAST_ORDERS)
+
+
+LEAST_ORDERS = 4
+SELECTION_PRICE = 3.0
 
 
 def _with_wobble(
@@ -266,7 +277,7 @@ def _with_wobble(
 
     delta phi = integral of the ripple of all combs that do not follow the shaft: sum 2 Re(Omega / (j rate) e^{j phase}).
     """
-    speed = fitting.speed_lines(problem, fitted)
+    speed = fitting.speed_lines(problem, fitted, fitting.band_weights(problem, fitted))
     lines, on = problem.lines, problem.on
     orders, owner, rate = lines.order[on.positive], lines.comb[on.positive], lines.rate_rad_per_s[on.positive]
     wobble = np.zeros(combs[0].phase_rad.size)

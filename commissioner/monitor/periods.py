@@ -290,8 +290,23 @@ def _is_multiple(frequency_hz: float, fundamental_hz: float, tolerance_hz: float
     return bool(abs(frequency_hz - order * fundamental_hz) < 1.5 * tolerance_hz)
 
 
+NEAR_MAINS_HZ = 0.7
+"""Mains harmonics wander in size and phase: their skirts are not loads."""
+NEAR_COMB_HZ = 0.3
+"""Nor are the skirts of a comb whose load varies."""
+
+
+def _distance(frequency_hz: float, fundamental_hz: float) -> float:
+    return abs(frequency_hz - fundamental_hz * max(round(frequency_hz / fundamental_hz), 1))
+
+
 def is_product(frequency_hz: float, combs_hz: list[float], supply_hz: float, tolerance_hz: float) -> bool:
     """True where the line is a sum or difference of known combs and even mains harmonics: mixing, not a load."""
+    nearest = np.abs(frequency_hz - supply_hz * np.round(frequency_hz / supply_hz))
+    if frequency_hz > 0.5 * supply_hz and nearest < max(NEAR_MAINS_HZ, 6 * tolerance_hz):
+        return True
+    if any(_distance(frequency_hz, f) < max(NEAR_COMB_HZ, 4 * tolerance_hz) for f in combs_hz):
+        return True
     multiples = [np.arange(-12, 13) * f if k == 0 else np.arange(-6, 7) * f for k, f in enumerate(combs_hz)]
     mains = np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 6.0, -6.0]) * supply_hz
     sums = mains

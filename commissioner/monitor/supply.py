@@ -21,8 +21,8 @@ TURN = np.exp(2j * np.pi / 3)
 KNOT_SPACING_S = 1.5
 """Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 SEGMENT_S = 10.0
-LONGEST_SEGMENT_S = 30.0
-"""Longer averages gain little and meet the motor's warming."""
+LONGEST_SEGMENT_S = 60.0
+"""Longer averages meet the motor's warming."""
 SAME_POWER = 0.02
 SAME_VARIATION = 1.3
 BAND_IN_SUPPLY_FREQUENCIES = 14.0

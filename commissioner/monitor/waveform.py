@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.fit import Fitted, Problem, band_weights, circuit_at, speed_lines, steps
+from commissioner.monitor.fit import Fitted, Problem, band_weights, circuit_at, shrinkage, speed_lines, steps
 from commissioner.monitor.inversion import (
     RotorState, SpeedLines, Torus, basis_of, complex_speed, rotor_state, speed_noise, speed_on, torque_of,
 )
@@ -41,21 +41,28 @@ class Solved:
     circuit: TCircuit
     speed: SpeedLines
     state: RotorState
+    raw: SpeedLines
+    weight: Signal
     changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
     """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
 
 
 def solve(problem: Problem, fitted: Fitted) -> Solved:
     """The solution and one change per noise block and per direction of the parameters' covariance."""
-    speed = speed_lines(problem, fitted)
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
-    state = rotor_state(fitted.circuit, pairs, lines, on, speed)
     weight = band_weights(problem, fitted)
-    changes = [*_noise_changes(problem, fitted, speed, state, weight), *_parameter_changes(problem, fitted, speed, weight)]
+    raw = speed_lines(problem, fitted, weight)
+    speed = SpeedLines(raw.mean_rad_per_s, shrinkage(problem, fitted, weight) * raw.amplitude_rad_per_s)
+    state = rotor_state(fitted.circuit, pairs, lines, on, speed)
+    changes = [
+        *_noise_changes(problem, fitted, speed, state, weight),
+        *_parameter_changes(problem, fitted, speed, weight),
+        *_model_changes(problem, fitted, speed, state),
+    ]
     if np.isfinite(problem.mean_speed_std):
         moved = SpeedLines(speed.mean_rad_per_s + problem.mean_speed_std, speed.amplitude_rad_per_s)
         changes.append((fitted.circuit, moved, state.flux_wb, lines.current_a))
-    return Solved(fitted.circuit, speed, state, tuple(changes))
+    return Solved(fitted.circuit, speed, state, raw, weight, tuple(changes))
 
 
 def _noise_changes(
@@ -76,16 +83,31 @@ def _noise_changes(
     return changes
 
 
+def _model_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    """Each harmonic moved by its model error, real and imaginary part in turn."""
+    changes = []
+    for k, error in enumerate(problem.model_error):
+        for direction in (1.0, 1j):
+            amplitude = speed.amplitude_rad_per_s.copy()
+            amplitude[k] += direction * error / np.sqrt(2.0)
+            moved = SpeedLines(speed.mean_rad_per_s, amplitude)
+            changes.append((fitted.circuit, moved, state.flux_wb, problem.lines.current_a))
+    return changes
+
+
 def _parameter_changes(
     problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Signal
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)
     changes = []
     for step in steps(fitted):
         circuit = circuit_at(fitted, step)
         mean, upper, lower = complex_speed(circuit, pairs, lines, on)
         value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
-        moved = SpeedLines(value, weight * upper + (1 - weight) * lower)
+        moved = SpeedLines(value, speed.amplitude_rad_per_s + weight * (upper - start_up) + (1 - weight) * (lower - start_low))
         changes.append((circuit, moved, rotor_state(circuit, pairs, lines, on, moved).flux_wb, lines.current_a))
     return changes
 

@@ -99,9 +99,9 @@ def slip_at_current(circuit: TCircuit, supply_rad_per_s: float, voltage_v: float
     return high if excess(high) <= 0.0 else float(brentq(excess, low, high))
 
 
-STARTING_CURRENT = 5.5
-"""Locked-rotor over rated current of standard cage motors (IEC 60034-12 designs lie between 4 and 8)."""
-STATOR_SHARE_OF_REST = 0.65
+STARTING_CURRENT = 6.5
+"""Locked-rotor over rated current of standard cage motors (35 published circuits: median 6.9, from 3.6 to 14)."""
+STATOR_SHARE_OF_REST = 0.75
 """Share of the losses left after the rotor copper that is stator copper; the rest is iron and friction."""
 
 
