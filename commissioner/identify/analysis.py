@@ -42,8 +42,8 @@ EXTRA_POWERS = 4
 FINAL_REVIEWS = 6
 BLOCK = 500
 COARSE = 0.03  # of a standard error, while models are compared
-KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.4)
-"""Knots of the leg error, in fractions of the largest current; beyond the last it is constant."""
+KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+"""Knots of the leg error, in fractions of the largest current; beyond the last it has a hyperbolic tail."""
 COPPER_ZERO_DEGC = -234.5
 
 
@@ -167,7 +167,12 @@ def _identify_axis(
     _require_conditioned(batch)
     compensation = batch.compensation(axis_deg, span)
     law: Literal["fast", "lyapunov"] = "lyapunov" if estimator == "lyapunov" else "fast"
-    seen, observer = _observe(stretches, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
+    centred = [
+        replace(s, current_a=s.current_a - offset) for s, offset in zip(stretches, batch.offsets_a, strict=True)
+    ]
+    # DC levels do not excite persistently: the recursion is for tones, the batch fit takes the staircase along.
+    tones = [s for s in centred if s.kind != "staircase"] or centred
+    seen, observer = _observe(tones, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
     flux = batch.peak_flux_wb
     at_flux, covariance = batch.inverse_gamma_at(flux)
     linear = batch.inverse_gamma_at(0.0)[0]
@@ -255,7 +260,8 @@ def _first_estimate(
     if leg is not None:
         grid = np.linspace(0.0, span_a, 1025)
         compensation = Compensation(leg.on_axis(grid, stretches[0].axis_deg), span_a)
-    return _observe(stretches, plate, box, period_s, compensation, "fast", guess)[0]
+    tones = [s for s in stretches if s.kind != "staircase"] or stretches
+    return _observe(tones, plate, box, period_s, compensation, "fast", guess)[0]
 
 
 def _select(

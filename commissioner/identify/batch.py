@@ -46,7 +46,8 @@ class Segment:
 @dataclass(frozen=True)
 class ModelChoice:
     """What beyond the linear circuit is fitted: `extra_powers` odd powers (3, 5, ...) of flux in the magnetizing current
-    relative to `flux_scale_wb`, the inverter's leg error at `knots_a` (the first, 0, is not among them), a delay."""
+    relative to `flux_scale_wb`, the inverter's leg error at `knots_a` (the first, 0, is not among them) and the height of its
+    tail beyond the last knot, v_K + t (1 - x_K / x), a delay."""
 
     extra_powers: int = 0
     flux_scale_wb: float = 1.0
@@ -56,7 +57,31 @@ class ModelChoice:
 
     @property
     def size(self) -> int:
-        return SHARED + self.extra_powers + len(self.knots_a)
+        return SHARED + self.extra_powers + self.leg_size
+
+    @property
+    def leg_size(self) -> int:
+        return len(self.knots_a) + 1 if self.knots_a else 0
+
+    def leg_points(self) -> Signal:
+        """Currents at which a leg error is tabulated: the knots, then the tail to 30 times the last."""
+        return np.concatenate([[0.0], self.knots_a, self.knots_a[-1] * np.geomspace(1.15, 30.0, 14)])
+
+    def leg_basis(self) -> Matrix:
+        """(points, coefficients): leg voltage at `leg_points` per unit of each coefficient."""
+        points, count = self.leg_points(), len(self.knots_a)
+        basis = np.zeros((points.size, count + 1))
+        basis[1 : count + 1, :count] = np.eye(count)
+        basis[count + 1 :, count - 1] = 1.0
+        basis[count + 1 :, count] = 1.0 - self.knots_a[-1] / points[count + 1 :]
+        return basis
+
+    def leg_coefficients(self, leg: InverterError) -> Matrix:
+        """The coefficients that come nearest to a leg error known otherwise."""
+        knots = np.array(self.knots_a)
+        at_knots = leg.leg_voltage_v(knots)
+        far = leg.leg_voltage_v(knots[-1:] * 4.0)[0]
+        return np.append(at_knots, (far - at_knots[-1]) / 0.75)
 
     @property
     def free_shared(self) -> NDArray[np.bool_]:
@@ -133,10 +158,10 @@ class BatchFit:
         if not self.model.knots_a:
             return None
         start = SHARED + self.model.extra_powers
-        std = np.sqrt(np.diag(self.covariance)[start:])
-        return InverterError(
-            (0.0, *self.model.knots_a), (0.0, *map(float, self.theta[start:])), (0.0, *map(float, std))
-        )
+        basis = self.model.leg_basis()
+        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, self.covariance[start:, start:], basis), 0.0))
+        values = basis @ self.theta[start:]
+        return InverterError(tuple(self.model.leg_points().tolist()), tuple(values.tolist()), tuple(std.tolist()))
 
     def compensation(self, axis_deg: float, current_span_a: float) -> Compensation:
         """What an observer has to take off along this axis to see the unsaturated linear machine."""
@@ -224,16 +249,13 @@ class _Problem:
         return np.array([self.model.with_offset, not segment.starts_at_rest, not segment.starts_at_rest])
 
     def _basis(self, axis_deg: float) -> Matrix:
-        """(rows, knots): the axis voltage that one volt at each knot makes, over the axis current."""
-        knots = self.model.knots_a
+        """(rows, coefficients): the axis voltage that a unit of each leg coefficient makes, over the axis current."""
+        if not self.model.knots_a:
+            return np.zeros((TABLE_ROWS, 0))
+        points = tuple(self.model.leg_points().tolist())
         grid = np.linspace(0.0, self.current_span_a, TABLE_ROWS)
-        columns = []
-        for k in range(len(knots)):
-            hat = np.zeros(len(knots) + 1)
-            hat[k + 1] = 1.0
-            leg = InverterError((0.0, *knots), tuple(hat))
-            columns.append(leg.on_axis(grid, axis_deg))
-        return np.ascontiguousarray(np.column_stack(columns)) if columns else np.zeros((TABLE_ROWS, 0))
+        legs = (InverterError(points, tuple(column)) for column in self.model.leg_basis().T.tolist())
+        return np.ascontiguousarray(np.column_stack([leg.on_axis(grid, axis_deg) for leg in legs]))
 
     def evaluate(self, theta: Matrix, own: Matrix) -> _Evaluation:
         held = _held_with_derivatives(theta[:CIRCUIT], self.period_s)
@@ -327,7 +349,7 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
     theta[SHARED : SHARED + common] = fit.theta[SHARED : SHARED + common] * powers
     leg = fit.inverter()
     if leg is not None and model.knots_a:
-        theta[SHARED + new :] = leg.leg_voltage_v(np.array(model.knots_a))
+        theta[SHARED + new :] = model.leg_coefficients(leg)
     return theta
 
 
@@ -356,7 +378,7 @@ def start_theta(start: InverseGamma, model: ModelChoice, leg: InverterError | No
         gamma.stator_resistance_ohm, gamma.rotor_resistance_ohm, gamma.leakage_inductance_h, gamma.stator_inductance_h
     )
     if leg is not None and model.knots_a:
-        theta[SHARED + model.extra_powers :] = leg.leg_voltage_v(np.array(model.knots_a))
+        theta[SHARED + model.extra_powers :] = model.leg_coefficients(leg)
     return theta
 
 

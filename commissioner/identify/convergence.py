@@ -24,7 +24,7 @@ def settled(
     history: Sequence[tuple[float, BlockEstimate]], window_s: float, allowed_std: tuple[float, float, float, float]
 ) -> Settling:
     """Judge (time, estimate) pairs: every relative standard error within `allowed_std`, and no parameter has moved in
-    the last `window_s` by more than three of its standard errors or a tenth of what is allowed."""
+    the last `window_s` by more than three of its standard errors or a third of what is allowed."""
     nothing = (float("inf"),) * 4
     if not history:
         return Settling(False, nothing, nothing, "no estimate yet")
@@ -38,7 +38,7 @@ def settled(
     for name, moved, s, allowed in zip(NAMES, drift, std, allowed_std, strict=True):
         if s > allowed:
             return Settling(False, _four(drift), _four(std), f"{name}: standard error {s:.2%}, allowed {allowed:.2%}")
-        if moved > max(3.0 * s, 0.1 * allowed):
+        if moved > max(3.0 * s, allowed / 3.0):
             return Settling(False, _four(drift), _four(std), f"{name}: moved {moved:.2%} in {window_s:g} s, error {s:.2%}")
     return Settling(True, _four(drift), _four(std), "all four parameters within their allowed standard errors and at rest")
 

@@ -30,6 +30,8 @@ ABORT_ABOVE = 1.01
 MAX_RAISE = 2.0
 AGREEMENT = 0.3
 SURE_LOSS = 0.8
+HOLD_OFF, URGENT = 3.0, 1.05
+"""One step down at a time: reactions to wait for its effect, unless the flux is this far above the limit."""
 
 
 class FluxAdvice(enum.Enum):
@@ -72,6 +74,8 @@ class FluxGuard:
     _last_scale: float = field(default=0.0, init=False)
     _was_high: bool = field(default=False, init=False)
     _granted: float = field(default=0.0, init=False)
+    _ceiling: float = field(default=1.0, init=False)
+    _backed_off_s: float = field(default=-math.inf, init=False)
     _recent: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
     @property
@@ -218,11 +222,16 @@ class FluxGuard:
         return bool(difference < AGREEMENT * self.limit_wb and explained and certain)
 
     def _advise(self, fraction: float, reached: float, scale: float, permitted: float) -> tuple[FluxAdvice, float]:
+        permitted = min(permitted, self._ceiling)
         if fraction <= BACK_OFF_ABOVE:
             self._was_high = False
             return (FluxAdvice.RAISE if permitted > 1.001 * scale else FluxAdvice.HOLD), permitted
         if self._was_high and reached > ABORT_ABOVE * self.limit_wb:
             return FluxAdvice.ABORT, 0.0
         self._was_high = True
-        self._granted = min(permitted, scale * TARGET / fraction)
+        time_s = self._samples * self.sample_period_s
+        if time_s - self._backed_off_s < HOLD_OFF * (self.latency_s + self.reaction_s) and fraction < URGENT:
+            return FluxAdvice.HOLD, permitted  # the last step down has not reached the flux yet
+        self._backed_off_s = time_s
+        self._granted = self._ceiling = min(permitted, scale * TARGET / fraction)
         return FluxAdvice.BACK_OFF, self._granted

@@ -132,72 +132,89 @@ class Staircase:
     levels: tuple[DcLevel, ...]
 
 
-KNEE_POINTS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 5.0, 8.0, 14.0, 25.0)
-CLIMB_WEIGHT = 0.2
-"""A climbing point is worth less than a settled level: its flux lags behind its current."""
+KNEE_POINTS = np.concatenate([[0.0], np.geomspace(0.05, 200.0, 40)])
+"""Where a fitted knee shape is tabulated, in knee currents."""
+TAILS = (1.0, 1.5, 2.0, 4.0)
+"""Exponents n of the knee shapes tried, x / (1 + x^n)^(1/n): from a hyperbola, whose tail is long, to almost a corner."""
 
 
 def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
-    """Least squares of u = R_s i + F(i - offset) + L di/dt over the levels.
+    """Least squares of u = R_s i + F(i - offset) over the levels, leg error f(x) = V s(x / knee), for several knee shapes.
 
-    A leg loses f(x) = V z / (1 + z^p)^(1/p), z = x / knee: from a long tail (output capacitance) to a sharp corner.
-    L, the inductance seen while climbing, counts only where a level has a slope. Fewer than three levels with current,
-    two of one sign, cannot separate resistance from lost voltage: DataRefused.
+    Shapes weigh with how well they fit; what they disagree about is part of the standard errors. Fewer than three levels
+    with current, or fewer than two of one sign, cannot separate resistance from lost voltage: DataRefused.
     """
-    voltage = np.array([level.voltage_v for level in levels])
-    current = np.array([level.current_a for level in levels])
-    rise = np.array([level.rise_a_per_s for level in levels])
-    largest = float(np.max(np.abs(current), initial=0.0))
-    _require_levels(current[rise == 0.0], largest)
-    weight = np.where(rise == 0.0, 1.0, CLIMB_WEIGHT)
-    has_both_signs = bool(np.any(current > 0.1 * largest) and np.any(current < -0.1 * largest))
-
-    def misfit(p: Signal) -> Signal:
-        resistance, plateau, log_knee, log_power, offset, inductance = p
-        true = current - (offset if has_both_signs else 0.0)
-        leg = _knee_shape(plateau, math.exp(log_knee), math.exp(log_power))
-        model = resistance * true + leg.on_axis(true, axis_deg) + inductance * rise
-        prior_terms = [(log_knee - math.log(0.05 * largest)) / 2.0, (log_power - 0.4) / 0.5, offset / (0.02 * largest)]
-        return np.concatenate([weight * (voltage - model) / noise, prior_terms])
-
-    start, scale, low, high = _staircase_start(voltage, current, largest)
-    noise = 0.003 * float(np.max(np.abs(voltage)))
-    for _ in range(3):
-        fit = least_squares(misfit, start, bounds=(low, high), x_scale=scale)
-        start = fit.x
-        residual = misfit(fit.x)[: voltage.size] * noise
-        noise = max(float(np.sqrt(np.sum(residual**2) / np.sum(weight**2))), 1e-5 * float(np.max(np.abs(voltage))))
-    std = np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)))
-    inverter = _knee_shape(fit.x[1], math.exp(fit.x[2]), math.exp(fit.x[3]))
+    largest = max((abs(level.current_a) for level in levels), default=0.0)
+    carrying = [level for level in levels if abs(level.current_a) > 0.1 * largest]
+    positive = sum(level.current_a > 0 for level in carrying)
+    if largest <= 0.0 or len(carrying) < 3 or max(positive, len(carrying) - positive) < 2:
+        raise DataRefused(
+            "the DC staircase has too few levels that carry current", step="fit DC staircase",
+            value=f"{len(carrying)} levels above a tenth of the largest current",
+            limit="3 levels, 2 of one sign", remedy="raise the DC levels or the current limit",
+        )
+    fits = [_fit_shape(levels, axis_deg, tail, largest, 0 < positive < len(carrying)) for tail in TAILS]
+    best = min(fits, key=lambda f: f.misfit)
+    weights = np.array([math.exp(-0.5 * max(len(levels) - 4, 1) * (f.misfit / best.misfit - 1.0)) for f in fits])
+    weights /= weights.sum()
+    values = np.array([f.values for f in fits])
+    mean = weights @ values
+    spread = np.sqrt(weights @ (values - mean) ** 2 + weights @ np.array([np.square(f.std) for f in fits]))
+    shape = knee_shape(best.values[1], best.values[2], best.tail)
     return Staircase(
-        stator_resistance=Quantity(float(fit.x[0]), float(std[0])),
-        error_voltage=Quantity(float(fit.x[1]), float(std[1])),
-        offset_a=float(fit.x[4]) if has_both_signs else 0.0,
-        inverter=InverterError(inverter.current_a, inverter.voltage_v, (float(std[1]),) * len(KNEE_POINTS)),
-        residual_v=noise,
+        stator_resistance=Quantity(float(best.values[0]), float(spread[0] + abs(mean[0] - best.values[0]))),
+        error_voltage=Quantity(float(best.values[1]), float(spread[1] + abs(mean[1] - best.values[1]))),
+        offset_a=float(best.values[3]),
+        inverter=InverterError(shape.current_a, shape.voltage_v, (float(spread[1]),) * len(shape.current_a)),
+        residual_v=math.sqrt(best.misfit),
         levels=tuple(levels),
     )
 
 
-def _require_levels(settled_a: Signal, largest_a: float) -> None:
-    carrying = settled_a[np.abs(settled_a) > 0.1 * largest_a]
-    positive = int(np.sum(carrying > 0))
-    if largest_a <= 0.0 or carrying.size < 3 or max(positive, carrying.size - positive) < 2:
-        raise DataRefused(
-            "the DC staircase has too few levels that carry current", step="fit DC staircase",
-            value=f"{carrying.size} levels above a tenth of the largest current",
-            limit="3 levels, 2 of one sign", remedy="raise the DC levels or the current limit",
-        )
+@dataclass(frozen=True)
+class _ShapeFit:
+    """(R_s, V, knee, offset) for one knee shape, their standard errors and the mean square misfit of the levels in V^2."""
+
+    tail: float
+    values: Signal
+    std: Signal
+    misfit: float
 
 
-def _knee_shape(plateau_v: float, knee_a: float, power: float) -> InverterError:
-    points = np.array(KNEE_POINTS)
-    values = plateau_v * points / (1.0 + points**power) ** (1.0 / power)
-    return InverterError(tuple(map(float, knee_a * points)), tuple(map(float, values)))
+def _fit_shape(
+    levels: Sequence[DcLevel], axis_deg: float, tail: float, largest: float, has_both_signs: bool
+) -> _ShapeFit:
+    voltage = np.array([level.voltage_v for level in levels])
+    current = np.array([level.current_a for level in levels])
+    start, scale, lower = _staircase_start(voltage, current, largest)
+    top_v = float(np.max(np.abs(voltage)))
+    noise = 0.002 * top_v
+
+    def misfit(p: Signal) -> Signal:
+        true = current - (p[3] if has_both_signs else 0.0)
+        shape = knee_shape(p[1], p[2], tail)
+        wide = [0.3 * math.log(p[2] / (0.02 * largest)), p[3] / (0.03 * largest)]
+        return np.concatenate([(voltage - p[0] * true - shape.on_axis(true, axis_deg)) / noise, wide])
+
+    for _ in range(2):
+        fit = least_squares(misfit, start, bounds=(lower, np.inf), x_scale=scale)
+        start = fit.x
+        residual = misfit(fit.x)[: voltage.size] * noise
+        noise = max(math.sqrt(float(residual @ residual) / max(voltage.size - 4, 1)), 3e-5 * top_v)
+    std = np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)))
+    if not has_both_signs:
+        fit.x[3] = 0.0
+    return _ShapeFit(tail, fit.x, std, max(float(np.mean(residual**2)), (1e-5 * top_v) ** 2))
 
 
-def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[Signal, Signal, Signal, Signal]:
-    """Resistance and plateau from the straight line through the upper levels; start, scale, lower and upper bounds."""
+def knee_shape(plateau_v: float, knee_a: float, tail: float) -> InverterError:
+    """V x / (1 + x^n)^(1/n), x = current / knee, tabulated."""
+    values = plateau_v * KNEE_POINTS / (1.0 + KNEE_POINTS**tail) ** (1.0 / tail)
+    return InverterError(tuple((knee_a * KNEE_POINTS).tolist()), tuple(values.tolist()))
+
+
+def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[Signal, Signal, Signal]:
+    """(R_s, V, knee, offset): resistance and plateau from the straight line through the upper levels; scales, lower bounds."""
     upper = np.abs(current) > 0.4 * largest
     if upper.sum() < 2:
         upper = np.abs(current) > 0.1 * largest
@@ -205,11 +222,10 @@ def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[
     (resistance, loss), *_ = np.linalg.lstsq(design, voltage[upper], rcond=None)
     top_v = float(np.max(np.abs(voltage)))
     resistance = max(float(resistance), 0.05 * top_v / largest)
-    start = np.array([resistance, max(0.75 * float(loss), 1e-3 * top_v), math.log(0.05 * largest), 0.4, 0.0, 0.0])
-    scale = np.array([resistance, top_v, 1.0, 0.5, 0.01 * largest, 0.1 * top_v / largest])
-    low = np.array([0.0, -top_v, math.log(1e-4 * largest), math.log(0.7), -0.1 * largest, 0.0])
-    high = np.array([np.inf, top_v, math.log(largest), math.log(8.0), 0.1 * largest, np.inf])
-    return start, scale, low, high
+    start = np.array([resistance, max(0.75 * float(loss), 1e-3 * top_v), 0.02 * largest, 0.0])
+    scale = np.array([resistance, top_v, 0.02 * largest, 0.01 * largest])
+    lower = np.array([0.0, -np.inf, 1e-5 * largest, -np.inf])
+    return start, scale, lower
 
 
 def flux_limit_wb(nameplate: Nameplate, fraction: float) -> float:
