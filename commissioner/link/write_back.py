@@ -46,9 +46,11 @@ class WriteBack:
         self._profile = items.profile
         self._journal = journal
         self._sleep, self._clock = sleep, clock
+        self._has_asked_to_commit = False
 
     def snapshot(self) -> ParameterSnapshot:
-        """What the drive holds now. `stored` is empty where the drive cannot show its non-volatile set."""
+        """What the drive holds once its jobs are done. `stored` is empty where the drive cannot show that set."""
+        self._let_jobs_end()
         return ParameterSnapshot(
             identity=read_identity(self._items),
             in_use=self._read_in_use(),
@@ -174,6 +176,7 @@ class WriteBack:
     def _commit(self) -> None:
         values: dict[str, Value] = {"commit": self._profile.commands["commit"]}
         self._journal(Intent(Action.COMMIT, values))
+        self._has_asked_to_commit = True
         self._items.write(values)
         self._await_result("commit_result", COMMIT_RESULTS, "commit")
 
@@ -204,6 +207,13 @@ class WriteBack:
         for address, value in writes:
             self._items.port.write(address, [value])
 
+    def _let_jobs_end(self) -> None:
+        """A commit or store whose answer was lost may still be at work: what is read before it ends is not the end."""
+        end = self._clock() + RESULT_DEADLINE_S
+        jobs = ("commit_result", "store_result")
+        while BUSY in self._items.read(jobs).values() and self._clock() < end:
+            self._sleep(POLL_S)
+
     def _await_result(self, item: str, meanings: Mapping[int, str], step: str) -> None:
         end = self._clock() + RESULT_DEADLINE_S
         result = int(self._items.read_number(item))
@@ -227,6 +237,9 @@ class WriteBack:
     # --- after --------------------------------------------------------------------------------------------------
     def _after_failure(self, error: DriveError, snapshot: ParameterSnapshot) -> WriteBackFailed:
         try:
+            if self._has_asked_to_commit:
+                self._stage(snapshot.in_use)  # a commit that is still under way can now only bring these into use
+            self._let_jobs_end()
             self._bring_back(snapshot)
             outcome, was_restored = "the values found before are in the drive again, verified", True
         except CommissionerError as second:

@@ -135,7 +135,7 @@ class TcpDevice(_Device):
                     self._answer_all(secured)
             else:
                 self._answer_all(plain)
-        except OSError:
+        except (OSError, struct.error, IndexError):  # what came was not Modbus: hang up
             return
 
     def _answer_all(self, line: socket.socket) -> None:

@@ -383,3 +383,31 @@ def test_a_drive_without_known_parameters_has_an_empty_snapshot_and_is_refused_b
     with pytest.raises(UsageError, match="cannot write back") as caught:
         inverter.write_parameters({}, inverter.snapshot())
     assert "keypad" in caught.value.remedy
+
+
+def test_a_commit_still_at_work_when_its_answer_is_lost_does_not_end_behind_our_back(bench):
+    """Seen over the wire: the old set was read, called restored, and then the commit came true."""
+    drive, finish, reads = bench.drive, bench.drive._commit, []
+    refresh = drive._refresh
+
+    def begin(word):
+        drive.put("commit_result", 1)
+        reads.append(0)
+        raise ReplyTimeout("no answer", step="test", value=None, limit=None, remedy="none")
+
+    def work():
+        if reads and len(reads) < 8:
+            reads.append(0)
+            if len(reads) == 8:
+                drive._commit = finish
+                finish(0xC0DE)
+        refresh()
+
+    drive._commit, drive._refresh = begin, work
+    with pytest.raises(WriteBackFailed) as caught:
+        bench.inverter.write_parameters(NEW, bench.snapshot)
+    assert caught.value.was_restored
+    for _ in range(10):
+        drive.read(576, 8)
+    assert len(reads) == 8
+    assert bench.held() == pytest.approx(OLD, rel=1e-6)

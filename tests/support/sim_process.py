@@ -1,0 +1,67 @@
+"""`python -m sim` as a process of its own, for tests that speak to it over a wire.
+
+    with SimProcess("--tcp", "0") as sim:
+        open_port(parse_url(sim.url), ...)
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+
+START_S = 60.0
+"""The first start on a fresh machine compiles the simulator's kernels."""
+
+
+class SimProcess:
+    """`url` is where it listens. `log()` is what was really true. Killed at the end, whatever happened."""
+
+    def __init__(self, *arguments: str, speed: str = "max") -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        self.log_file = Path(self._folder.name) / "state.jsonl"
+        self._command = [
+            sys.executable, "-m", "sim", "--speed", speed, "--state-log", str(self.log_file), *arguments
+        ]
+
+    def __enter__(self) -> SimProcess:
+        self._process = subprocess.Popen(
+            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL
+        )
+        kind, address = self._listening().split()[1:3]
+        self.url = {"tcp": f"tcp://{address}", "tls": f"tls://{address}", "rtu": f"rtu://{address}?parity=N&stop=1&baud=921600"}[kind]
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+        self._folder.cleanup()
+
+    def log(self) -> list[dict[str, object]]:
+        """The simulator's own record of states, writes and trips so far."""
+        return [json.loads(line) for line in self.log_file.read_text().splitlines() if line.endswith("}")]
+
+    def _listening(self) -> str:
+        assert self._process.stdout is not None
+        line, end = b"", time.monotonic() + START_S
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._process.stdout, selectors.EVENT_READ)
+            while not line.endswith(b"\n") and time.monotonic() < end:
+                if ready.select(0.2):
+                    piece = os.read(self._process.stdout.fileno(), 4096)
+                    if not piece:
+                        break
+                    line += piece
+        text = line.decode()
+        if not text.startswith("listening "):
+            self._process.kill()
+            raise AssertionError(f"sim did not start: {text} {self._process.communicate()[1].decode()}")
+        return text.splitlines()[0]
