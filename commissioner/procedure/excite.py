@@ -40,10 +40,11 @@ BIAS_RAMP_PER_S = 4.0
 """The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
 CLIMB_STEP_S = 0.02
 RUNGS = (1.0, 0.6, 0.3)
-"""DC levels of one sign, of the top current."""
+LATER_RUNGS = 2
+"""DC levels of one sign, of the top current; how many of them once the inverter is known."""
 SETTLED = 0.006
-KNEE_STEP, KNEE_TOP = 0.02, 0.3
-"""Points kept from the climb, of the top current: their distance and how far up."""
+KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
+"""Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
 COMPENSATION_ROWS = 1025
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
@@ -62,14 +63,14 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     yield Enable("DC staircase")
     findings.segment += 1
     yield from stair.zero()
-    voltages = findings.dc_voltages_v or (yield from stair.climb())
+    voltages = findings.dc_voltages_v[:LATER_RUNGS] or (yield from stair.climb())
     for voltage_v in (*voltages, *(-v for v in reversed(voltages))):
         yield from stair.hold(voltage_v)
         yield Tell(stair.progress(2 * len(voltages)))
     yield SetBias(0.0)
     yield from _ramp_down(findings, "DC staircase", axis_deg, 1.0 / BIAS_RAMP_PER_S)
     yield Disarm("staircase measured")
-    findings.dc_voltages_v = voltages
+    findings.dc_voltages_v = findings.dc_voltages_v or voltages
     findings.knee = findings.knee or tuple(stair.knee)
     fitted = resistance.fit_staircase((*stair.levels, *findings.knee), axis_deg)
     findings.staircases.append(fitted)
@@ -124,13 +125,14 @@ class _Stair:
         return tuple(float(np.interp(rung * reached[-1], reached, volts)) for rung in RUNGS)
 
     def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
-        """Points on the knee of the inverter's error, which no settled level shows; the iron's lag taken off."""
+        """Points on the knee of the inverter's error, which no settled level shows; the iron's small lag taken off."""
         step_a, top_a = KNEE_STEP * self._plan.top_current_a, KNEE_TOP * self._plan.top_current_a
         last_a = self.knee[-1].current_a if self.knee else 0.0
         if last_a + step_a <= current_a <= top_a:
             typical = prior(self.job.nameplate).typical
-            inductance_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
-            self.knee.append(DcLevel(voltage_v - inductance_h * rise_a_per_s, current_a, 0.0))
+            lag_v = (typical.leakage_inductance_h + typical.magnetizing_inductance_h) * rise_a_per_s
+            if lag_v < KNEE_LAG * voltage_v:
+                self.knee.append(DcLevel(voltage_v - lag_v, current_a, 0.0))
 
     def hold(self, voltage_v: float) -> Generator[Command, Any, None]:
         """Hold a level until its current has settled; keep the means of the last window."""
