@@ -385,29 +385,34 @@ def test_a_drive_without_known_parameters_has_an_empty_snapshot_and_is_refused_b
     assert "keypad" in caught.value.remedy
 
 
-def test_a_commit_still_at_work_when_its_answer_is_lost_does_not_end_behind_our_back(bench):
+@pytest.mark.parametrize("latches", [False, True], ids=["takes what is staged at its end", "took it at the command"])
+def test_a_commit_still_at_work_when_its_answer_is_lost_does_not_end_behind_our_back(bench, latches):
     """Seen over the wire: the old set was read, called restored, and then the commit came true."""
-    drive, finish, reads = bench.drive, bench.drive._commit, []
+    drive, finish, reads, taken = bench.drive, bench.drive._commit, [], []
     refresh = drive._refresh
 
     def begin(word):
         drive.put("commit_result", 1)
         reads.append(0)
+        taken.extend(drive.words[592:601])
         raise ReplyTimeout("no answer", step="test", value=None, limit=None, remedy="none")
 
     def work():
-        if reads and len(reads) < 8:
+        if reads and len(reads) < 12:
             reads.append(0)
-            if len(reads) == 8:
+            if len(reads) == 12:
                 drive._commit = finish
+                staged = list(drive.words[592:601])
+                drive.words[592:601] = taken if latches else staged
                 finish(0xC0DE)
+                drive.words[592:601] = staged
         refresh()
 
     drive._commit, drive._refresh = begin, work
     with pytest.raises(WriteBackFailed) as caught:
         bench.inverter.write_parameters(NEW, bench.snapshot)
     assert caught.value.was_restored
-    for _ in range(10):
+    for _ in range(20):
         drive.read(576, 8)
-    assert len(reads) == 8
+    assert len(reads) == 12
     assert bench.held() == pytest.approx(OLD, rel=1e-6)
