@@ -72,7 +72,6 @@ class FluxGuard:
     _samples: int = field(default=0, init=False)
     _scale_since_s: float = field(default=0.0, init=False)
     _last_scale: float = field(default=0.0, init=False)
-    _was_high: bool = field(default=False, init=False)
     _granted: float = field(default=0.0, init=False)
     _ceiling: float = field(default=1.0, init=False)
     _backed_off_s: float = field(default=-math.inf, init=False)
@@ -115,7 +114,9 @@ class FluxGuard:
             self._scale_since_s = time_s
         self._last_scale = present_scale
         permitted = self._permit(estimate, present_scale, time_s, current_a)
-        advice, permitted = self._advise(fraction, max(observer_wb, model_free_wb), present_scale, permitted)
+        advice, permitted = self._advise(
+            fraction, min(observer_wb, model_free_wb), present_scale, permitted, time_s
+        )
         rotor_wb = float(np.max(np.abs(estimate.rotor_flux_wb)))
         return FluxReading(observer_wb, model_free_wb, predicted_wb, rotor_wb, fraction, advice, permitted)
 
@@ -221,17 +222,23 @@ class FluxGuard:
         certain &= estimate.std[3] < 0.2 * estimate.parameters.magnetizing_inductance_h
         return bool(difference < AGREEMENT * self.limit_wb and explained and certain)
 
-    def _advise(self, fraction: float, reached: float, scale: float, permitted: float) -> tuple[FluxAdvice, float]:
+    def _advise(
+        self, fraction: float, agreed_wb: float, scale: float, permitted: float, time_s: float
+    ) -> tuple[FluxAdvice, float]:
+        """Back off on the larger of the estimates; abort only where both say that a back-off in effect did not help.
+
+        A back-off is given time to reach the flux before the next one, and never asks for less than the scale with which
+        no motor can pass the limit.
+        """
         permitted = min(permitted, self._ceiling)
         if fraction <= BACK_OFF_ABOVE:
-            self._was_high = False
             return (FluxAdvice.RAISE if permitted > 1.001 * scale else FluxAdvice.HOLD), permitted
-        if self._was_high and reached > ABORT_ABOVE * self.limit_wb:
+        since_s = time_s - self._backed_off_s
+        if agreed_wb > ABORT_ABOVE * self.limit_wb and self.latency_s + self.reaction_s < since_s < math.inf:
             return FluxAdvice.ABORT, 0.0
-        self._was_high = True
-        time_s = self._samples * self.sample_period_s
-        if time_s - self._backed_off_s < HOLD_OFF * (self.latency_s + self.reaction_s) and fraction < URGENT:
-            return FluxAdvice.HOLD, permitted  # the last step down has not reached the flux yet
+        if since_s < HOLD_OFF * (self.latency_s + self.reaction_s) and fraction < URGENT:
+            return FluxAdvice.HOLD, permitted
         self._backed_off_s = time_s
-        self._granted = self._ceiling = min(permitted, scale * TARGET / fraction)
+        self._granted = max(min(permitted, scale * TARGET / fraction), min(scale, TARGET * self.safe_scale))
+        self._ceiling = self._granted
         return FluxAdvice.BACK_OFF, self._granted
