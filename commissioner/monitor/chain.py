@@ -71,6 +71,7 @@ class Observation:
     mean_torque_std: float
     proof: Proof
     findings: tuple[Finding, ...]
+    inertia_kg_m2: float | None
 
     @property
     def pole_pairs(self) -> int:
@@ -194,7 +195,7 @@ def _invert(
     return Observation(
         audited, frame, part, found, search, lines, combs, problem, fitted, start, solved, period,
         tuple(_load_periods(members, combs, found.shaft.frequency_hz, problem, solved, float(np.ptp(frame.time_s[part])))),
-        whole, whole_std, shaft_speed, torque, torque_std, proof, (*audited.findings, _wander(frame, part)),
+        whole, whole_std, shaft_speed, torque, torque_std, proof, (*audited.findings, _wander(frame, part)), inertia,
     )
 
 

@@ -1,0 +1,217 @@
+"""The answer as plain numbers: the contract's JSON keys, and what the data could not fix, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from commissioner.monitor.audit import Audited, Finding
+from commissioner.monitor.chain import Observation, Refused
+from commissioner.monitor.fit import NAMES, Fitted, circuit_at, steps
+from commissioner.monitor.indicators import Indicator, Pulses, rotor_side_bands
+from commissioner.monitor.trend import Entry, Verdict
+from commissioner.motor.circuit import EQUAL_LEAKAGE
+
+OPEN = 0.25
+"""A combination that keeps more than this share of its prior variance was not fixed by the data."""
+WORDS = {
+    "stator_resistance_ohm": "R_s", "rotor_resistance_ohm": "R_r", "magnetizing_inductance_h": "L_m",
+    "leakage_inductance_h": "L_l",
+}
+
+
+def quantity(value: float, std: float) -> dict[str, float]:
+    return {"value": float(value), "std": float(std)}
+
+
+def as_document(
+    observation: Observation, pulses: Pulses | None, indicators: list[Indicator], verdict: Verdict | None
+) -> dict[str, object]:
+    """The contract's `monitor` result. All quantities SI, per-phase star equivalent, referred to the stator."""
+    period = observation.period
+    load = None
+    if period.load_torque_nm is not None and period.load_torque_std is not None:
+        load = {"rms_std_nm": float(np.sqrt(np.mean(period.load_torque_std**2)))}
+    return {
+        "outcome": "done",
+        "refused_because": None,
+        "mean_speed_rad_per_s": quantity(observation.mean_speed_rad_per_s, observation.mean_speed_std),
+        "mean_torque_nm": quantity(observation.mean_torque_nm, observation.mean_torque_std),
+        "slip": observation.slip,
+        "segment": _segment(observation),
+        "parameters": _parameters(observation.fitted),
+        "t_model": _t_model(observation.fitted),
+        "parameters_from": observation.start.origin,
+        "cannot_be_fixed": cannot_be_fixed(observation.fitted),
+        "periods": [
+            {
+                "name": p.name, "frequency_hz": quantity(p.frequency_hz, p.frequency_std_hz),
+                "period_s": quantity(1 / p.frequency_hz, p.frequency_std_hz / p.frequency_hz**2),
+                "ratio_to_shaft": p.ratio_to_shaft, "follows": p.follows, "harmonics": p.harmonics,
+                "periods_averaged": p.periods_averaged, "speed_ripple_rms_rad_per_s": p.speed_ripple_rad_per_s,
+            }
+            for p in observation.load_periods
+        ],
+        "waveforms": {
+            "speed_rms_std_rad_per_s": float(np.sqrt(np.mean(period.speed_std**2))),
+            "electromagnetic_torque_rms_std_nm": float(np.sqrt(np.mean(period.torque_std**2))),
+            "load_torque": load or "not given: the inertia is unknown",
+            "starts_at_s": float(period.time_s[0]),
+            "shaft_angle": "counted from the first row; its origin is arbitrary without an encoder",
+            "contains": "what repeats with the loads; ripple at multiples of the supply frequency is left out",
+        },
+        "current_resimulation_error": {
+            "relative_rms": observation.proof.relative_rms,
+            "periodic_share": _finite(observation.proof.periodic_share),
+            "over_s": float(np.ptp(observation.proof.time_s)),
+        },
+        "reference_speed": None,
+        "indicators": indicator_document(observation, pulses, indicators),
+        "trend": None if verdict is None else verdict_document(verdict),
+        "audit": audit_document(observation.audited, observation.findings),
+        "quantities": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
+    }
+
+
+def refused_document(refused: Refused) -> dict[str, object]:
+    """What was learned before the refusal, and the reason with its number."""
+    reason = refused.reason
+    return {
+        "outcome": "rejected",
+        "refused_because": {
+            "code": reason.code, "what": reason.what, "value": reason.value, "limit": reason.limit, "remedy": reason.remedy,
+        },
+        "mean_speed_rad_per_s": None,
+        "mean_torque_nm": None,
+        "parameters": None,
+        "periods": [],
+        "current_resimulation_error": None,
+        "indicators": _terminal(refused.audited),
+        "audit": audit_document(refused.audited, refused.findings),
+    }
+
+
+def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
+    """The combination of parameters that is least known, in words, and how much of it is prior."""
+    parts = [
+        f"{WORDS[name]}^{weight:+.2f}" for name, weight in zip(NAMES, fitted.open_direction, strict=True) if abs(weight) > 0.05
+    ]
+    std = float(np.sqrt(fitted.open_direction @ fitted.log_covariance @ fitted.open_direction))
+    return {
+        "combination": " * ".join(parts),
+        "relative_std": std,
+        "share_from_prior": fitted.open_share,
+        "sentence": (
+            f"The data hardly fix {' * '.join(parts)}: {fitted.open_share:.0%} of its prior uncertainty is left."
+            if fitted.open_share > OPEN else
+            f"Least known is {' * '.join(parts)}, to {std:.1%}; the data fix all four parameters."
+        ),
+    }
+
+
+def indicator_document(observation: Observation, pulses: Pulses | None, indicators: list[Indicator]) -> dict[str, object]:
+    document: dict[str, object] = {
+        indicator.name: quantity(indicator.quantity.value, indicator.quantity.std) for indicator in indicators
+    }
+    document["pulses_per_turn"] = None if pulses is None else pulses.per_turn
+    document |= _terminal(observation.audited)
+    bands = rotor_side_bands(
+        observation.found.left_over, observation.search.supply_hz, observation.slip, float(abs(observation.lines.current_a[0]))
+    )
+    document["rotor_side_bands"] = None if bands is None else {
+        "offset_hz": bands.offset_hz, "level_db": bands.level_db, "above_floor_db": bands.above_floor_db,
+    }
+    return document
+
+
+def entry_of(observation: Observation, indicators: list[Indicator], source: str) -> Entry:
+    """What a baseline stores of this recording."""
+    return Entry(
+        source, observation.mean_speed_rad_per_s, observation.mean_torque_nm, observation.search.supply_hz,
+        {i.name: (i.quantity.value, i.noise_std) for i in indicators},
+    )
+
+
+def verdict_document(verdict: Verdict) -> dict[str, object]:
+    return {
+        "state": verdict.state.name.lower(), "sentence": verdict.state.value, "compared_with": verdict.compared_with,
+        "alarms": list(verdict.names), "false_alarm_per_indicator": verdict.false_alarm,
+        "healthy_recordings_that_alarm_against_the_others": verdict.left_out_alarms,
+        "healthy_recordings_at_other_operating_points": verdict.other_operating_points,
+        "watched": [
+            {
+                "name": w.name, "value": w.value, "healthy_mean": w.healthy_mean, "healthy_std": w.healthy_std,
+                "distance": w.distance, "threshold": w.threshold, "alarms": w.alarms,
+            }
+            for w in verdict.watched
+        ],
+    }
+
+
+def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> dict[str, object]:
+    return {
+        "sample_period_s": audited.sample_period_s,
+        "channels": dict(audited.channel_map),
+        "findings": [
+            {"code": f.code, "kind": f.kind, "what": f.what, "value": f.value, "limit": f.limit, "remedy": f.remedy}
+            for f in findings
+        ],
+    }
+
+
+def _terminal(audited: Audited) -> dict[str, object]:
+    """What the fundamental alone says."""
+    f = audited.fundamental
+    if f is None:
+        return {}
+    root = np.sqrt(2.0)
+    return {
+        "supply_frequency_hz": f.frequency_hz, "voltage_rms_v": abs(f.voltage_v) / root, "current_rms_a": abs(f.current_a) / root,
+        "voltage_unbalance": f.voltage_unbalance, "current_unbalance": f.current_unbalance, "power_w": f.power_w,
+        "reactive_power_var": f.reactive_var, "power_factor": f.power_factor, "runs_backwards": f.runs_backwards,
+    }
+
+
+def _segment(observation: Observation) -> dict[str, float]:
+    time = observation.frame.time_s[observation.part] + observation.audited.start_s
+    return {
+        "start_s": float(time[0]), "end_s": float(time[-1]), "mean_speed_rad_per_s": observation.segment_speed_rad_per_s,
+        "supply_frequency_hz": observation.lines.supply_rad_per_s / (2 * np.pi),
+    }
+
+
+def _parameters(fitted: Fitted) -> dict[str, dict[str, float]]:
+    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+    value = np.array(fitted.circuit.as_inverse_gamma().as_tuple())
+    moved = np.array([circuit_at(fitted, step).as_inverse_gamma().as_tuple() for step in steps(fitted)])
+    std = np.sqrt(np.sum((moved - value) ** 2, axis=0))
+    constant = fitted.circuit.as_inverse_gamma().rotor_time_constant_s
+    constants = [circuit_at(fitted, step).as_inverse_gamma().rotor_time_constant_s for step in steps(fitted)]
+    out = {name: quantity(v, s) for name, v, s in zip(names, value, std, strict=True)}
+    out["rotor_time_constant_s"] = quantity(constant, float(np.sqrt(np.sum((np.array(constants) - constant) ** 2))))
+    return out
+
+
+def _t_model(fitted: Fitted) -> dict[str, object]:
+    c = fitted.circuit
+    std = np.sqrt(np.diag(fitted.log_covariance))
+    out: dict[str, object] = {
+        "stator_resistance_ohm": quantity(c.stator_resistance_ohm, std[0] * c.stator_resistance_ohm),
+        "rotor_resistance_ohm": quantity(c.rotor_resistance_ohm, std[1] * c.rotor_resistance_ohm),
+        "magnetizing_inductance_h": quantity(c.magnetizing_inductance_h, std[2] * c.magnetizing_inductance_h),
+        "stator_leakage_h": quantity(c.stator_leakage_h, std[3] * c.stator_leakage_h),
+        "rotor_leakage_h": quantity(c.rotor_leakage_h, std[3] * c.rotor_leakage_h),
+    }
+    share = c.stator_leakage_h / (c.stator_leakage_h + c.rotor_leakage_h)
+    out["assumption"] = EQUAL_LEAKAGE if abs(share - 0.5) < 1e-9 else f"{share:.2f} of the leakage in the stator"
+    return out
+
+
+def with_reference(document: dict[str, object], comparison: Mapping[str, float]) -> dict[str, object]:
+    """The document with the encoder's verdict; the encoder was never an input."""
+    return document | {"reference_speed": dict(comparison)}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

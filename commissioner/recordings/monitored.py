@@ -1,0 +1,45 @@
+"""What `monitor --out` leaves in a folder: the characteristic period as CSV, and one self-contained HTML report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from commissioner.errors import UsageError
+from commissioner.monitor.chain import Observation
+from commissioner.recordings.table import write_table
+from commissioner.records import Signal
+from commissioner.report.page import Page, render
+
+CSV_NAME = "characteristic_period.csv"
+REPORT_NAME = "report.html"
+
+
+def write_results(folder: Path, observation: Observation, page: Page) -> dict[str, str]:
+    """The two files; names and columns are the contract's, standard deviations are added columns."""
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is not a folder", step="write results", value=str(folder), limit="a folder", remedy="choose another --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    csv, report = folder / CSV_NAME, folder / REPORT_NAME
+    write_table(csv, columns_of(observation), {})
+    temporary = report.with_name(report.name + ".part")
+    temporary.write_text(render(page), "utf-8")
+    temporary.replace(report)
+    return {"characteristic_period": str(csv), "report": str(report)}
+
+
+def columns_of(observation: Observation) -> dict[str, Signal]:
+    """`load_torque_nm` holds no numbers where the inertia is unknown."""
+    period = observation.period
+    empty = np.full(period.time_s.size, np.nan)
+    return {
+        "time_s": period.time_s,
+        "shaft_angle_rad": period.shaft_angle_rad,
+        "speed_rad_per_s": period.speed_rad_per_s,
+        "electromagnetic_torque_nm": period.torque_nm,
+        "load_torque_nm": empty if period.load_torque_nm is None else period.load_torque_nm,
+        "speed_std_rad_per_s": period.speed_std,
+        "electromagnetic_torque_std_nm": period.torque_std,
+        "load_torque_std_nm": empty if period.load_torque_std is None else period.load_torque_std,
+    }

@@ -1,0 +1,64 @@
+"""The nameplate of a running recording: a motor file, or the recording's own metadata; and a start from commissioning."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.monitor.fit import PRIOR_FROM_COMMISSIONING, Start
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate, check
+from commissioner.motor.running import equal_leakages
+
+NEEDED = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
+MAX_RESULT_BYTES = 10_000_000
+
+
+def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None) -> Nameplate:
+    """The plate; `motor` (a name or a file) overrides the metadata. ConfigurationError names what is missing or wrong."""
+    if motor is not None:
+        from commissioner.settings import load_motor
+
+        return load_motor(motor)
+    for key in NEEDED:
+        if not isinstance(metadata.get(key), float):
+            raise ConfigurationError(
+                file=source, key=key, value=metadata.get(key), expected="a number in the recording's metadata, or --motor NAME_OR_FILE"
+            )
+    values = {key: float(metadata[key]) for key in NEEDED}
+    pairs = metadata.get("pole_pairs")
+    estimate = round(60 * values["rated_frequency_hz"] / max(values["rated_speed_rpm"], 1.0) - 0.02)
+    inertia = metadata.get("inertia_kg_m2")
+    plate = Nameplate(
+        **values,
+        pole_pairs=int(pairs) if isinstance(pairs, float) else max(estimate, 1),
+        connection=str(metadata.get("connection", "star")),
+        inertia_kg_m2=float(inertia) if isinstance(inertia, float) and inertia > 0 else None,
+    )
+    for problem in check(plate):
+        raise ConfigurationError(file=source, key=problem.key, value=problem.value, expected=problem.expected)
+    return plate
+
+
+def start_from(path: Path) -> Start:
+    """What commissioning found: the `parameters` of a run's result, as the start and the prior of the fit."""
+    if not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
+        raise UsageError(f"there is no result {path}", step="read start", value=str(path), limit="the result.json of a run",
+                         remedy="give the result.json of a commissioning run")
+    try:
+        parameters = json.loads(path.read_text("utf-8"))["parameters"]
+        values = [
+            float(parameters[name]["value"])
+            for name in ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+        ]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ConfigurationError(
+            file=str(path), key="parameters", value=str(error), expected="the four inverse-Gamma parameters of a run's result"
+        ) from error
+    if not all(np.isfinite(v) and v > 0 for v in values):
+        raise ConfigurationError(file=str(path), key="parameters", value=str(values), expected="four numbers above 0")
+    return Start(equal_leakages(InverseGamma(*values)), PRIOR_FROM_COMMISSIONING, f"commissioning result {path.name}")
