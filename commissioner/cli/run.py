@@ -113,4 +113,6 @@ def _show(done: Commissioned, *, as_json: bool) -> None:
         screen.emit(dict(done.result) | {"folder": str(done.folder)})
         return
     screen.result(dict(done.result))
-    screen.out.print(f"[dim]report    {done.folder / 'report.html'}\nsamples   {done.folder / 'recording.parquet'}[/]")
+    for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
+        if (done.folder / name).is_file():
+            screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)

@@ -10,14 +10,15 @@ import numpy as np
 
 from commissioner.errors import Aborted
 from commissioner.identify import excitation, resistance
-from commissioner.identify.analysis import identify
+from commissioner.identify.analysis import Identification, identify
 from commissioner.identify.compensation import Compensation
 from commissioner.identify.convergence import Settling, settled
 from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
 from commissioner.identify.flux import FluxAdvice, FluxGuard, FluxReading
 from commissioner.identify.observer import BlockEstimate, ParallelObserver
 from commissioner.identify.resistance import DcLevel, InverterError, StaircaseLimits
-from commissioner.motor.nameplate import prior
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import ParameterBox, prior
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.assembly import assemble
 from commissioner.procedure.findings import (
@@ -45,10 +46,12 @@ LATER_RUNGS = 2
 SETTLED = 0.006
 KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
 """Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
+LOOK_STD = 0.15
+"""A value of the first look counts where its relative standard error is below this."""
 COMPENSATION_ROWS = 1025
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
-FIRST_LOOK = 0.25
+FIRST_LOOK = 0.3
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
 
@@ -185,8 +188,11 @@ def excite(job: Job, findings: Findings) -> Step:
     seconds = job.plan.excitation.seconds * job.stretch
     limits = _excitation_limits(job, findings)
     if findings.first_look is None:
-        guess = excitation.first_guess(job.nameplate, findings.resistance_ohm(job), limits)
-        yield from _test(job, findings, axis_deg, guess, FIRST_LOOK * seconds, FIRST_LOOK * seconds)
+        look_s = FIRST_LOOK * seconds
+        guess = excitation.design(
+            job.nameplate, _known(job, findings), limits, _period_s(findings), findings.inverter, look_s
+        )
+        yield from _test(job, findings, axis_deg, guess, look_s, look_s)
         yield from _look_closer(job, findings)
     assert findings.estimate is not None
     chosen = excitation.design(
@@ -205,9 +211,25 @@ def _look_closer(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     recording = assemble(findings.blocks, {}, "first look")
     assert recording is not None
     look = identify(recording, job.nameplate, "nls", findings.inverter, findings.estimate)
-    findings.first_look, findings.estimate = look, look.parameters
+    findings.first_look = look
+    findings.estimate = _believable(look, _known(job, findings), prior(job.nameplate))
     error = look.inverter.plateau_v if look.inverter else 0.0
     yield Tell(FirstLook(look.parameters.as_tuple(), look.std, error, look.delay_s[0]))
+
+
+def _known(job: Job, findings: Findings) -> InverseGamma:
+    """The plate's typical machine with the resistance that was measured."""
+    return replace(prior(job.nameplate).typical, stator_resistance_ohm=findings.resistance_ohm(job))
+
+
+def _believable(look: Identification, otherwise: InverseGamma, box: ParameterBox) -> InverseGamma:
+    """Each value of the look, or the plate's where the look is too uncertain or outside what the plate allows."""
+    corners = zip(
+        look.parameters.as_tuple(), look.std, otherwise.as_tuple(), box.lower.as_tuple(), box.upper.as_tuple(), strict=True
+    )
+    return InverseGamma(
+        *(v if s < LOOK_STD * v and low <= v <= high else plate for v, s, plate, low, high in corners)
+    )
 
 
 def _excitation_limits(job: Job, findings: Findings) -> ExcitationLimits:
@@ -264,10 +286,9 @@ class _UnderTest:
     ) -> None:  # fmt: skip
         period_s, resistance_ohm = _period_s(findings), findings.resistance_ohm(job)
         self._job, self._findings, self._axis_deg, self._seconds = job, findings, axis_deg, seconds
-        box = prior(job.nameplate)
-        known = replace(box.typical, stator_resistance_ohm=resistance_ohm)
         self._observer = ParallelObserver(
-            box, period_s, job.nameplate.rated_current_peak_a, start=findings.estimate or known,
+            prior(job.nameplate), period_s, job.nameplate.rated_current_peak_a,
+            start=findings.estimate or _known(job, findings),
             compensation=_compensation(findings.inverter, axis_deg, job.trip_current_a),
         )  # fmt: skip
         self._guard = FluxGuard(

@@ -124,7 +124,9 @@ class Findings:
     def resistance_ohm(self, job: Job) -> float:
         """The best stator resistance so far: first look, else last staircase, else the plate's typical value."""
         if self.first_look is not None:
-            return self.first_look.parameters.stator_resistance_ohm
+            look = self.first_look
+            if look.std[0] < 0.05 * look.parameters.stator_resistance_ohm:
+                return look.parameters.stator_resistance_ohm
         if self.staircases:
             return self.staircases[-1].stator_resistance.value
         return prior(job.nameplate).typical.stator_resistance_ohm
