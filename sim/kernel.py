@@ -83,8 +83,12 @@ def load(p):
 @piece
 def _leg_drop(i, link_v, m):
     """Mean voltage one leg loses to dead time and devices while it carries `i` (V, sign of the current)."""
-    dead = m.dead_fraction * link_v * sign_law(i * m.dead_per_a, m.dead_shape)
-    return m.slope_ohm * i + dead + m.drop_v * sign_law(i * m.drop_per_a, m.drop_shape)
+    drop = m.slope_ohm * i
+    if m.dead_fraction != 0.0:
+        drop += m.dead_fraction * link_v * sign_law(i * m.dead_per_a, m.dead_shape)
+    if m.drop_v != 0.0:
+        drop += m.drop_v * sign_law(i * m.drop_per_a, m.drop_shape)
+    return drop
 
 
 @piece
@@ -107,12 +111,12 @@ def rotor_current(flux_a, flux_b, m):
 
 @kernel
 def _memory_current(x, y, a, b, p):
-    """Eddy-branch and hysteresis current (A): extra states, or vector plays seen from the flux (a, b)."""
-    i_a, i_b = y[8], y[9]
+    """Eddy-branch and hysteresis current (A): extra states of `y`, or the vector plays of `x` seen from flux (a, b)."""
+    i_a, i_b = y[at.X_EDDY], y[at.X_EDDY + 1]
     if p[at.P_HYST_A] == 0.0:
         return i_a, i_b
     if p[at.P_HYST_SHAPE] != 1.0:
-        return i_a + y[10], i_b + y[11]
+        return i_a + y[at.X_HYST], i_b + y[at.X_HYST + 1]
     for j in range(PLAYS):
         radius = p[at.P_HYST_WB] * (0.5 + 1.0 * j)
         d_a = a - x[at.X_PLAY + 2 * j]
@@ -137,19 +141,15 @@ def _move_plays(x, p):
 
 
 @piece
-def _currents(a, b, ra, rb, m, x, y, p):
+def _currents(a, b, ra, rb, extra_a, extra_b, m):
     """(i_s, i_r) alpha, beta at stator flux (a, b) and rotor flux (ra, rb), without the pure iron-loss conductance.
 
-    `y` holds the extra states, `x` the memory; both are looked at only where the machine has any.
+    `extra` is what eddies and hysteresis ask for on top.
     """
     slope = magnetizing_slope(a * a + b * b, m)
     ir_a, ir_b = rotor_current(ra - a, rb - b, m)
-    is_a = slope * (a + m.salient_c * a + m.salient_s * b) - ir_a
-    is_b = slope * (b + m.salient_s * a - m.salient_c * b) - ir_b
-    if m.is_extended:
-        extra_a, extra_b = _memory_current(x, y, a, b, p)
-        is_a += extra_a
-        is_b += extra_b
+    is_a = slope * (a + m.salient_c * a + m.salient_s * b) - ir_a + extra_a
+    is_b = slope * (b + m.salient_s * a - m.salient_c * b) - ir_b + extra_b
     return is_a, is_b, ir_a, ir_b
 
 
@@ -165,22 +165,18 @@ def _back_emf(is_a, is_b, now, m):
 
 
 @piece
-def _derivative(a, b, ra, rb, now, m, x, y, out, p):
-    """(d psi_s/dt, d psi_r/dt, i_s), alpha and beta each; derivatives of the extra states go to `out`."""
-    is_a, is_b, ir_a, ir_b = _currents(a, b, ra, rb, m, x, y, p)
+def _stage(a, b, ra, rb, extra_a, extra_b, now, m):
+    """(d psi_s/dt, d psi_r/dt without what deep bars take, i_s, i_r), alpha and beta each. Scalars only."""
+    is_a, is_b, ir_a, ir_b = _currents(a, b, ra, rb, extra_a, extra_b, m)
     e_a, e_b = _back_emf(is_a, is_b, now, m)
     if m.iron_s != 0.0:  # the loss current sits in parallel: terminal current and EMF are found together
         core_a, core_b = is_a, is_b
         for _ in range(6):
             is_a, is_b = core_a + m.iron_s * e_a, core_b + m.iron_s * e_b
             e_a, e_b = _back_emf(is_a, is_b, now, m)
-    drop_a = now.r_r * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b)
-    drop_b = now.r_r * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b)
-    if m.is_extended:
-        bar_a, bar_b = _extra_states(y, ir_a, ir_b, a, b, e_a, e_b, p, out)
-        drop_a += bar_a
-        drop_b += bar_b
-    return e_a, e_b, -drop_a - now.speed * rb, -drop_b + now.speed * ra, is_a, is_b
+    d_a = -now.r_r * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b) - now.speed * rb
+    d_b = -now.r_r * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b) + now.speed * ra
+    return e_a, e_b, d_a, d_b, is_a, is_b, ir_a, ir_b
 
 
 @kernel
@@ -251,8 +247,6 @@ def _lag(x, slot, i0, im, i1, p):
 @kernel
 def _sensed(x, axis, i0, im, i1, p):
     """Current behind the anti-alias filter at middle and end of a substep, component `axis` (0 alpha, 1 beta)."""
-    if p[at.P_LAG_ORDER] == 0.0:
-        return im, i1
     start = x[at.X_LAG1 + axis]
     middle, end = _lag(x, at.X_LAG1 + axis, i0, im, i1, p)
     if p[at.P_LAG_ORDER] == 2.0:
@@ -280,9 +274,10 @@ def _warm(x, is_a, is_b, ir_a, ir_b, p):
     x[at.X_HEAT_R] += dt * (p[at.P_HEAT_R] * power - x[at.X_HEAT_R] / p[at.P_HEAT_R_TAU])
 
 
-@piece
-def _peaks(x, is_a, is_b, m):
+@kernel
+def _peaks(x, is_a, is_b, p):
     """Keep the largest stator flux, inverse-Gamma rotor flux (Wb) and phase current (A) seen."""
+    m = load(p)
     q = x[0] * x[0] + x[1] * x[1]
     ratio = m.per_leak_h / (m.per_leak_h + magnetizing_slope(q, m))
     x[at.X_PEAK_S] = max(x[at.X_PEAK_S], math.sqrt(q))
@@ -293,17 +288,34 @@ def _peaks(x, is_a, is_b, m):
 
 
 @kernel
-def _move(y, x, k, h):
-    """Extra states of a Runge-Kutta stage: y = x + h k."""
+def _extra_forward(x, work, reach):
+    """Extra states of a Runge-Kutta stage: row 0 = x + reach * row 1."""
     for j in range(4, at.X_ODE):
-        y[j] = x[j] + h * k[j]
+        work[0, j] = x[j] + reach * work[1, j]
+
+
+@kernel
+def _extra_gather(work, weight):
+    """Add a stage's derivative to the step: row 2 += weight * row 1."""
+    for j in range(4, at.X_ODE):
+        work[2, j] += weight * work[1, j]
+
+
+@kernel
+def _extra_finish(x, work, a, b, p):
+    """Extra states at the end of a step, the plays dragged along."""
+    for j in range(4, at.X_ODE):
+        x[j] += work[2, j]
+        work[1, j] = work[2, j] = 0.0
+    x[0], x[1] = a, b
+    if p[at.P_HYST_SHAPE] == 1.0 and p[at.P_HYST_A] != 0.0:
+        _move_plays(x, p)
 
 
 @kernel
 def scratch():
-    """Five rows of working memory for the Runge-Kutta stages."""
-    n = at.X_ODE
-    return np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    """Working memory of `advance_period`: stage, derivative and sum of the extra states."""
+    return np.zeros((3, at.X_ODE))
 
 
 @kernel
@@ -314,6 +326,7 @@ def advance_period(x, p, voltage_v, axis, work, points):
     The link voltage and the hot resistances stand still within the period. `work` is `scratch()`.
     """
     m = load(p)
+    has_lag = p[at.P_LAG_ORDER] != 0.0
     steps = int(p[at.P_SUBSTEPS])
     h = p[at.P_PERIOD] / steps
     t = x[at.X_TIME]
@@ -326,48 +339,53 @@ def advance_period(x, p, voltage_v, axis, work, points):
         p[at.P_RSA] * (1.0 + x[at.X_HEAT_A]), p[at.P_RSB] * (1.0 + x[at.X_HEAT_B]),
         p[at.P_RSC] * (1.0 + x[at.X_HEAT_C]), p[at.P_RR] * (1.0 + x[at.X_HEAT_R]), _shaft_speed(t, p), link,
     )
-    y, k1, k2, k3, k4 = work
     points[0, 0] = points[at.POINTS - 1, 0]
     points[0, 1] = points[at.POINTS - 1, 1]
     a, b, ra, rb = x[0], x[1], x[2], x[3]
-    squares, mean_a, mean_b, i1a, i1b = 0.0, 0.0, 0.0, 0.0, 0.0
+    squares, mean_a, mean_b = 0.0, 0.0, 0.0
+    extra_a, extra_b, ir_a, ir_b, i1a, i1b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for step in range(steps):
-        a1, b1, c1, d1, i0a, i0b = _derivative(a, b, ra, rb, now, m, x, x, k1, p)
-        g = 0.5 * h
+        e_a, e_b, d_a, d_b, i0a, i0b, ima, imb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        sum_a, sum_b, sum_c, sum_d = 0.0, 0.0, 0.0, 0.0
+        for stage in range(4):
+            reach = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+            weight = h / 6.0 if stage in (0, 3) else h / 3.0
+            ya, yb = a + reach * e_a, b + reach * e_b
+            yc, yd = ra + reach * d_a, rb + reach * d_b
+            if m.is_extended:
+                _extra_forward(x, work, reach)
+                extra_a, extra_b = _memory_current(x, work[0], ya, yb, p)
+            e_a, e_b, d_a, d_b, is_a, is_b, ir_a, ir_b = _stage(ya, yb, yc, yd, extra_a, extra_b, now, m)
+            if m.is_extended:
+                bar_a, bar_b = _extra_states(work[0], ir_a, ir_b, ya, yb, e_a, e_b, p, work[1])
+                d_a -= bar_a
+                d_b -= bar_b
+                _extra_gather(work, weight)
+            sum_a, sum_b = sum_a + weight * e_a, sum_b + weight * e_b
+            sum_c, sum_d = sum_c + weight * d_a, sum_d + weight * d_b
+            if stage == 0:
+                i0a, i0b = is_a, is_b
+            elif stage == 2:
+                ima, imb = is_a, is_b
+        a, b, ra, rb = a + sum_a, b + sum_b, ra + sum_c, rb + sum_d
         if m.is_extended:
-            _move(y, x, k1, g)
-        a2, b2, c2, d2, _, _ = _derivative(a + g * a1, b + g * b1, ra + g * c1, rb + g * d1, now, m, x, y, k2, p)
-        if m.is_extended:
-            _move(y, x, k2, g)
-        a3, b3, c3, d3, ima, imb = _derivative(a + g * a2, b + g * b2, ra + g * c2, rb + g * d2, now, m, x, y, k3, p)
-        if m.is_extended:
-            _move(y, x, k3, h)
-        a4, b4, c4, d4, i1a, i1b = _derivative(a + h * a3, b + h * b3, ra + h * c3, rb + h * d3, now, m, x, y, k4, p)
-        a += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        b += h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
-        ra += h / 6.0 * (c1 + 2.0 * c2 + 2.0 * c3 + c4)
-        rb += h / 6.0 * (d1 + 2.0 * d2 + 2.0 * d3 + d4)
-        if m.is_extended:
-            x[0], x[1] = a, b
-            for j in range(4, at.X_ODE):
-                x[j] += h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
-            if p[at.P_HYST_SHAPE] == 1.0 and p[at.P_HYST_A] != 0.0:
-                _move_plays(x, p)
-        if m.iron_s == 0.0:
-            i1a, i1b, _, _ = _currents(a, b, ra, rb, m, x, x, p)
+            _extra_finish(x, work, a, b, p)
+            extra_a, extra_b = _memory_current(x, x, a, b, p)
+        if m.iron_s != 0.0:
+            _, _, _, _, i1a, i1b, ir_a, ir_b = _stage(a, b, ra, rb, extra_a, extra_b, now, m)
         else:
-            _, _, _, _, i1a, i1b = _derivative(a, b, ra, rb, now, m, x, x, k4, p)
-        mid_a, end_a = _sensed(x, 0, i0a, ima, i1a, p)
-        mid_b, end_b = _sensed(x, 1, i0b, imb, i1b, p)
-        _keep_point(points, steps, 2 * step + 1, mid_a, mid_b)
-        _keep_point(points, steps, 2 * step + 2, end_a, end_b)
+            i1a, i1b, ir_a, ir_b = _currents(a, b, ra, rb, extra_a, extra_b, m)
+        mid_a, mid_b, end_a, end_b = ima, imb, i1a, i1b
+        if has_lag:
+            mid_a, end_a = _sensed(x, 0, i0a, ima, i1a, p)
+            mid_b, end_b = _sensed(x, 1, i0b, imb, i1b, p)
+        _keep_points(points, steps, step, mid_a, mid_b, end_a, end_b)
         mean_a += i0a + 4.0 * ima + i1a
         mean_b += i0b + 4.0 * imb + i1b
         squares += i0a * i0a + i0b * i0b + 4.0 * (ima * ima + imb * imb) + i1a * i1a + i1b * i1b
     x[0], x[1], x[2], x[3] = a, b, ra, rb
-    ir_a, ir_b = rotor_current(ra - a, rb - b, m)
     _warm(x, i1a, i1b, ir_a, ir_b, p)
-    _peaks(x, i1a, i1b, m)
+    _peaks(x, i1a, i1b, p)
     power = 1.5 * (along * mean_a + across * mean_b) / (6.0 * steps)
     copper = (now.r_a + now.r_b + now.r_c) / 3.0 * squares / (6.0 * steps) + now.r_r * (ir_a * ir_a + ir_b * ir_b)
     x[at.X_ENERGY_IN] += power * p[at.P_PERIOD]
@@ -376,13 +394,14 @@ def advance_period(x, p, voltage_v, axis, work, points):
     x[at.X_TIME] = t + p[at.P_PERIOD]
 
 
-@piece
-def _keep_point(points, steps, half_step, a, b):
-    """Store a sensed current when this half substep falls on a quarter of the period."""
-    for j in range(1, at.POINTS):
-        if 2 * half_step == j * steps:
-            points[j, 0] = a
-            points[j, 1] = b
+@kernel
+def _keep_points(points, steps, step, mid_a, mid_b, end_a, end_b):
+    """Store the sensed currents of a substep's middle and end where they fall on a quarter of the period."""
+    for half_step, a, b in ((2 * step + 1, mid_a, mid_b), (2 * step + 2, end_a, end_b)):
+        for j in range(1, at.POINTS):
+            if 2 * half_step == j * steps:
+                points[j, 0] = a
+                points[j, 1] = b
 
 
 @kernel
@@ -434,11 +453,10 @@ def coast(x, p, seconds):
     h = 1e-5
     spent = 0.0
     m = load(p)
-    out = np.zeros(at.X_ODE)
     push = p[at.P_LINK_V] * 2.0 / 3.0
     now = Now(0.0, 0.0, 0.0, p[at.P_RSA], p[at.P_RSB], p[at.P_RSC], p[at.P_RR], 0.0, 0.0)
     while spent < seconds:
-        e_a, e_b, d_a, d_b, is_a, is_b = _derivative(x[0], x[1], x[2], x[3], now, m, x, x, out, p)
+        e_a, e_b, d_a, d_b, is_a, is_b, _, _ = _stage(x[0], x[1], x[2], x[3], 0.0, 0.0, now, m)
         size = math.hypot(is_a, is_b)
         if size * p[at.P_LEAK_H] <= push * h:
             break
@@ -477,7 +495,8 @@ def _cool(x, p, seconds):
 @kernel
 def stator_current(x, p):
     """Stator current (alpha, beta, A) of a state, without a parallel iron-loss current."""
-    i_a, i_b, _, _ = _currents(x[0], x[1], x[2], x[3], load(p), x, x, p)
+    extra_a, extra_b = _memory_current(x, x, x[0], x[1], p)
+    i_a, i_b, _, _ = _currents(x[0], x[1], x[2], x[3], extra_a, extra_b, load(p))
     return i_a, i_b
 
 

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 
-from sim.compiled import kernel
+from sim.compiled import kernel, piece
 
 SIGN_SHAPES = ("capacitive", "tanh", "clipped", "arctan", "clamped", "root", "logarithmic")
 SATURATION_SHAPES = ("power", "exponential", "knee", "steel")
 LEAKAGE_SHAPES = ("rational", "root", "closed_slot")
 
 
-@kernel
+@piece
 def sign_law(z: float, shape: float) -> float:
     """Smooth sign of `z` = current over knee current, -1..1 (only `logarithmic` passes 1, slowly).
 
@@ -22,8 +22,8 @@ def sign_law(z: float, shape: float) -> float:
     capacitance of the leg: a ramp that does not finish below the knee (z/2), one that does above it (1 - 1/(2z)).
     """
     if shape == 0.0:
-        size = abs(z)
-        return math.copysign(1.0 - 0.5 / size, z) if size > 1.0 else 0.5 * z
+        reach = 1.0 / max(abs(z), 1.0)  # no branch: the sign of a current is hard to predict
+        return z * reach * (1.0 - 0.5 * reach)
     if shape == 5.0:
         return z / math.sqrt(1.0 + z * z)
     return _rarer_sign_law(z, shape)
@@ -43,7 +43,7 @@ def _rarer_sign_law(z: float, shape: float) -> float:
     return math.asinh(z) / math.asinh(40.0)  # a diode's logarithm, 1 at 40 knee currents
 
 
-@kernel
+@piece
 def saturation_excess(y: float, strength: float, order: float, shape: float) -> float:
     """Extra magnetizing current as a fraction of the linear one; `y` = (flux / rated flux)^2, `strength` at y = 1.
 
@@ -51,19 +51,22 @@ def saturation_excess(y: float, strength: float, order: float, shape: float) -> 
     `exponential` and `knee` (nothing below 0.6 rated flux, quadratic above) are other irons; `steel` adds the
     low-flux permeability dip that annealed sheet shows.
     """
+    if shape == 0.0 and order == 7.0:
+        return strength * y * y * y * math.sqrt(y)
     if strength == 0.0:
         return 0.0
+    return _rarer_saturation(y, strength, order, shape)
+
+
+@kernel
+def _rarer_saturation(y: float, strength: float, order: float, shape: float) -> float:
     if shape == 0.0:
-        if order == 7.0:
-            return strength * y * y * y * math.sqrt(y)
         return strength * y ** (0.5 * order)
     if shape == 1.0:
         return strength * (math.exp(0.5 * order * y) - 1.0) / (math.exp(0.5 * order) - 1.0)
     if shape == 2.0:
         over = math.sqrt(y) - 0.6
-        if over <= 0.0:
-            return 0.0
-        return strength * over * over / 0.16 / (1.0 + over)  * 1.4
+        return 1.4 * strength * over * over / 0.16 / (1.0 + over) if over > 0.0 else 0.0
     dip = 0.35 * strength * math.exp(-y / 0.04)
     return dip + strength * y * y * y
 
