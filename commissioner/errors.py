@@ -25,7 +25,7 @@ from __future__ import annotations
 
 
 class CommissionerError(Exception):
-    """What happened (`str`), where (`step`), what was seen (`value`), what was allowed (`limit`), what to do (`remedy`)."""
+    """What happened (`str`), where (`step`), what was seen (`value`) and allowed (`limit`), what to do (`remedy`)."""
 
     exit_code = 5
     outcome = "faulted"

@@ -43,18 +43,35 @@ def convergence(tests: Sequence[Sequence[Mapping[str, Any]]]) -> Figure:
 
 
 def _settle(panel: Any, tests: Sequence[Sequence[Mapping[str, Any]]], index: int, factor: float) -> None:
-    """Scale to the last half of the tests: the start-up may leave the panel."""
+    """Scale to the second half of the long tests: start-up and first look may leave the panel."""
+    longest = max(test[-1]["time_s"] for test in tests)
     late = [
         factor * row["parameters"][index]
         for test in tests
-        if test
+        if test[-1]["time_s"] > 0.5 * longest
         for row in test
-        if row["time_s"] > 0.25 * test[-1]["time_s"]
+        if row["time_s"] > 0.5 * test[-1]["time_s"]
     ]
-    if late:
-        low, high = min(late), max(late)
-        margin = max(0.6 * (high - low), 0.05 * abs(high))
-        panel.set_ylim(low - margin, high + margin)
+    low, high = min(late), max(late)
+    margin = max(3.0 * (high - low), 0.03 * abs(high))
+    panel.set_ylim(low - margin, high + margin)
+
+
+def magnetizing_curve(curve: Sequence[Mapping[str, Any]], holds_for_wb: float, rated_wb: float) -> Figure:
+    """L_M over the stator flux that was visited, with its 95 % interval; nothing beyond."""
+    figure, panels = _panels(1, 1, 2.6)
+    panel = panels.flat[0]
+    flux = np.array([row["stator_flux_wb"] for row in curve])
+    value = 1e3 * np.array([row["magnetizing_inductance_h"]["value"] for row in curve])
+    spread = 1.96e3 * np.array([row["magnetizing_inductance_h"]["std"] or np.nan for row in curve])
+    panel.plot(flux, value, color=BLUE, label="identified")
+    panel.fill_between(flux, value - spread, value + spread, color=BLUE, alpha=0.15, linewidth=0)
+    panel.axvline(holds_for_wb, color=GREEN, label="the result holds here")
+    panel.axvline(rated_wb, color=RED, linestyle="--", label="rated")
+    panel.set_xlabel("peak stator flux / Wb")
+    panel.set_ylabel("L_M / mH")
+    panel.legend(ncols=3)
+    return figure
 
 
 def fluxes(tests: Sequence[Sequence[Mapping[str, Any]]], limit_wb: float) -> Figure:

@@ -73,6 +73,7 @@ def _sections(
                 *_flux_parts(tests, limit),
             ],
         )
+    yield Section("Magnetizing curve", list(_curve_parts(result)))
     yield Section("Currents and residual", list(_current_parts(findings)))
     yield Section("Checks before energising", list(_check_parts(result)))
     yield Section("What happened, in order", [_course(journal)])
@@ -107,7 +108,23 @@ def _result_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
             )
         )
     yield Table(("Parameter", "Value", "95 % interval", "In the drive before", "Change", "Read back"), rows)
+    yield from _conditions(result)
     yield from result.get("remarks") or ()
+
+
+def _conditions(result: Mapping[str, Any]) -> Iterator[str | Table]:
+    """What the values hold for: flux, circuit, inverter."""
+    rated, held = result["rated_flux_wb"]["stator_peak"], result["holds_for_stator_flux_wb"]
+    yield f"L_M and R_R are secant values at a peak stator flux of {held:.3g} Wb, {100 * held / rated:.0f} % of the rated."
+    leg = (result.get("inverter") or {}).get("leg_error_v")
+    if leg:
+        yield f"Each inverter leg loses {leg['value']:.3g} V to dead time and device drop; it was identified and taken off."
+    circuit = result["t_model"]
+    names = (("R_s", "stator_resistance_ohm", 1.0, "Ω"), ("R_r", "rotor_resistance_ohm", 1.0, "Ω"),
+             ("L_ls", "stator_leakage_h", 1e3, "mH"), ("L_lr", "rotor_leakage_h", 1e3, "mH"),
+             ("L_m", "magnetizing_inductance_h", 1e3, "mH"))  # fmt: skip
+    row = [f"{factor * circuit[name]['value']:.4g} {unit}" for _, name, factor, unit in names]
+    yield Table([n[0] for n in names], [row], caption=f"T circuit, under the assumption: {circuit['assumption']}.")
 
 
 def _written_cell(row: Mapping[str, Any] | None, factor: float, unit: str) -> str:
@@ -128,6 +145,15 @@ def _axes_parts(result: Mapping[str, Any]) -> Iterator[Table | Picture]:
         figures.axes_side_by_side(axes, result["parameters"]),
         "Each test's estimate with its 95 % interval (blue) and the combined value (green).",
     )
+
+
+def _curve_parts(result: Mapping[str, Any]) -> Iterator[Picture]:
+    curve = result.get("magnetizing_curve") or ()
+    if curve:
+        yield picture(
+            figures.magnetizing_curve(curve, result["holds_for_stator_flux_wb"], result["rated_flux_wb"]["stator_peak"]),
+            "Secant magnetizing inductance over the flux the tests visited, with its 95 % interval.",
+        )
 
 
 def _flux_parts(tests: Sequence[Sequence[Mapping[str, Any]]], limit_wb: float | None) -> Iterator[Picture]:

@@ -1,4 +1,4 @@
-"""Everything that may be asked of a drive. Steps yield these, the runner carries them out, `limits` judges each first."""
+"""Everything that may be asked of a drive: steps yield these, `limits` judges them, the runner carries them out."""
 
 from __future__ import annotations
 
