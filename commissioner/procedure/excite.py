@@ -51,7 +51,7 @@ LOOK_STD = 0.15
 COMPENSATION_ROWS = 1025
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
-FIRST_LOOK = 0.3
+FIRST_LOOK = 0.25
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
 

@@ -92,7 +92,8 @@ def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
         return Picture(f'<img alt="" src="data:image/png;base64,{data}">', caption)
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue().decode()
-    return Picture(text[text.index("<svg") :], caption)
+    head, _, rest = text[text.index("<svg") :].partition("<metadata>")  # matplotlib's, with links to elsewhere
+    return Picture(head + rest.partition("</metadata>")[2], caption)
 
 
 def render(page: Page) -> str:
