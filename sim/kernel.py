@@ -50,18 +50,16 @@ class Model(NamedTuple):
     drop_v: float
     drop_per_a: float
     drop_shape: float
-    slope_ohm: float
 
 
 class Now(NamedTuple):
-    """What stands still within one control period: leg voltages (V), hot resistances (ohm), shaft speed, link (V)."""
+    """What stands still within one control period: voltage (V), hot resistance tensor (ohm), shaft speed, link (V)."""
 
-    va: float
-    vb: float
-    vc: float
-    r_a: float
-    r_b: float
-    r_c: float
+    v_a: float
+    v_b: float
+    r_aa: float
+    r_ab: float
+    r_bb: float
     r_r: float
     speed: float
     link_v: float
@@ -76,14 +74,14 @@ def load(p):
         p[at.P_LEAKSAT], 1.0 / p[at.P_LEAKSAT_WB] if p[at.P_LEAKSAT_WB] > 0.0 else 0.0, p[at.P_LEAKSAT_SHAPE],
         p[at.P_ANISO_C], p[at.P_ANISO_S], p[at.P_RR_C], p[at.P_RR_S], p[at.P_IRON_S],
         p[at.P_DEAD_FRACTION], p[at.P_DEAD_PER_A], p[at.P_DEAD_SHAPE],
-        p[at.P_DROP_V], p[at.P_DROP_PER_A], p[at.P_DROP_SHAPE], p[at.P_SLOPE_OHM],
+        p[at.P_DROP_V], p[at.P_DROP_PER_A], p[at.P_DROP_SHAPE],
     )
 
 
 @piece
 def _leg_drop(i, link_v, m):
-    """Mean voltage one leg loses to dead time and devices while it carries `i` (V, sign of the current)."""
-    drop = m.slope_ohm * i
+    """Mean voltage one leg loses to dead time and device threshold while it carries `i` (V, sign of the current)."""
+    drop = 0.0
     if m.dead_fraction != 0.0:
         drop += m.dead_fraction * link_v * sign_law(i * m.dead_per_a, m.dead_shape)
     if m.drop_v != 0.0:
@@ -155,19 +153,32 @@ def _currents(a, b, ra, rb, extra_a, extra_b, m):
 
 @piece
 def _back_emf(is_a, is_b, now, m):
-    """d psi_s/dt (V): leg voltages minus leg drops minus phase resistances, in alpha-beta."""
-    i_b = -0.5 * is_a + HALF_SQRT3 * is_b
-    i_c = -0.5 * is_a - HALF_SQRT3 * is_b
-    ea = now.va - _leg_drop(is_a, now.link_v, m) - now.r_a * is_a
-    eb = now.vb - _leg_drop(i_b, now.link_v, m) - now.r_b * i_b
-    ec = now.vc - _leg_drop(i_c, now.link_v, m) - now.r_c * i_c
-    return (2.0 * ea - eb - ec) / 3.0, (eb - ec) / (2.0 * HALF_SQRT3)
+    """d psi_s/dt (V): voltage minus resistive drop minus the three legs' errors, in alpha-beta."""
+    e_a = now.v_a - now.r_aa * is_a - now.r_ab * is_b
+    e_b = now.v_b - now.r_ab * is_a - now.r_bb * is_b
+    if m.dead_fraction == 0.0 and m.drop_v == 0.0:
+        return e_a, e_b
+    drop_u = _leg_drop(is_a, now.link_v, m)
+    drop_v = _leg_drop(-0.5 * is_a + HALF_SQRT3 * is_b, now.link_v, m)
+    drop_w = _leg_drop(-0.5 * is_a - HALF_SQRT3 * is_b, now.link_v, m)
+    return e_a - (2.0 * drop_u - drop_v - drop_w) / 3.0, e_b - (drop_v - drop_w) / (2.0 * HALF_SQRT3)
 
 
 @piece
-def _stage(a, b, ra, rb, extra_a, extra_b, now, m):
-    """(d psi_s/dt, d psi_r/dt without what deep bars take, i_s, i_r), alpha and beta each. Scalars only."""
-    is_a, is_b, ir_a, ir_b = _currents(a, b, ra, rb, extra_a, extra_b, m)
+def _standing(v_a, v_b, t, link, x, p):
+    """The Now of a period: phase resistances as warm as they are, as one symmetric tensor, devices' slope included."""
+    r_u = p[at.P_RSA] * (1.0 + x[at.X_HEAT_A]) + p[at.P_SLOPE_OHM]
+    r_v = p[at.P_RSB] * (1.0 + x[at.X_HEAT_B]) + p[at.P_SLOPE_OHM]
+    r_w = p[at.P_RSC] * (1.0 + x[at.X_HEAT_C]) + p[at.P_SLOPE_OHM]
+    return Now(
+        v_a, v_b, (4.0 * r_u + r_v + r_w) / 6.0, (r_w - r_v) / (4.0 * HALF_SQRT3), 0.5 * (r_v + r_w),
+        p[at.P_RR] * (1.0 + x[at.X_HEAT_R]), _shaft_speed(t, p), link,
+    )
+
+
+@piece
+def _stage(ra, rb, is_a, is_b, ir_a, ir_b, now, m):
+    """(d psi_s/dt, d psi_r/dt without what deep bars take, i_s), alpha and beta each. Scalars only."""
     e_a, e_b = _back_emf(is_a, is_b, now, m)
     if m.iron_s != 0.0:  # the loss current sits in parallel: terminal current and EMF are found together
         core_a, core_b = is_a, is_b
@@ -176,7 +187,7 @@ def _stage(a, b, ra, rb, extra_a, extra_b, now, m):
             e_a, e_b = _back_emf(is_a, is_b, now, m)
     d_a = -now.r_r * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b) - now.speed * rb
     d_b = -now.r_r * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b) + now.speed * ra
-    return e_a, e_b, d_a, d_b, is_a, is_b, ir_a, ir_b
+    return e_a, e_b, d_a, d_b, is_a, is_b
 
 
 @kernel
@@ -207,7 +218,7 @@ def _extra_states(y, ir_a, ir_b, a, b, e_a, e_b, p, out):
     return drop_a, drop_b
 
 
-@kernel
+@piece
 def link_voltage(t, sag_v, p):
     """DC link (V) at time `t`: rectifier ripple on what the load has left of it."""
     ripple = 0.0
@@ -222,7 +233,7 @@ def link_voltage(t, sag_v, p):
     return p[at.P_LINK_V] * (1.0 + p[at.P_RIPPLE] * ripple) - sag_v
 
 
-@kernel
+@piece
 def _shaft_speed(t, p):
     """Electrical shaft speed (rad/s): steady creep, a decaying turn, or a pendulum."""
     if p[at.P_SPEED] == 0.0:
@@ -254,7 +265,7 @@ def _sensed(x, axis, i0, im, i1, p):
     return middle, end
 
 
-@kernel
+@piece
 def _warm(x, is_a, is_b, ir_a, ir_b, p):
     """Relative resistance rise of the three phases and the cage after one control period."""
     if p[at.P_HEAT_S] == 0.0 and p[at.P_HEAT_R] == 0.0:
@@ -274,10 +285,9 @@ def _warm(x, is_a, is_b, ir_a, ir_b, p):
     x[at.X_HEAT_R] += dt * (p[at.P_HEAT_R] * power - x[at.X_HEAT_R] / p[at.P_HEAT_R_TAU])
 
 
-@kernel
-def _peaks(x, is_a, is_b, p):
+@piece
+def _peaks(x, is_a, is_b, m):
     """Keep the largest stator flux, inverse-Gamma rotor flux (Wb) and phase current (A) seen."""
-    m = load(p)
     q = x[0] * x[0] + x[1] * x[1]
     ratio = m.per_leak_h / (m.per_leak_h + magnetizing_slope(q, m))
     x[at.X_PEAK_S] = max(x[at.X_PEAK_S], math.sqrt(q))
@@ -318,14 +328,15 @@ def scratch():
     return np.zeros((3, at.X_ODE))
 
 
-@kernel
-def advance_period(x, p, voltage_v, axis, work, points):
+@piece
+def advance_period(x, p, m, voltage_v, axis, work, points, known):
     """One control period with the leg commands of `voltage_v` along `axis` (cos, sin); fills `points` (POINTS, 2).
 
-    Classical Runge-Kutta in P_SUBSTEPS (even) steps; `points` are the sensed currents at 0, 1/4 .. 1 of the period.
+    `m` is the Model of `p`, `known` are the `all_currents` of the state `x`; those of the state it leaves are returned.
+
+    Classical Runge-Kutta in P_SUBSTEPS (1 or even) steps; `points` are the sensed currents at 0, 1/4 .. 1 of the period.
     The link voltage and the hot resistances stand still within the period. `work` is `scratch()`.
     """
-    m = load(p)
     has_lag = p[at.P_LAG_ORDER] != 0.0
     steps = int(p[at.P_SUBSTEPS])
     h = p[at.P_PERIOD] / steps
@@ -334,16 +345,13 @@ def advance_period(x, p, voltage_v, axis, work, points):
     x[at.X_LINK] = link
     scaled = voltage_v * link / p[at.P_LINK_NOMINAL_V]
     along, across = scaled * axis[0], scaled * axis[1]
-    now = Now(
-        along, -0.5 * along + HALF_SQRT3 * across, -0.5 * along - HALF_SQRT3 * across,
-        p[at.P_RSA] * (1.0 + x[at.X_HEAT_A]), p[at.P_RSB] * (1.0 + x[at.X_HEAT_B]),
-        p[at.P_RSC] * (1.0 + x[at.X_HEAT_C]), p[at.P_RR] * (1.0 + x[at.X_HEAT_R]), _shaft_speed(t, p), link,
-    )
+    now = _standing(along, across, t, link, x, p)
     points[0, 0] = points[at.POINTS - 1, 0]
     points[0, 1] = points[at.POINTS - 1, 1]
     a, b, ra, rb = x[0], x[1], x[2], x[3]
     squares, mean_a, mean_b = 0.0, 0.0, 0.0
-    extra_a, extra_b, ir_a, ir_b, i1a, i1b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    extra_a, extra_b, i1a, i1b = 0.0, 0.0, 0.0, 0.0
+    core_a, core_b, ir_a, ir_b = known
     for step in range(steps):
         e_a, e_b, d_a, d_b, i0a, i0b, ima, imb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         sum_a, sum_b, sum_c, sum_d = 0.0, 0.0, 0.0, 0.0
@@ -355,7 +363,9 @@ def advance_period(x, p, voltage_v, axis, work, points):
             if m.is_extended:
                 _extra_forward(x, work, reach)
                 extra_a, extra_b = _memory_current(x, work[0], ya, yb, p)
-            e_a, e_b, d_a, d_b, is_a, is_b, ir_a, ir_b = _stage(ya, yb, yc, yd, extra_a, extra_b, now, m)
+            if stage > 0:
+                core_a, core_b, ir_a, ir_b = _currents(ya, yb, yc, yd, extra_a, extra_b, m)
+            e_a, e_b, d_a, d_b, is_a, is_b = _stage(yc, yd, core_a, core_b, ir_a, ir_b, now, m)
             if m.is_extended:
                 bar_a, bar_b = _extra_states(work[0], ir_a, ir_b, ya, yb, e_a, e_b, p, work[1])
                 d_a -= bar_a
@@ -371,10 +381,10 @@ def advance_period(x, p, voltage_v, axis, work, points):
         if m.is_extended:
             _extra_finish(x, work, a, b, p)
             extra_a, extra_b = _memory_current(x, x, a, b, p)
+        core_a, core_b, ir_a, ir_b = _currents(a, b, ra, rb, extra_a, extra_b, m)
+        i1a, i1b = core_a, core_b
         if m.iron_s != 0.0:
-            _, _, _, _, i1a, i1b, ir_a, ir_b = _stage(a, b, ra, rb, extra_a, extra_b, now, m)
-        else:
-            i1a, i1b, ir_a, ir_b = _currents(a, b, ra, rb, extra_a, extra_b, m)
+            _, _, _, _, i1a, i1b = _stage(ra, rb, core_a, core_b, ir_a, ir_b, now, m)
         mid_a, mid_b, end_a, end_b = ima, imb, i1a, i1b
         if has_lag:
             mid_a, end_a = _sensed(x, 0, i0a, ima, i1a, p)
@@ -385,18 +395,27 @@ def advance_period(x, p, voltage_v, axis, work, points):
         squares += i0a * i0a + i0b * i0b + 4.0 * (ima * ima + imb * imb) + i1a * i1a + i1b * i1b
     x[0], x[1], x[2], x[3] = a, b, ra, rb
     _warm(x, i1a, i1b, ir_a, ir_b, p)
-    _peaks(x, i1a, i1b, p)
+    _peaks(x, i1a, i1b, m)
     power = 1.5 * (along * mean_a + across * mean_b) / (6.0 * steps)
-    copper = (now.r_a + now.r_b + now.r_c) / 3.0 * squares / (6.0 * steps) + now.r_r * (ir_a * ir_a + ir_b * ir_b)
+    copper = 0.5 * (now.r_aa + now.r_bb) * squares / (6.0 * steps) + now.r_r * (ir_a * ir_a + ir_b * ir_b)
     x[at.X_ENERGY_IN] += power * p[at.P_PERIOD]
     x[at.X_ENERGY_LOSS] += 1.5 * copper * p[at.P_PERIOD]
     _load_link(x, power, p)
     x[at.X_TIME] = t + p[at.P_PERIOD]
+    return core_a, core_b, ir_a, ir_b
 
 
-@kernel
+@piece
 def _keep_points(points, steps, step, mid_a, mid_b, end_a, end_b):
     """Store the sensed currents of a substep's middle and end where they fall on a quarter of the period."""
+    if steps == 1:  # a machine this slow: the parabola through start, middle and end tells the quarters
+        for c, mid, end in ((0, mid_a, end_a), (1, mid_b, end_b)):
+            start = points[0, c]
+            points[1, c] = 0.375 * start + 0.75 * mid - 0.125 * end
+            points[2, c] = mid
+            points[3, c] = -0.125 * start + 0.75 * mid + 0.375 * end
+            points[4, c] = end
+        return
     for half_step, a, b in ((2 * step + 1, mid_a, mid_b), (2 * step + 2, end_a, end_b)):
         for j in range(1, at.POINTS):
             if 2 * half_step == j * steps:
@@ -404,7 +423,7 @@ def _keep_points(points, steps, step, mid_a, mid_b, end_a, end_b):
                 points[j, 1] = b
 
 
-@kernel
+@piece
 def _load_link(x, power, p):
     """Move the link's sag towards what the drawn power (W) leaves; a soft source sags like its root."""
     if p[at.P_SAG_V_PER_W] == 0.0:
@@ -454,9 +473,10 @@ def coast(x, p, seconds):
     spent = 0.0
     m = load(p)
     push = p[at.P_LINK_V] * 2.0 / 3.0
-    now = Now(0.0, 0.0, 0.0, p[at.P_RSA], p[at.P_RSB], p[at.P_RSC], p[at.P_RR], 0.0, 0.0)
+    now = _standing(0.0, 0.0, x[at.X_TIME], 0.0, x, p)
     while spent < seconds:
-        e_a, e_b, d_a, d_b, is_a, is_b, _, _ = _stage(x[0], x[1], x[2], x[3], 0.0, 0.0, now, m)
+        is_a, is_b, ir_a, ir_b = _currents(x[0], x[1], x[2], x[3], 0.0, 0.0, m)
+        e_a, e_b, d_a, d_b, _, _ = _stage(x[2], x[3], is_a, is_b, ir_a, ir_b, now, m)
         size = math.hypot(is_a, is_b)
         if size * p[at.P_LEAK_H] <= push * h:
             break
@@ -493,11 +513,10 @@ def _cool(x, p, seconds):
 
 
 @kernel
-def stator_current(x, p):
-    """Stator current (alpha, beta, A) of a state, without a parallel iron-loss current."""
+def all_currents(x, p):
+    """(i_s, i_r) of a state, alpha and beta each (A), without a parallel iron-loss current."""
     extra_a, extra_b = _memory_current(x, x, x[0], x[1], p)
-    i_a, i_b, _, _ = _currents(x[0], x[1], x[2], x[3], extra_a, extra_b, load(p))
-    return i_a, i_b
+    return _currents(x[0], x[1], x[2], x[3], extra_a, extra_b, load(p))
 
 
 @kernel
@@ -506,9 +525,10 @@ def play_voltages(x, p, voltage_v, axis_rad, out_points, out_link):
     work = scratch()
     axis = (math.cos(axis_rad), math.sin(axis_rad))
     points = np.zeros((at.POINTS, 2))
-    points[at.POINTS - 1, 0], points[at.POINTS - 1, 1] = stator_current(x, p)
+    known, m = all_currents(x, p), load(p)
+    points[at.POINTS - 1, 0], points[at.POINTS - 1, 1] = known[0], known[1]
     for k in range(voltage_v.shape[0]):
-        advance_period(x, p, voltage_v[k], axis, work, points)
+        known = advance_period(x, p, m, voltage_v[k], axis, work, points, known)
         for j in range(at.POINTS):
             out_points[k, j, 0] = points[j, 0]
             out_points[k, j, 1] = points[j, 1]

@@ -6,7 +6,7 @@ import math
 
 from sim import layout as at
 from sim.compiled import kernel
-from sim.kernel import advance_period, scratch
+from sim.kernel import advance_period, all_currents, load, scratch
 from sim.sensing import between, convert, phase_of, sense
 
 HISTORY = 16
@@ -73,6 +73,7 @@ def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip):
     grid = e[at.E_STEP_V]
     count_a = s[at.S_LSB_A] / COUNTS_PER_LSB
     capacity = ring.shape[0]
+    known, m = all_currents(x, p), load(p)
     for j in range(n):
         k = c[at.C_PERIOD]
         t = k * period
@@ -105,7 +106,7 @@ def run_interrupts(n, x, p, e, s, c, white, history, means, ring, flags, trip):
         before = history[(k - 1) % HISTORY]
         points[at.POINTS - 1, 0] = before[at.POINTS - 1, 0]
         points[at.POINTS - 1, 1] = before[at.POINTS - 1, 1]
-        advance_period(x, p, u, axis, work, points)
+        known = advance_period(x, p, m, u, axis, work, points, known)
         c[at.C_PERIOD] = k + 1
     return n
 

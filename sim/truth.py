@@ -75,7 +75,7 @@ def leg_error_v(plant: Plant, current_a: float) -> float:
     p, _ = pack(plant)
     m = load(p)
     dead = m.dead_fraction * p[at.P_LINK_V] * sign_law(current_a * m.dead_per_a, m.dead_shape)
-    return float(dead + m.drop_v * sign_law(current_a * m.drop_per_a, m.drop_shape) + m.slope_ohm * current_a)
+    return float(dead + m.drop_v * sign_law(current_a * m.drop_per_a, m.drop_shape) + p[at.P_SLOPE_OHM] * current_a)
 
 
 def axis_error_v(plant: Plant, axis_deg: float, current_a: float) -> float:
