@@ -106,6 +106,15 @@ def normal_equations(
         slopes.append(slope)
         chi2.append(float(product[-1, -1]))
         counts.append(int(segment.is_good.sum()) * record.facts.phases)
+    prior = layout.penalty(wanted)
+    if prior.any():
+        theta = np.zeros(size)
+        known = {(t.effect, t.symbol): x for t, x in zip(model.terms, model.theta[4:], strict=True)}
+        theta[4:] = [known.get((t.effect, t.symbol), 0.0) for t in wanted]
+        grams.append(prior)
+        slopes.append(-prior @ theta)
+        chi2.append(float(theta @ prior @ theta))
+        counts.append(0)
     return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
 
 
@@ -117,7 +126,10 @@ def _averaged(stacked: Array, good: NDArray[np.bool_], block: int) -> tuple[Arra
 
 
 def chi2_of(model: Model, record: Record, layout: Layout, noise: Noise) -> float:
-    return float(sum(segment_chi2(model, record, layout, noise)))
+    """Whitened squared residual plus the dictionary's prior."""
+    theta = model.theta
+    prior = float(theta @ layout.penalty(model.terms) @ theta)
+    return float(sum(segment_chi2(model, record, layout, noise))) + prior
 
 
 def segment_chi2(model: Model, record: Record, layout: Layout, noise: Noise) -> list[float]:
@@ -175,13 +187,15 @@ def fit(
             if promised < tolerance:
                 return Fit(model, normal, True, done)
             trial = model.moved(theta + step)
-            there = normal_equations(trial, record, layout, trial.terms, noise)
-            if np.isfinite(there.total_chi2) and there.total_chi2 < normal.total_chi2:
+            with np.errstate(over="ignore", invalid="ignore"):
+                there_chi2 = chi2_of(trial, record, layout, noise)
+            if np.isfinite(there_chi2) and there_chi2 < normal.total_chi2:
                 improved = True
                 break
             damping = max(10.0 * damping, 1e-4)
         if not improved:
             return Fit(model, normal, False, done)
+        there = normal_equations(trial, record, layout, trial.terms, noise)
         gained = normal.total_chi2 - there.total_chi2
         model, normal = trial, there
         damping = damping * 0.1 if gained > 0.5 * promised else damping * 3.0

@@ -352,8 +352,9 @@ def _slope(
         dwb = wab * fj[0, p] + wbb * fj[1, p] + fw[1, p]
         dk[stage, 2, p] = -dwa - omega * dx[3, p]
         dk[stage, 3, p] = -dwb + omega * dx[2, p]
-        fw[0, p] = dwa
-        fw[1, p] = dwb
+        is_motion = kinds[p] == OMEGA
+        fw[0, p] = dwa - (fw[0, p] if is_motion else 0.0)
+        fw[1, p] = dwb - (fw[1, p] if is_motion else 0.0)
     for n in range(branches):
         if branch_gain[n] != 0.0:
             for p in range(count):
@@ -374,7 +375,7 @@ def propagate(
 
     `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,),
     `phase_factor` (n, 3) and `channels` (n, c) known functions of time; the segment starts in
-    `initial_state` (psi_s, psi_R). Returns current (2, n), slope after and before each sample (2, n), sensitivities (P, 2, n) and
+    `initial_state` (psi_s, psi_R). Returns current (2, n), slope after and before each sample (2, n), sensitivities (n, 2, P) and
     rotor current and iron flux (2, n) each.
     """
     samples = voltage_a.shape[0]
@@ -387,7 +388,7 @@ def propagate(
     slope_before = np.zeros((2, samples))
     rotor_current = np.zeros((2, samples))
     iron_flux = np.zeros((2, samples))
-    tangent = np.zeros((count, 2, samples))
+    tangent = np.zeros((samples, 2, count))
     x = np.zeros(order)
     dx = np.zeros((order, count))
     y = np.zeros(order)
@@ -476,25 +477,34 @@ def propagate(
                     rotor_current[c, t] = -k[0, 2 + c] / rr
                 if has_loss_tangent:
                     for p in range(count):
-                        tangent[p, 0, t] = fi[0, p]
-                        tangent[p, 1, t] = fi[1, p]
+                        tangent[t, 0, p] = fi[0, p]
+                        tangent[t, 1, p] = fi[1, p]
                 if is_active_leg:
-                    iu = out[0]
-                    iv = -0.5 * iu + 0.5 * SQRT3 * out[1]
-                    iw = -0.5 * iu - 0.5 * SQRT3 * out[1]
-                    nearest = min(abs(iu), abs(iv), abs(iw))
-                    reach = 1.5 * period * base[2] * (abs(now_a - rs * iu) + abs(now_b - rs * out[1])) + 3.0 * legs_knee
-                    if nearest < reach:
-                        steps = crossing_substeps
-                        h = period / steps
+                    # steps fine enough for the steepest part of the leg curve the currents may meet in this period
+                    steep = 0.0
+                    for leg in range(3):
+                        il, sl = out[0], slope_before[0, t]
+                        if leg > 0:
+                            side = 0.5 * SQRT3 if leg == 1 else -0.5 * SQRT3
+                            il = -0.5 * out[0] + side * out[1]
+                            sl = -0.5 * slope_before[0, t] + side * slope_before[1, t]
+                        turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
+                        low = max(abs(il) - 1.2 * period * (abs(sl) + turn), 0.0)
+                        at = np.arcsinh(low / legs_knee)
+                        if at < legs_top:
+                            j = spline_weights(at, legs_top, legs_now.shape[0] - 3, wts, 2)
+                            bend = abs(_curve(legs_now, j, wts, 2, 4)) / np.sqrt(low * low + legs_knee * legs_knee)
+                            steep = max(steep, bend)
+                    steps = max(substeps, min(crossing_substeps, int(steep * base[2] * period / 0.3) + 1))
+                    h = period / steps
             elif e == 0:
                 slope_after[0, t] = out[2 + 2 * stops]
                 slope_after[1, t] = out[3 + 2 * stops]
                 if g == 0.0:
                     for p in range(count):
                         is_loss = 1.0 if kinds[p] == IRON_LOSS else 0.0
-                        tangent[p, 0, t] = fi[0, p] + is_loss * (last_a - now_a)
-                        tangent[p, 1, t] = fi[1, p] + is_loss * (last_b - now_b)
+                        tangent[t, 0, p] = fi[0, p] + is_loss * (last_a - now_a)
+                        tangent[t, 1, p] = fi[1, p] + is_loss * (last_b - now_b)
             e += 1
             if stage < 3 or e == 0:
                 continue

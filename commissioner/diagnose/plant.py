@@ -58,8 +58,24 @@ class Layout:
     branch_time_s: Array
     nonlinearity_scale_a: float
     substeps: int = 1
-    crossing_substeps: int = 6
+    crossing_substeps: int = 12
+    legs_slack_v: float = 1.0
     shift_times_s: tuple[tuple[int, float], ...] = ()
+
+    def penalty(self, terms: Sequence[Term]) -> Array:
+        """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
+
+        tell apart): each rise beyond 0.15 of the range's end is about `legs_slack_v` or less.
+        """
+        size = 4 + len(terms)
+        out = np.zeros((size, size))
+        count = self.legs_vectors.shape[0]
+        knots = (np.arange(count) + 0.5) * self.legs_top / count
+        tail = np.sinh(self.legs_top) * 0.15
+        for k, term in enumerate(terms):
+            if term.kind in (kernel.LEGS, kernel.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
+                out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
+        return out
 
     def finer(self) -> Layout:
         """Half the step length, for the solver-error check."""
@@ -67,24 +83,30 @@ class Layout:
 
 
 def odd_vectors(intervals: int) -> Array:
-    """Spline vectors with F(0) = F''(0) = 0 and a flat end: odd functions that saturate, (intervals, intervals+3)."""
+    """Rises of odd saturating functions, (intervals, intervals+3): row k climbs from 0 to 1 around knot k and stays.
+
+    Cumulative sums of the spline vectors with F(0) = F''(0) = 0 and a flat end, so that weights >= 0 give a curve that
+    never falls: a leg with falling voltage loss would be an oscillator.
+    """
     vectors = np.zeros((intervals, intervals + 3))
     vectors[0, 2], vectors[0, 0] = 1.0, -1.0
     for k in range(1, intervals):
         vectors[k, k + 2] = 1.0
-    vectors[intervals - 2, intervals] = 1.0
     # flat end: c[K+2] = c[K]
     vectors[:, intervals + 2] = vectors[:, intervals]
-    return vectors
+    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
 
 
 def even_vectors(intervals: int) -> Array:
-    """Spline vectors with G(0) = G'(0) = 0: extra slopes that are zero at zero size, (intervals+1, intervals+3)."""
+    """Rises of even functions with G(0) = G'(0) = 0, (intervals+1, intervals+3): row k climbs from knot k on.
+
+    Weights >= 0 give a slope that never falls with size, as saturation does.
+    """
     vectors = np.zeros((intervals + 1, intervals + 3))
     vectors[0, 0], vectors[0, 1], vectors[0, 2] = 1.0, -0.5, 1.0
     for k in range(1, intervals + 1):
         vectors[k, k + 2] = 1.0
-    return vectors
+    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
 
 
 @dataclass(frozen=True)
@@ -166,7 +188,8 @@ def predict(
             model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
             *(listed[k].step for k in inside),
         ])
-        _to_phases(tangent * scale[:, None, None], jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
+        scaled = np.ascontiguousarray((tangent * scale).transpose(2, 1, 0))
+        _to_phases(scaled, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
     measured = _sense(model, record, segment, channels, layout, (current, after, before), jacobian, listed)
     return Prediction(measured, jacobian, rotor, iron, before)
 
@@ -251,7 +274,7 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
     if model.has_kind(kernel.BRANCH):
-        rate = max(rate, 1.5 / float(layout.branch_time_s.min()))
+        rate = max(rate, 0.5 / float(layout.branch_time_s.min()))
     if model.has_kind(kernel.LEAKAGE_CURVE):
         rate *= 1.3
     period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
@@ -268,9 +291,10 @@ def _sense(
     current, after, before = (to_phases @ x for x in trajectory)
     period = record.facts.sample_period_s
     edge = np.diff(to_phases @ segment.voltage_ab_v, axis=1, prepend=0.0) / period
-    capacitance = model.total(CABLE)
-    if capacitance:
-        current = current + capacitance * edge
+    capacitance = model.sum_kind(CABLE, 3)
+    edges = [edge, np.hstack([np.zeros((phases, 1)), edge[:, :-1]]), np.hstack([edge[:, 1:], np.zeros((phases, 1))])]
+    if capacitance.any():
+        current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
     elapsed = segment.time_s - segment.time_s[0]
     late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
     for k, (number, at) in enumerate(layout.shift_times_s):
@@ -336,7 +360,7 @@ def _sense(
         elif term.kind == TONE:
             row[term.index % 3] = channels[:, term.index // 3]
         elif term.kind == CABLE:
-            row[:] = edge
+            row[:] = edges[term.index]
         if term.kind >= 100:
             row *= term.step
     return reported

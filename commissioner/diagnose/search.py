@@ -14,6 +14,7 @@ import numpy as np
 from commissioner.diagnose import kernel
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import Layout, Model, even_vectors, odd_vectors, predict
@@ -30,7 +31,7 @@ GUARD = 1e-3
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "magnetic_hysteresis", "leakage_saturation"})
 EXPLORED_SAMPLES = 45_000
-CORNERS_HZ = (40.0, 120.0, 400.0)
+CORNERS_HZ = (30.0, 70.0, 150.0, 330.0, 700.0)
 STOP_SHARES = (0.02, 0.06, 0.18, 0.5)
 
 Report = Callable[[str], None]
@@ -68,6 +69,7 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         stop_radius_wb=np.array(STOP_SHARES) * flux,
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
+        legs_slack_v=0.003 * peak * model.nominal[0],
     )
     return layout, flux
 
@@ -139,16 +141,30 @@ def search(
         start = fit(nominal.model, small, layout, noise, rounds=6)
         search_small = _Search(small, layout, small_setting, noise, names, report)
         fitted, accepted, _ = search_small.run(start, ())
-        model, layout, first = fitted.model, search_small.layout, search_small.first
-        current_setting = replace(setting, layout=layout, iron_flux_wb=search_small.setting.iron_flux_wb)
+        first = search_small.first
+        model = _without_curves(_completed(fitted.model, accepted, setting))
     whole = _Search(record, layout, current_setting, noise, names, report)
-    start = fit(model, record, layout, noise, rounds=6)
+    start = whole.relayout(fit(model, record, layout, noise))
     fitted, accepted, last = whole.run(start, accepted)
     first = whole.first if first is None else first
     return Found(
         nominal, fitted, accepted, record, whole.layout, whole.setting, last, first,
         tuple(whole.below), whole.gains(fitted, accepted),
     )
+
+
+def _without_curves(model: Model) -> Model:
+    """Curves set back to zero: spline coefficients beyond the flux reached so far mean nothing on other data."""
+    curves = (kernel.IRON_CURVE, kernel.LEAKAGE_CURVE, kernel.STOP)
+    values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
+    return replace(model, values=values)
+
+
+def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model:
+    """The model with every number of its effects: on a part of the data some were invisible."""
+    terms = tuple(t for name in accepted for t in CATALOGUE[name].terms(setting))
+    known = {(t.effect, t.symbol): v for t, v in zip(model.terms, model.values, strict=True)}
+    return Model(model.nominal, terms, tuple(known.get((t.effect, t.symbol), t.start) for t in terms))
 
 
 class _Search:
@@ -187,7 +203,7 @@ class _Search:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
-            current = self._relayout(current)
+            current = self.relayout(current)
             current, accepted, dropped = self._backward(current, accepted)
             refused = set(dropped)
 
@@ -215,8 +231,7 @@ class _Search:
 
     def _is_plausible(self, model: Model, name: str) -> bool:
         entry = CATALOGUE[name]
-        sizes = entry.sizes(self.setting, model.of(name))
-        return not (entry.sign and sizes and next(iter(sizes.values()))[0] * entry.sign <= 0)
+        return is_plausible(name, entry.sizes(self.setting, model.of(name)), self.record.facts.current_peak_a)
 
     def _backward(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...], list[str]]:
         """Drops accepted effects that the later ones have made idle (or turned to the wrong sign)."""
@@ -232,28 +247,32 @@ class _Search:
                     dropped.append(name)
         return current, accepted, dropped
 
-    def _relayout(self, current: Fit) -> Fit:
+    def relayout(self, current: Fit) -> Fit:
         """New dictionary ranges where the improved model reaches other fluxes; curves start again from zero."""
         flux = max(
             float(np.hypot(*predict(current.model, self.record, k, self.layout).iron_flux_wb).max())
             for k in range(len(self.record.segments))
         )
         leak = 1.2 * self.record.facts.current_peak_a * current.model.nominal[2]
-        if 0.85 < 1.08 * flux / self.layout.iron_top_wb < 1.1 and 0.8 < leak / self.layout.leak_top_wb < 1.15:
+        if 0.85 < 1.08 * flux / self.layout.iron_top_wb < 1.06 and 0.8 < leak / self.layout.leak_top_wb < 1.15:
             return current
         self.layout = replace(
             self.layout, iron_top_wb=1.08 * flux, leak_top_wb=leak, stop_radius_wb=np.array(STOP_SHARES) * flux
         )
         self.setting = replace(self.setting, layout=self.layout, iron_flux_wb=flux)
-        curves = (kernel.IRON_CURVE, kernel.LEAKAGE_CURVE, kernel.STOP)
-        values = tuple(
-            0.0 if t.kind in curves else v for t, v in zip(current.model.terms, current.model.values, strict=True)
-        )
-        return fit(replace(current.model, values=values), self.record, self.layout, self.noise)
+        return fit(_without_curves(current.model), self.record, self.layout, self.noise)
 
     def gains(self, fitted: Fit, accepted: Sequence[str]) -> dict[str, float]:
         """Delta chi2 of each accepted effect, the others free (linear, at the fit)."""
         return {name: loss_without(fitted, name) for name in accepted}
+
+
+def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
+    """The sign physics demands; and a leg error that is at half its height before a fifth of the largest current."""
+    sign = CATALOGUE[name].sign
+    if sign and sizes and next(iter(sizes.values()))[0] * sign <= 0:
+        return False
+    return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
 
 
 def loss_without(current: Fit, name: str) -> float:

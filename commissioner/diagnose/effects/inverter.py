@@ -33,7 +33,7 @@ def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 def _legs(name: str, kind: int, setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.legs_vectors.shape[0]
-    return tuple(Term(name, f"leg_{k}", "V", kind, k, 1.0) for k in range(count))
+    return tuple(Term(name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count))
 
 
 @effect(
@@ -109,7 +109,7 @@ def dc_link_ripple(setting: Setting) -> tuple[Term, ...]:
 
 
 def _cable_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"capacitance_nf": (values.get("capacitance", 0.0) * 1e9, "nF")}
+    return {"capacitance_nf": (sum(values.values()) * 1e9, "nF")}
 
 
 @effect(
@@ -120,8 +120,10 @@ def _cable_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="excite lines up to 0.4 of the sampling rate",
 )
 def cable_capacitance(setting: Setting) -> tuple[Term, ...]:
-    """C >= 0 [F] per phase to the star point, charged by the mean command's difference over one sample."""
-    return (Term("cable_capacitance", "capacitance", "F", CABLE, 0, 1e-9, 0.0, 1e-4),)
+    """C >= 0 [F] per phase to the star point, charged by the step of the command at, before or after the sample."""
+    return tuple(
+        Term("cable_capacitance", when, "F", CABLE, k, 1e-9, 0.0, 1e-4) for k, when in enumerate(("at", "before", "after"))
+    )
 
 
 ENTRIES: tuple[Effect, ...] = (dead_time, device_drop, dc_link_sag, dc_link_ripple, cable_capacitance)

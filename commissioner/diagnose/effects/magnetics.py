@@ -29,14 +29,16 @@ def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="repeat the lowest tone at half and at full flux",
 )
 def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
-    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached; G >= 0 at its end.
+    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond a quarter of
 
+    it (below, the permeability of steel may still grow).
     `split` moves the saturating flux between rotor (-0.5) and stator (+0.5) side of the leakage.
     """
     count = setting.layout.iron_vectors.shape[0]
     step = setting.facts.rated_current_peak_a / max(setting.iron_flux_wb, 1e-9) * 0.01
     curve = tuple(
-        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kernel.IRON_CURVE, k, step) for k in range(count)
+        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kernel.IRON_CURVE, k, step, 0.0 if k > 2 else -np.inf)
+        for k in range(count)
     )
     return (*curve, Term("magnetizing_saturation", "split", "1", kernel.NU, 0, 0.1, -0.5, 0.5))
 
@@ -103,10 +105,12 @@ def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="DC staircase with a small high tone on top",
 )
 def leakage_saturation(setting: Setting) -> tuple[Term, ...]:
-    """Extra inverse leakage S(|psi_sigma|) [1/H], a cubic spline with S(0) = 0 over the leakage flux reached."""
+    """Extra inverse leakage S(|psi_sigma|) >= 0 [1/H], a rising cubic spline with S(0) = 0 over the leakage flux reached."""
     count = setting.layout.leak_vectors.shape[0]
     step = 0.01 * setting.facts.current_peak_a / setting.layout.leak_top_wb
-    return tuple(Term("leakage_saturation", f"curve_{k}", "1/H", kernel.LEAKAGE_CURVE, k, step) for k in range(count))
+    return tuple(
+        Term("leakage_saturation", f"curve_{k}", "1/H", kernel.LEAKAGE_CURVE, k, step, 0.0, np.inf) for k in range(count)
+    )
 
 
 def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
