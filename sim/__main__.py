@@ -85,7 +85,8 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
         return 0 if options.truth else _nothing_to_do()
     serving = Options(
         _speed(options.speed), options.seed, options.nvm, options.state_log, tuple(options.fault),
-        options.tcp, options.tls, _tls(options) if options.tls >= 0 else None, options.rtu, options.baud, options.parity,
+        options.tcp, options.tls, _tls(options) if options.tls >= 0 else None,
+        options.rtu, options.baud, options.parity,
     )
     asyncio.run(_serve_until_signal(scenario, serving, serve))
     return 0

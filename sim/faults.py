@@ -11,7 +11,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from sim.firmware import Firmware, Trip
+from sim.firmware import Firmware
+from sim.states import Trip
 
 WIRE = {
     "late": 0.5, "lost": None, "lost_request": None, "repeated": None, "truncated": 3, "corrupted": None,
@@ -164,7 +165,7 @@ def strike(fault: Fault, drive: Firmware) -> None:
         drive.run_until_sample(drive.produced + drive.setup.ring_capacity)
         drive.run_until_sample(drive.produced + int(float(fault.argument or 0)))
     elif fault.name == "sample_gap":
-        drive.gaps.append((drive.produced, int(float(fault.argument or 1))))
+        drive.samples.gaps.append((drive.produced, int(float(fault.argument or 1))))
     else:
         _misbehave(fault, drive)
 

@@ -334,7 +334,7 @@ def advance_period(x, p, m, voltage_v, axis, work, points, known):
 
     `m` is the Model of `p`, `known` are the `all_currents` of the state `x`; those of the state it leaves are returned.
 
-    Classical Runge-Kutta in P_SUBSTEPS (1 or even) steps; `points` are the sensed currents at 0, 1/4 .. 1 of the period.
+    Classical Runge-Kutta in P_SUBSTEPS (1 or even) steps; `points` are sensed currents at 0, 1/4 .. 1 of the period.
     The link voltage and the hot resistances stand still within the period. `work` is `scratch()`.
     """
     has_lag = p[at.P_LAG_ORDER] != 0.0

@@ -173,7 +173,7 @@ def _pack_sensors(plant: Plant, s: np.ndarray) -> None:
 
 
 def _substeps(p: np.ndarray, accuracy: float) -> float:
-    """1 or an even number of Runge-Kutta steps that keeps step times fastest pole below 0.4 (error about 1e-4 of that mode).
+    """1 or an even number of Runge-Kutta steps that keeps step times fastest pole below 0.4 (error 1e-4 of the mode).
 
     The fastest pole is (leg slope near zero current + R_s + R_r) over the leakage inductance.
     """

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from sim import effects
-from sim.firmware import Setup
 from sim.laws import SATURATION_SHAPES, SIGN_SHAPES
 from sim.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, Sensors
+from sim.states import Setup
 
 FOLDER = Path(__file__).parent / "scenarios"
 MACHINE_TABLE = FOLDER / "machines.csv"
@@ -104,7 +104,7 @@ def find(name: str) -> Path:
 
 
 def read_document(name: str, depth: int = 0) -> dict[str, Any]:
-    """The TOML of a scenario; `extends` names one it builds on. ScenarioError where it is not TOML or extends itself."""
+    """The TOML of a scenario; `extends` names one it builds on. ScenarioError where that cannot be."""
     path = find(name)
     try:
         document = tomllib.loads(path.read_text())

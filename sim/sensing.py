@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from sim.compiled import kernel
-
 from sim import layout as at
+from sim.compiled import kernel
 
 HALF_SQRT3 = 0.5 * math.sqrt(3.0)
 

@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import termios
 import threading
 import time
 import tty
@@ -28,10 +29,11 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from sim.drive_map import DriveMap, load_map
 from sim.faults import SERVER, WIRE, Fault, Plan, deliver, parse
-from sim.firmware import Answer, Firmware, warm_up
+from sim.firmware import Firmware, warm_up
 from sim.memory import Memory
 from sim.scenario import Scenario
 from sim.state_log import StateLog
+from sim.states import Answer
 
 STEP_ENERGISED_S = 0.001
 STEP_OFF_S = 0.010
@@ -61,8 +63,8 @@ class Drive:
     def __init__(self, scenario: Scenario, options: Options) -> None:
         self.plan = Plan([parse(text) for text in (*scenario.faults, *options.faults)])
         self.speed = options.speed
-        warm_up(scenario.plant)
         self.map: DriveMap = load_map(shift=scenario.map_shift or self.plan.map_shift)
+        warm_up(scenario.plant, self.map)
         setup = replace(scenario.setup, interlocks=dict(scenario.setup.interlocks))
         factory = [
             float(value) / self.map.items[name].scale
@@ -88,7 +90,7 @@ class Drive:
             target = (time.monotonic() - self.started) * self.speed
             if target > self.firmware.t:
                 self.firmware.advance(target - self.firmware.t)
-        self.firmware.check_watchdog_now()
+        self.firmware.check_watchdog()
 
     def pass_time(self) -> None:
         """Motor time a request takes when it is not a window."""
@@ -102,9 +104,9 @@ class Drive:
         if self.speed:
             self.keep_pace()
             return
-        wanted = int(self.firmware.values["window_index"]) + self.firmware.window_samples(count)
+        wanted = int(self.firmware.values["window_index"]) + self.firmware.samples.fitting(count)
         self.firmware.run_until_sample(wanted)
-        self.firmware.check_watchdog_now()
+        self.firmware.check_watchdog()
 
     async def action(
         self, function: int, start: int, address: int, count: int, registers: list[int], values: Any
@@ -113,7 +115,7 @@ class Drive:
         if values is not None:
             if function != 23:
                 self.pass_time()
-            return _exception(self.firmware.write(address, list(values)))
+            return _exception(self.firmware.registers.write(address, list(values)))
         if function == 6:  # its own echo
             return None
         is_window = address == self.map.window_address
@@ -121,7 +123,7 @@ class Drive:
             self.fill_window(count)
         else:
             self.pass_time()
-        words = self.firmware.read(address, count)
+        words = self.firmware.registers.read(address, count)
         if isinstance(words, Answer):
             return _exception(words)
         registers[address - start : address - start + count] = words
@@ -251,7 +253,7 @@ def _crc_bytes(body: bytes) -> bytes:
 class Line:
     """One way in: a TCP or TLS port, a serial device, or a pty of our own."""
 
-    def __init__(self, drive: Drive, kind: str, make: Callable[[], Any]) -> None:
+    def __init__(self, drive: Drive, kind: str, make: Callable[..., Any]) -> None:
         self.drive, self.kind, self.make = drive, kind, make
         self.is_rtu = kind == "rtu"
         self.address = ""
@@ -260,7 +262,8 @@ class Line:
 
     async def open(self) -> None:
         """Listen; OSError where the port or device cannot be had."""
-        self.server = self.make()
+        came_back = not self.is_rtu and bool(self.address)
+        self.server = self.make(int(self.address.rsplit(":", 1)[1])) if came_back else self.make()
         self.server.callback_new_connection = lambda: Handler(self.server, self)
         if not await self.server.listen():
             raise OSError(f"cannot listen on {self.kind} {self.server.comm_params.source_address}")
@@ -279,6 +282,7 @@ class Line:
         self._attach_pty()
 
     def _attach_pty(self) -> None:
+        termios.tcflush(self.pty_master, termios.TCIFLUSH)
         handler = Handler(self.server, self)
         transport = PtyTransport(self.pty_master, handler)
         handler.connection_made(transport)
@@ -290,18 +294,11 @@ class Line:
         if self.pty_master >= 0:
             loop.remove_reader(self.pty_master)
             loop.call_later(seconds, self._attach_pty)
-            return
-        port = int(self.address.rsplit(":", 1)[1])
+            return  # what is asked meanwhile is lost, as on a powered-down port
         for connection in list(self.server.active_connections.values()):
             connection.transport.abort()
         self.server.close()
-        loop.call_later(seconds, lambda: asyncio.ensure_future(self._reopen(port)))
-
-    async def _reopen(self, port: int) -> None:
-        original = self.make
-        self.make = lambda: original(port)
-        await self.open()
-        self.make = original
+        loop.call_later(seconds, lambda: asyncio.ensure_future(self.open()))
 
     async def close(self) -> None:
         if self.pty_master >= 0:

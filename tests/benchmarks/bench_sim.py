@@ -17,12 +17,13 @@ import pytest
 
 from sim import layout as at
 from sim.drive_map import load_map
-from sim.firmware import Firmware, Setup
+from sim.firmware import Firmware
 from sim.kernel import play_voltages
 from sim.machine import Heating, Machine, Plant, PowerStage, Sensors, fresh_state, pack
 from sim.memory import Memory
 from sim.scenario import load
 from sim.server import Options, run_in_thread
+from sim.states import Setup
 from tests.sim.client import TcpClient
 
 PEER_PERIOD_S = 3e-4

@@ -11,9 +11,10 @@ import pytest
 
 from sim import layout as at
 from sim.drive_map import load_map
-from sim.firmware import Answer, Firmware, Setup, State, Trip
+from sim.firmware import Firmware
 from sim.machine import Plant, Sensors
 from sim.memory import Memory
+from sim.states import Answer, Setup, State, Trip
 from tests.sim.client import crc_bytes, floats
 
 MAP = load_map()
@@ -26,12 +27,12 @@ def drive(plant: Plant | None = None, setup: Setup | None = None, memory: Memory
 
 def put(firmware: Firmware, name: str, value: object) -> Answer:
     item = MAP.items[name]
-    return firmware.write(item.address, item.encode(value))
+    return firmware.registers.write(item.address, item.encode(value))
 
 
 def get(firmware: Firmware, name: str):
     item = MAP.items[name]
-    return item.decode(firmware.read(item.address, item.words))
+    return item.decode(firmware.registers.read(item.address, item.words))
 
 
 def ready(firmware: Firmware, **changes: object) -> Firmware:
@@ -159,8 +160,8 @@ def test_current_limit_trips_at_the_sample_that_passes_it():
     firmware.advance(0.5)
     assert firmware.fault is Trip.OVERCURRENT
     assert 0.6 < get(firmware, "trip_value") < 0.8
-    last = firmware.ring[firmware.produced - 1, 1:] * firmware.current_scale_a
-    before = firmware.ring[firmware.produced - 2, 1:] * firmware.current_scale_a
+    last = firmware.samples.ring[firmware.produced - 1, 1:] * firmware.current_scale_a
+    before = firmware.samples.ring[firmware.produced - 2, 1:] * firmware.current_scale_a
     assert np.abs(last).max() > 0.6 - firmware.plant.sensors.lsb_a
     assert np.abs(before).max() <= 0.6 + firmware.plant.sensors.lsb_a
 
@@ -169,7 +170,7 @@ def test_test_ends_by_itself_with_a_ramp_down():
     firmware = switch_on(ready(drive(), duration_s=0.5, watchdog_ms=2000))
     firmware.advance(1.5)
     assert firmware.state is State.SWITCH_ON_DISABLED
-    u = firmware.ring[: firmware.produced, 0] * 0.01
+    u = firmware.samples.ring[: firmware.produced, 0] * 0.01
     assert np.abs(u[2480:2500]).max() > 4.0
     assert abs(u[-1]) < 0.2
     assert firmware.produced == pytest.approx(2500 + 500, abs=60)
@@ -190,8 +191,8 @@ def test_excitation_is_the_published_formula_and_flags_its_clamp():
     bias = np.minimum(5.0, 100.0 * (t + 2e-4))
     scale = np.minimum(1.0, 10.0 * (t + 2e-4))
     wanted = bias + scale * 40.0 * np.cos(2.0 * math.pi * 10.0 * t + 0.4)
-    np.testing.assert_allclose(firmware.ring[: t.size, 0] * 0.01, np.clip(wanted, -30.0, 30.0), atol=0.006)
-    clamped = firmware.ring_flags[: t.size] & MAP.flags["voltage_clamped"] != 0
+    np.testing.assert_allclose(firmware.samples.ring[: t.size, 0] * 0.01, np.clip(wanted, -30.0, 30.0), atol=0.006)
+    clamped = firmware.samples.flags[: t.size] & MAP.flags["voltage_clamped"] != 0
     np.testing.assert_array_equal(clamped, np.abs(wanted) > 30.0)
 
 
@@ -217,24 +218,24 @@ def test_window_header_data_and_check_sum_are_as_published():
     firmware = switch_on(ready(drive()))
     firmware.advance(0.1)
     put(firmware, "window_index", 17)
-    words = firmware.read(256, 125)
+    words = firmware.registers.read(256, 125)
     assert words[:5] == [firmware.session, 0, 17, 29, 0b1111]
     assert words[5] == MAP.flags["running"]
     assert words[6] * 0.02 == pytest.approx(540.0, rel=0.02)
     check_window(words)
     data = np.array(words[8 : 8 + 116], np.uint16).view(np.int16).reshape(29, 4)
-    np.testing.assert_array_equal(data, firmware.ring[17:46])
+    np.testing.assert_array_equal(data, firmware.samples.ring[17:46])
 
 
 def test_asking_again_gives_the_same_words():
     firmware = switch_on(ready(drive()))
     firmware.advance(0.2)
     put(firmware, "window_index", 100)
-    once = firmware.read(256, 125)
+    once = firmware.registers.read(256, 125)
     put(firmware, "window_index", 200)
-    firmware.read(256, 125)
+    firmware.registers.read(256, 125)
     put(firmware, "window_index", 100)
-    again = firmware.read(256, 125)
+    again = firmware.registers.read(256, 125)
     assert once[8:] == again[8:]
     assert once[:6] == again[:6]
 
@@ -242,7 +243,7 @@ def test_asking_again_gives_the_same_words():
 def test_a_short_read_gets_a_window_that_fits_it():
     firmware = switch_on(ready(drive(), channel_mask=0b0110))
     firmware.advance(0.1)
-    words = firmware.read(256, 8 + 10)
+    words = firmware.registers.read(256, 8 + 10)
     assert (words[3], words[4], len(words)) == (5, 0b0110, 18)
     check_window(words)
 
@@ -250,7 +251,7 @@ def test_a_short_read_gets_a_window_that_fits_it():
 def test_overwritten_samples_are_flagged_and_counted():
     firmware = switch_on(ready(drive(setup=Setup(ring_capacity=1000)), duration_s=20.0, watchdog_ms=2000))
     firmware.advance(0.3)
-    words = firmware.read(256, 125)
+    words = firmware.registers.read(256, 125)
     assert words[1] << 16 | words[2] == 500
     assert words[5] & MAP.flags["overrun"]
     assert get(firmware, "overruns") == 500
@@ -260,7 +261,7 @@ def test_last_window_says_that_nothing_follows():
     firmware = switch_on(ready(drive(), duration_s=0.1, watchdog_ms=2000))
     firmware.advance(1.0)
     put(firmware, "window_index", firmware.produced - 3)
-    words = firmware.read(256, 125)
+    words = firmware.registers.read(256, 125)
     assert words[3] == 3
     assert words[5] & MAP.flags["ended"]
     assert not words[5] & MAP.flags["running"]
@@ -271,15 +272,15 @@ def test_clipped_sensor_is_flagged():
     firmware = switch_on(ready(drive(plant), dc_bias_v=15.0))
     firmware.advance(0.3)
     firmware.values["window_index"] = firmware.produced - 20
-    assert firmware.read(256, 125)[5] & MAP.flags["clipped"]
+    assert firmware.registers.read(256, 125)[5] & MAP.flags["clipped"]
 
 
 def test_decimated_samples_are_means_over_the_periods():
     plain, coarse = switch_on(ready(drive())), switch_on(ready(drive(), decimation=10))
     for firmware in (plain, coarse):
         firmware.advance(0.2)
-    means = plain.ring[:1000].reshape(100, 10, 4).mean(axis=1)
-    np.testing.assert_allclose(coarse.ring[:100], means, atol=0.51)
+    means = plain.samples.ring[:1000].reshape(100, 10, 4).mean(axis=1)
+    np.testing.assert_allclose(coarse.samples.ring[:100], means, atol=0.51)
 
 
 @pytest.mark.parametrize(
@@ -289,22 +290,22 @@ def test_what_needs_a_stop_is_refused_while_energised(name):
     firmware = switch_on(ready(drive()))
     item = MAP.items[name]
     before = firmware.values[name]
-    assert firmware.write(item.address, item.encode(before)) is Answer.BUSY
+    assert firmware.registers.write(item.address, item.encode(before)) is Answer.BUSY
     assert firmware.values[name] == before
 
 
 def test_read_only_unknown_and_half_written_items_are_refused():
     firmware = drive()
     assert put(firmware, "magic", 1) is Answer.NO_SUCH_ADDRESS
-    assert firmware.write(90, [1]) is Answer.NO_SUCH_ADDRESS
-    assert firmware.read(76, 2) is Answer.NO_SUCH_ADDRESS
-    assert firmware.write(MAP.items["current_limit_a"].address, [1]) is Answer.NO_SUCH_ADDRESS
-    assert firmware.write(MAP.items["axis_deg"].address, floats(math.nan)) is Answer.BAD_VALUE
+    assert firmware.registers.write(90, [1]) is Answer.NO_SUCH_ADDRESS
+    assert firmware.registers.read(76, 2) is Answer.NO_SUCH_ADDRESS
+    assert firmware.registers.write(MAP.items["current_limit_a"].address, [1]) is Answer.NO_SUCH_ADDRESS
+    assert firmware.registers.write(MAP.items["axis_deg"].address, floats(math.nan)) is Answer.BAD_VALUE
 
 
 def test_a_refused_request_changes_none_of_its_items():
     firmware = drive()
-    assert firmware.write(96, [400, *floats(7.0), *floats(math.inf)]) is Answer.BAD_VALUE
+    assert firmware.registers.write(96, [400, *floats(7.0), *floats(math.inf)]) is Answer.BAD_VALUE
     assert firmware.values["watchdog_ms"] == 0
     assert firmware.values["current_limit_a"] == 0
 
@@ -313,7 +314,7 @@ def stage(firmware: Firmware, values: list[float], crc: int | None = None) -> No
     words = floats(*values)
     raw = b"".join(w.to_bytes(2, "big") for w in words)
     right = int.from_bytes(crc_bytes(raw), "little")
-    assert firmware.write(592, [*words, right if crc is None else crc]) is Answer.DONE
+    assert firmware.registers.write(592, [*words, right if crc is None else crc]) is Answer.DONE
     put(firmware, "commit", 0xC0DE)
 
 
@@ -389,4 +390,4 @@ def test_same_seed_same_samples_however_time_is_cut():
     whole.advance(0.3)
     for _ in range(300):
         cut.advance(0.001)
-    np.testing.assert_array_equal(whole.ring, cut.ring)
+    np.testing.assert_array_equal(whole.samples.ring, cut.samples.ring)

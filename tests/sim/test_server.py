@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import ipaddress
 import json
+import os
+import pty
 import ssl
 import subprocess
 import sys
 import time
+import tty
 from pathlib import Path
 
 import pytest
@@ -230,3 +234,25 @@ def test_streaming_needs_no_more_than_one_request_per_window(tcp: Client):
     assert all(w[3] == 58 for w in windows[:-1])
     ends = [index_of(w) + w[3] for w in windows]
     assert [index_of(w) for w in windows[1:]] == ends[:-1]
+
+
+def test_an_existing_serial_device_is_served_and_comes_back_after_a_restart():
+    master, slave = pty.openpty()
+    for descriptor in (master, slave):
+        tty.setraw(descriptor)
+    options = Options(rtu=os.ttyname(slave), faults=("restart:0.2@2",))
+    with run_in_thread(SCENARIO, options):
+        client = RtuClient.__new__(RtuClient)
+        client.descriptor, client.timeout_s = master, 0.5
+        assert client.read(0, 2) == [0x434D, 0x5352]
+        with pytest.raises(Silent):
+            client.read(0, 2)
+        deadline = time.monotonic() + 3.0
+        while time.monotonic() < deadline:
+            with contextlib.suppress(Silent):
+                assert client.read(0, 2) == [0x434D, 0x5352]
+                break
+        else:
+            pytest.fail("the drive did not come back")
+    os.close(slave)
+    client.close()
