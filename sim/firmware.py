@@ -89,6 +89,10 @@ class Firmware:
             self._set_fault(Trip(self.setup.fault_at_start), 0.0, 0.0)
         self.log.write("power_up", self.t, parameters=self.parameters.in_use, session=self.session)
 
+    def power_off(self) -> None:
+        """Mains off for good: the output is dead and the log says so."""
+        self._block("power")
+
     def power_cycle(self) -> None:
         """Mains off and on: output dead at once, volatile values lost, parameters as stored."""
         self._block("power")

@@ -396,6 +396,7 @@ async def serve(
     finally:
         for line in lines:
             await line.close()
+        drive.firmware.power_off()
         drive.firmware.log.close()
 
 
