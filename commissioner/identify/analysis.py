@@ -27,7 +27,7 @@ from commissioner.identify.batch import (
 )
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.compensation import NOTHING, Compensation
-from commissioner.identify.observer import BlockEstimate, ParallelObserver
+from commissioner.identify.observer import PRIOR_LOG_STD, BlockEstimate, ParallelObserver
 from commissioner.identify.resistance import DcLevel, InverterError, Staircase, fit_staircase
 from commissioner.identify.whiteness import Whiteness, whiteness
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
@@ -40,6 +40,8 @@ Matrix = NDArray[np.float64]
 WORST_RELATIVE_STD = 0.25
 EXTRA_POWERS = 4
 FINAL_REVIEWS = 6
+UNKNOWN_STATE_LOG_STD = 0.03
+"""How well parameters must be known before an unknown initial state is estimated beside them."""
 BLOCK = 500
 COARSE = 0.03  # of a standard error, while models are compared
 KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
@@ -204,6 +206,7 @@ def _observe(
     observer = ParallelObserver(
         box, period_s, plate.rated_current_peak_a, law=law, start=start, compensation=compensation,
         starts_at_rest=stretches[0].starts_at_rest,
+        start_log_std=PRIOR_LOG_STD if stretches[0].starts_at_rest or start is None else UNKNOWN_STATE_LOG_STD,
         expected_voltage_v=np.concatenate([s.voltage_v for s in stretches]) if law == "lyapunov" else None,
     )
     average = _Average(sum(s.voltage_v.size for s in stretches))

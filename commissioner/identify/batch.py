@@ -28,6 +28,8 @@ from commissioner.records import Signal
 Matrix = NDArray[np.float64]
 TABLE_ROWS = 2049
 SCORE_BLOCK_S = 0.25
+WIDEST = 50.0
+"""A circuit value may move by this factor from its start: data that want more do not determine it."""
 CIRCUIT, DELAY, SHARED, OWN = output_error.CIRCUIT, output_error.DELAY, output_error.SHARED, output_error.OWN
 
 
@@ -192,6 +194,7 @@ def fit_segments(
     choice = model or ModelChoice()
     problem = _Problem(segments, sample_period_s, choice)
     theta = start_theta(start, choice) if theta_start is None else theta_start.copy()
+    problem.bounds = (theta[:CIRCUIT] / WIDEST, theta[:CIRCUIT] * WIDEST)
     own = np.zeros((len(segments), OWN))
     present = problem.evaluate(theta, own)
     damping, converged, iteration = 1e-4, False, 0
@@ -232,6 +235,7 @@ class _Problem:
 
     def __init__(self, segments: Sequence[Segment], period_s: float, model: ModelChoice) -> None:
         self.segments = segments
+        self.bounds = (np.zeros(CIRCUIT), np.full(CIRCUIT, np.inf))
         self.period_s = period_s
         self.model = model
         shared, count = model.size, len(segments)
@@ -300,6 +304,7 @@ class _Problem:
 
     def apply(self, theta: Matrix, own: Matrix, step: Matrix) -> tuple[Matrix, Matrix]:
         new_theta = theta + step[: self.model.size]
+        new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *self.bounds)
         new_theta[DELAY] = float(np.clip(new_theta[DELAY], -self.period_s, 2.0 * self.period_s))
         return new_theta, own + step[self.model.size :].reshape(own.shape)
 

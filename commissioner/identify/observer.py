@@ -35,7 +35,7 @@ OFFSET_STD = 0.02
 """Standard deviation of a current sensor's offset, of the current scale, before anything is known."""
 NOISE_MEMORY_S = 0.1
 FIRST_REVIEW_S = 0.3
-LYAPUNOV_TIME_CONSTANT_S = 5.0
+LYAPUNOV_TIME_CONSTANT_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class ParallelObserver:
 
     `prior` bounds the machine (from the nameplate), `current_scale_a` its currents (rated peak). `starts_at_rest` says
     that current and flux are zero at the first sample; otherwise, and after every gap, the unknown state is estimated
-    along with the parameters. Raises UsageError where the Lyapunov law has no positive-real margin over the prior.
+    along with the parameters, which needs parameters known to some per cent (`start`, `start_log_std`). Raises UsageError where the Lyapunov law has no positive-real margin over the prior.
     """
 
     prior: ParameterBox
@@ -94,6 +94,7 @@ class ParallelObserver:
     current_scale_a: float
     law: Law = "fast"
     start: InverseGamma | None = None
+    start_log_std: float = PRIOR_LOG_STD
     compensation: Compensation = NOTHING
     starts_at_rest: bool = True
     memory_s: float = 240.0
@@ -111,7 +112,8 @@ class ParallelObserver:
             _require_margin(self.prior, self._filter, self.sample_period_s)
             if self.expected_voltage_v is not None:
                 self._gamma = self._gain_matrix(self.expected_voltage_v)
-        self._shell = self._fresh(first, self.current_scale_a**2)
+        is_known = self.start is not None and self.start_log_std < PRIOR_LOG_STD
+        self._shell = self._fresh(first, self.current_scale_a**2, around_start=is_known)
         self._history: list[StoredBlock] = []
         self._samples = 0
         self._next_review = max(FIRST_REVIEW_S / self.sample_period_s, 100.0)
@@ -155,7 +157,8 @@ class ParallelObserver:
         total = piece.voltage_v.shape[0]
         done = 0
         while done < total or not signals:
-            cut = total if self.law != "fast" else min(total, done + max(1, int(self._next_review) - self._samples))
+            due = int(self._next_review) - self._samples
+            cut = min(total, done + due) if self._remembers and due > 0 else total
             part = StoredBlock(
                 piece.voltage_v[done:cut], piece.current_a[done:cut], piece.restarts and done == 0,
                 piece.begins_at_rest and done == 0, piece.open_loop_v if done == 0 else None,
@@ -180,13 +183,17 @@ class ParallelObserver:
         )
 
     def _remember(self, part: StoredBlock) -> None:
-        if self._samples * self.sample_period_s > self.memory_s:
+        if not self._remembers:
             self._history.clear()
             return
         self._history.append(part)
         if self.law == "fast" and self._samples >= int(self._next_review):
             self.review()
             self._next_review *= 2.0
+
+    @property
+    def _remembers(self) -> bool:
+        return self._samples * self.sample_period_s <= self.memory_s
 
     def review(self) -> None:
         """Go over the stored data once more from the present estimate (one Gauss-Newton step of the recursion)."""
@@ -268,7 +275,7 @@ class ParallelObserver:
         theta = to_theta(machine, self._filter, self.sample_period_s)
         if around_start:
             jacobian = _jacobian(machine, self._filter, self.sample_period_s) * np.array(machine.as_tuple())
-            covariance = PRIOR_LOG_STD**2 * jacobian @ jacobian.T
+            covariance = self.start_log_std**2 * jacobian @ jacobian.T
         else:
             covariance = _prior_covariance(self.prior, self._filter, self.sample_period_s)
         upper, diagonal = np.eye(kernels.PARAMETERS), np.zeros(kernels.PARAMETERS)

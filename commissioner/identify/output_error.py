@@ -73,18 +73,22 @@ def simulate(
     for k in range(-1, u.size):
         # Flux at the end of the period without the change of n; k = -1 evaluates the initial state.
         if k >= 0:
-            v = u[k] - delay * (u[k] - v_last) + n
-            c1 = ad[0, 0] * x1 + ad[0, 1] * x2 + b1[0] * v - b2[0] * n
-            c2 = ad[1, 0] * x1 + ad[1, 1] * x2 + b1[1] * v - b2[1] * n
+            # A late step inside the period: its mean, and its first moment as a centred ramp of that moment.
+            jump = u[k] - v_last
+            tilt = 6.0 * delay * (1.0 - delay) * jump
+            v = u[k] - delay * jump + n
+            c1 = ad[0, 0] * x1 + ad[0, 1] * x2 + b1[0] * (v - 0.5 * tilt) + b2[0] * (tilt - n)
+            c2 = ad[1, 0] * x1 + ad[1, 1] * x2 + b1[1] * (v - 0.5 * tilt) + b2[1] * (tilt - n)
             for j in range(p):
                 dc1[j] = ad[0, 0] * s1[j] + ad[0, 1] * s2[j] + (b1[0] - b2[0]) * dn[j]
                 dc2[j] = ad[1, 0] * s1[j] + ad[1, 1] * s2[j] + (b1[1] - b2[1]) * dn[j]
             for j in range(CIRCUIT):
-                dc1[j] += dad[j, 0, 0] * x1 + dad[j, 0, 1] * x2 + db1[j, 0] * v - db2[j, 0] * n
-                dc2[j] += dad[j, 1, 0] * x1 + dad[j, 1, 1] * x2 + db1[j, 1] * v - db2[j, 1] * n
-            step = v_last - u[k]
-            dc1[DELAY] += b1[0] * step
-            dc2[DELAY] += b1[1] * step
+                held, ramp = v - 0.5 * tilt, tilt - n
+                dc1[j] += dad[j, 0, 0] * x1 + dad[j, 0, 1] * x2 + db1[j, 0] * held + db2[j, 0] * ramp
+                dc2[j] += dad[j, 1, 0] * x1 + dad[j, 1, 1] * x2 + db1[j, 1] * held + db2[j, 1] * ramp
+            steep = 6.0 * (1.0 - 2.0 * delay) * jump
+            dc1[DELAY] += b2[0] * steep - b1[0] * (jump + 0.5 * steep)
+            dc2[DELAY] += b2[1] * steep - b1[1] * (jump + 0.5 * steep)
             v_last = u[k]
         else:
             c1, c2 = x1, x2

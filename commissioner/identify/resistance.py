@@ -93,6 +93,7 @@ class StaircasePlan:
     """What a staircase may reach on a motor of which only the plate is known, and how long a level takes to settle."""
 
     top_current_a: float
+    largest_inductance_h: float
     climb_v_per_s: float
     longest_dwell_s: float
     window_s: float
@@ -110,10 +111,11 @@ def staircase(nameplate: Nameplate, limits: StaircaseLimits) -> StaircasePlan:
     """
     box = prior(nameplate)
     inductance_h = 1.35 * (box.typical.leakage_inductance_h + box.typical.magnetizing_inductance_h)
-    top_a = 0.95 * min(limits.current_a, limits.flux_wb / inductance_h)
+    top_a = 0.9 * min(limits.current_a, limits.flux_wb / inductance_h)
     slow = -poles_per_s(box.typical)[0]
     return StaircasePlan(
         top_current_a=top_a,
+        largest_inductance_h=inductance_h,
         climb_v_per_s=top_a * box.typical.stator_resistance_ohm / CLIMB_S,
         longest_dwell_s=min(max(4.0 / slow, 0.3), 3.0),
         window_s=0.5 / slow,
