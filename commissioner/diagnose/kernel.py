@@ -30,6 +30,7 @@ R_S, R_R, GAMMA_SIGMA, GAMMA_M, NU = 0, 1, 2, 3, 4
 LEGS, IRON_CURVE, LEAKAGE_CURVE, STOP, BRANCH, IRON_LOSS = 5, 6, 7, 8, 9, 10
 VOLTAGE_MOD, OMEGA, PHASE_RESISTANCE, ROTOR_MOD = 11, 12, 13, 14
 ROTOR_ANISOTROPY, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY, INITIAL_FLUX = 15, 16, 17, 18
+CARRY = 20  # share of the flux at the end of the segment before that is left at the start
 LEGS_LINK = 19  # as LEGS, scaled with the link voltage and switching frequency (dead time, not device threshold)
 
 SQRT3 = np.sqrt(3.0)
@@ -369,14 +370,14 @@ def propagate(
     base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
     stop_gain, stop_radius, branch_gain, branch_time,
     kinds, indices, legs_vectors, iron_vectors, leak_vectors,
-    initial_state, with_tangent,
+    initial_state, flux_before, with_tangent,
 ):
     """Terminal current and its derivatives with respect to the listed parameters at every sample of one segment.
 
     `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,),
     `phase_factor` (n, 3) and `channels` (n, c) known functions of time; the segment starts in
     `initial_state` (psi_s, psi_R). Returns current (2, n), slope after and before each sample (2, n), sensitivities (n, 2, P) and
-    rotor current and iron flux (2, n) each.
+    rotor current and iron flux (2, n) each, and the rotor flux at the end (2,).
     """
     samples = voltage_a.shape[0]
     count = kinds.shape[0] if with_tangent else 0
@@ -408,6 +409,10 @@ def propagate(
     for c in range(4):
         x[c] = initial_state[c]
     for p in range(count):
+        if kinds[p] == CARRY:
+            for c in range(2):
+                dx[c, p] = flux_before[c]
+                dx[2 + c, p] = flux_before[c]
         if kinds[p] == INITIAL_FLUX:
             n = indices[p]
             if n < 2:
@@ -549,4 +554,4 @@ def propagate(
                         dz_ref[1, p] += x[1] - x[3]
         last_a = now_a
         last_b = now_b
-    return current, slope_after, slope_before, tangent, rotor_current, iron_flux
+    return current, slope_after, slope_before, tangent, rotor_current, iron_flux, x[2:4].copy()

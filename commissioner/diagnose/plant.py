@@ -8,7 +8,7 @@ operators of fixed radius, rotor branches of fixed corner frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -165,7 +165,8 @@ class Prediction:
     jacobian: Array
     rotor_current_a: Array
     iron_flux_wb: Array
-    slope_before: Array = field(default_factory=lambda: np.zeros((2, 0)))
+    slope_before: Array
+    last_rotor_flux_wb: tuple[float, float]
 
 
 def predict(
@@ -178,7 +179,7 @@ def predict(
     inside = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
     kinds = np.array([*NOMINAL_KINDS, *(listed[k].kind for k in inside)], dtype=np.int64)
     indices = np.array([0, 0, 0, 0, *(listed[k].index for k in inside)], dtype=np.int64)
-    current, after, before, tangent, rotor, iron = _propagate(
+    current, after, before, tangent, rotor, iron, last = _propagate(
         model, segment, channels, layout, kinds, indices, wanted is not None
     )
     jacobian = np.zeros((0, record.facts.phases, segment.count))
@@ -191,7 +192,7 @@ def predict(
         scaled = np.ascontiguousarray((tangent * scale).transpose(2, 1, 0))
         _to_phases(scaled, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
     measured = _sense(model, record, segment, channels, layout, (current, after, before), jacobian, listed)
-    return Prediction(measured, jacobian, rotor, iron, before)
+    return Prediction(measured, jacobian, rotor, iron, before, (float(last[0]), float(last[1])))
 
 
 def _to_phases(tangent: Array, jacobian: Array, rows: list[int]) -> None:
@@ -204,7 +205,7 @@ def _to_phases(tangent: Array, jacobian: Array, rows: list[int]) -> None:
 
 def _propagate(
     model: Model, segment: Segment, channels: Array, layout: Layout, kinds: Array, indices: Array, with_tangent: bool
-) -> tuple[Array, Array, Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
     n = segment.count
     voltage_factor, rotor_factor = np.ones(n), np.ones(n)
     omega, phase_factor = np.zeros(n), np.ones((n, 3))
@@ -230,7 +231,7 @@ def _propagate(
     branches = layout.branch_time_s if kernel.BRANCH in every else np.zeros(0)
     legs_size = layout.legs_vectors.shape[0]
     voltage = segment.voltage_ab_v
-    result: tuple[Array, Array, Array, Array, Array, Array] = kernel.propagate(
+    result: tuple[Array, Array, Array, Array, Array, Array, Array] = kernel.propagate(
         np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1]), voltage_factor, segment.link_ratio,
         phase_factor, rotor_factor, omega, channels,
         float(np.median(np.diff(segment.time_s))) if n > 1 else 1e-4,
@@ -247,7 +248,7 @@ def _propagate(
         _if(uses_legs, layout.legs_vectors),
         _if(kernel.IRON_CURVE in every, layout.iron_vectors),
         _if(kernel.LEAKAGE_CURVE in every, layout.leak_vectors),
-        _initial_state(model, segment), with_tangent,
+        _initial_state(model, segment), np.array(segment.flux_before_wb), with_tangent,
     )
     return result
 
@@ -259,6 +260,8 @@ def _if(is_used: bool, vectors: Array) -> Array:
 def _initial_state(model: Model, segment: Segment) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
+    share = model.total(kernel.CARRY)
+    state[:] = [share * f for f in (*segment.flux_before_wb, *segment.flux_before_wb)]
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kernel.INITIAL_FLUX and term.segment in (-1, segment.uid):
             if term.index < 2:

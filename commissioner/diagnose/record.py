@@ -29,6 +29,8 @@ class Segment:
     link_ratio: Signal
     starts_at_rest: bool = True
     uid: int = 0
+    flux_before_wb: tuple[float, float] = (0.0, 0.0)
+    """Rotor flux (alpha, beta) at the end of the segment before, of which a part may be left at the start."""
 
     @property
     def count(self) -> int:
@@ -51,7 +53,7 @@ class Segment:
         """The segment cut after so many samples."""
         return Segment(
             self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
-            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
+            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid, self.flux_before_wb,
         )
 
 

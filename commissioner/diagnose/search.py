@@ -17,7 +17,7 @@ from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, even_vectors, odd_vectors, predict
+from commissioner.diagnose.plant import Layout, Model, Term, even_vectors, odd_vectors, predict
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER, Screening, screen
 
@@ -110,6 +110,21 @@ def _starts(record: Record) -> list[tuple[float, float, float, float]]:
     ]
 
 
+CARRY = Term("", "flux_carried_over", "1", kernel.CARRY, 0, 0.01, 0.0, 1.0)
+"""Nuisance of the nominal model: how much of the rotor flux outlives the pause between two segments."""
+
+
+def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
+    """Every segment told the rotor flux at which the one before it ended (same file), by the model."""
+    before: tuple[float, float] = (0.0, 0.0)
+    out, file = [], -1
+    for k, segment in enumerate(record.segments):
+        started = segment.file == file
+        out.append(replace(segment, flux_before_wb=before if started and segment.starts_at_rest else (0.0, 0.0)))
+        before, file = predict(model, record, k, layout).last_rotor_flux_wb, segment.file
+    return replace(record, segments=tuple(out))
+
+
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:
     layout, flux = layout_for(record, nominal.model)
     record, lines = add_channels(record, nominal.model, layout)
@@ -129,6 +144,9 @@ def search(
     part = explored(record)
     quick = nominal_fit(part, noise)
     nominal = fit(quick.model, record, _bare_layout(), noise, rounds=6, tolerance=1.0)
+    if len(record.segments) > 1:
+        record = with_flux_before(record, nominal.model, _bare_layout())
+        nominal = fit(nominal.model.with_terms([CARRY]), record, _bare_layout(), noise, rounds=6, tolerance=1.0)
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
     record, layout, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
@@ -162,7 +180,8 @@ def _without_curves(model: Model) -> Model:
 
 def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model:
     """The model with every number of its effects: on a part of the data some were invisible."""
-    terms = tuple(t for name in accepted for t in CATALOGUE[name].terms(setting))
+    nuisance = tuple(t for t in model.terms if not t.effect)
+    terms = nuisance + tuple(t for name in accepted for t in CATALOGUE[name].terms(setting))
     known = {(t.effect, t.symbol): v for t, v in zip(model.terms, model.values, strict=True)}
     return Model(model.nominal, terms, tuple(known.get((t.effect, t.symbol), t.start) for t in terms))
 
