@@ -24,12 +24,18 @@ SHORTEST_S = 2.0
 LARGEST_JITTER = 0.05
 """rms deviation of the time stamps from a straight line, in sample periods."""
 NOTED_JITTER = 0.01
+LARGEST_HIDDEN_JITTER = 0.5
+"""Of a sample period, seen in the voltage where the stamps show none: white jitter below it averages out like noise."""
 LARGEST_CLIPPED = 0.002
 """Share of samples that sit on the same extreme value beyond what a sine would put there."""
 LARGEST_FREQUENCY_WANDER = 0.004
 """Of the mean, within the stretch analysed: the grid's own drift is ten times smaller."""
 LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
+
+HOPELESS = frozenset({"time_order", "dead_channel"})
+"""After these not even the fundamental means anything; after other refusals it is still reported."""
+LEAST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -100,21 +106,24 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> A
     period = _clock(recording, slice(low, high), findings)
     currents = [signal[low:high] for signal in recording.currents_a]
     voltages = [signal[low:high] for signal in recording.voltages_v]
+    currents, voltages, exchanged = channels.sort_by_kind(currents, voltages, plate)
+    findings += [Finding(*entry) for entry in exchanged]
     _levels(currents, voltages, findings)
     empty = np.zeros(0, dtype=np.complex128)
-    if any(finding.stops for finding in findings):
+    if any(finding.code in HOPELESS and finding.stops for finding in findings) or high - low < LEAST_SAMPLES:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})
     raw_frequency = abs(dominant_frequency_hz(_any_vector(voltages), period))
     _in_range(raw_frequency, plate, findings)
     pairing = channels.pair(*_phasors(currents, voltages, period, raw_frequency), plate, start, raw_frequency,
                             recording.voltages_are_line_to_line)
     findings += [Finding(*entry) for entry in pairing.findings]
-    if any(finding.stops for finding in findings):
+    if pairing.is_refused:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
     i, v = _vectors(currents, voltages, pairing, recording.voltages_are_line_to_line)
     supply = follow_supply(v, period, raw_frequency)
     fundamental = measure_fundamental(i, v, supply, period, pairing.runs_backwards)
     _ripple(v, fundamental, findings)
+    _sampling_jitter(v, supply, fundamental, period, findings)
     _disguise(fundamental, plate, findings)
     return Audited(
         low, float(recording.time_s[low]), period, i, v, supply, fundamental, tuple(findings), pairing.channel_map
@@ -149,6 +158,8 @@ def _whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tupl
     with np.errstate(invalid="ignore"):
         steps = np.diff(time) / period
         holes = np.flatnonzero(~(steps < 1.5)) + 1 if period > 0 else np.array([], dtype=np.int64)
+    if holes.size and good.all() and abs((time[-1] - time[0]) / period + 1 - time.size) < 0.25 * holes.size:
+        holes = holes[:0]  # as many rows as the time asks for: the stamps jitter, nothing is lost
     if np.any(np.diff(time) <= 0):
         findings.append(Finding("time_order", "refused", "time does not run forward", float(np.nanmin(np.diff(time))),
                                 "steps above 0 s", "sort the rows by time"))
@@ -290,6 +301,25 @@ def _ripple(v: Vector, fundamental: Fundamental, findings: list[Finding]) -> Non
         findings.append(Finding(
             "switched_voltage", "refused", f"{share:.0%} of the voltage is not its fundamental", share, LARGEST_RIPPLE,
             "filter the voltage before sampling, or give the mean over each switching period",
+        ))
+
+
+def _sampling_jitter(v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: list[Finding]) -> None:
+    """Jitter that the stamps do not show: it moves the voltage along the circle only, noise moves it in and out as well.
+
+    From second differences (they drop harmonics): omega V sigma_t = sqrt((var_along - var_across) / 6).
+    """
+    turned = v * np.exp(-1j * supply.angle_rad(np.arange(v.size) * period)) * np.exp(-1j * np.angle(fundamental.voltage_v))
+    rough = turned[2:] - 2 * turned[1:-1] + turned[:-2]
+    excess = max(float(rough.imag.var() - rough.real.var()), 0.0) / 6
+    if rough.imag.var() < 1.3 * rough.real.var():
+        return
+    jitter = np.sqrt(excess) / (2 * np.pi * fundamental.frequency_hz * abs(fundamental.voltage_v)) / period
+    if jitter > NOTED_JITTER * 5:
+        kind = "refused" if jitter > LARGEST_HIDDEN_JITTER else "note"
+        findings.append(Finding(
+            "clock_jitter", kind, f"the samples were taken off their time by {jitter:.0%} of a sample period rms", float(jitter),
+            LARGEST_HIDDEN_JITTER, "record with a hardware clock",
         ))
 
 

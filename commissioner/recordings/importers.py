@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.errors import CommissionerError, DataRefused, UsageError
+from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.table import MAX_BYTES, Table, read_table, to_running
 from commissioner.records import RunningRecording, Signal
 
@@ -43,20 +43,27 @@ def import_table(path: Path) -> Table:
         raise DataRefused(f"{path}: {FOREIGN[suffix]} files are not read", step="read recording", value=suffix,
                           limit="CSV, CSV.gz, Parquet, MATLAB v5", remedy="export the recording as CSV or Parquet")
     if suffix == ".mat":
-        return recognise(_read_matlab(path), {}, str(path))
+        return recognise(matlab_vectors(path), {}, str(path))
     try:
         table = read_table(path)
     except DataRefused as refusal:
         return _foreign_csv(path, refusal)
     if "time_s" in table.columns and any(name.startswith("current_") for name in table.columns):
         return table
-    return _foreign_csv(path, None) if suffix != ".parquet" else recognise(table.columns, table.metadata, str(path))
+    try:
+        return recognise(table.columns, table.metadata, str(path))
+    except DataRefused as refusal:
+        return _foreign_csv(path, refusal)
 
 
-def _foreign_csv(path: Path, refusal: CommissionerError | None) -> Table:
+def _foreign_csv(path: Path, refusal: DataRefused) -> Table:
+    """The file read as somebody else's CSV; where that fails too, what was wrong with it as a table stands."""
     if path.suffix.lower() == ".parquet":
-        raise refusal or _unreadable(path, "no columns")
-    columns, metadata = parse_csv(_text(path), str(path))
+        raise refusal
+    try:
+        columns, metadata = parse_csv(_text(path), str(path))
+    except DataRefused:
+        raise refusal from None
     return recognise(columns, metadata, str(path))
 
 
@@ -179,7 +186,7 @@ def _preface(lines: list[str]) -> dict[str, float | str]:
     return metadata
 
 
-def _read_matlab(path: Path) -> dict[str, Signal]:
+def matlab_vectors(path: Path) -> dict[str, Signal]:
     """Every numeric vector (or matrix column) of a MATLAB v5 file, by its dotted path; v7.3 is named and refused."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -226,21 +233,26 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
     period = data.get("sample_period_s")
     if "time_s" not in kept and isinstance(period, float) and longest:
         kept["time_s"] = np.arange(longest) * period
-    if "time_s" not in kept:
+    missing = _missing(kept)
+    if missing:
         raise DataRefused(
-            f"{source}: there is no time column and no sample rate", step="recognise columns", value=_some(columns),
-            limit="time_s, three currents, three voltages", remedy="add a time column, or sample_period_s",
-        )
-    missing = [f"current_{phase}_a" for phase in "uvw" if f"current_{phase}_a" not in kept]
-    star = all(f"voltage_{phase}_v" in kept for phase in "uvw")
-    line = all(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu"))
-    if missing or not (star or line):
-        raise DataRefused(
-            f"{source}: {'the currents of three phases' if missing else 'three voltages'} are needed to reconstruct speed and torque",
-            step="recognise columns", value=_some(columns), limit="current_u_a, current_v_a, current_w_a and three voltages",
-            remedy="record three line currents and three voltages, or rename the columns to the contract's",
+            f"{source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
+            step="recognise columns", value=_some(columns), limit="time_s, three line currents and three voltages, in SI units",
+            remedy="record all six channels against time, or rename the columns to the contract's",
         )
     return Table(kept, data, source)
+
+
+def _missing(kept: Mapping[str, Signal]) -> list[str]:
+    """What of time, currents and voltages is not there, in words."""
+    out = [] if "time_s" in kept else ["time (a time column or a sample rate)"]
+    phases = [phase for phase in "uvw" if f"current_{phase}_a" not in kept]
+    if phases:
+        out.append("the current" + ("s" if len(phases) > 1 else "") + " of phase " + ", ".join(phases))
+    star = all(f"voltage_{phase}_v" in kept for phase in "uvw")
+    if not star and not all(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu")):
+        out.append("three voltages")
+    return out
 
 
 def _some(columns: Mapping[str, Signal]) -> str:
