@@ -36,6 +36,8 @@ class LiveView:
 
     def __call__(self, record: object) -> None:
         match record:
+            case told.WarmingUp():
+                self._line("[dim]preparing the observer (compiles on the first run, about a minute)[/]")
             case told.StateEntered(state=state, axis_deg=axis):
                 self._line(f"[bold]{state}[/]" + (f"  [dim]axis {axis:g}°[/]" if axis is not None else ""))
             case told.DriveIdentified():

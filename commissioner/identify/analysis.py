@@ -8,7 +8,7 @@ with what the batch fit found taken off; agreement and whiteness. Then the axes 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,12 +27,12 @@ from commissioner.identify.batch import (
 )
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.compensation import NOTHING, Compensation
-from commissioner.identify.observer import PRIOR_LOG_STD, BlockEstimate, ParallelObserver
+from commissioner.identify.observer import PRIOR_LOG_STD, BlockEstimate, ParallelObserver, StoredBlock
 from commissioner.identify.resistance import DcLevel, InverterError, Staircase, fit_staircase
 from commissioner.identify.whiteness import Whiteness, whiteness
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, ParameterBox, RatedFlux, prior, rated_flux
-from commissioner.motor.standstill import admittance_s
+from commissioner.motor.standstill import admittance_s, poles_per_s
 from commissioner.records import Signal, StandstillRecording
 
 Estimator = Literal["pao", "lyapunov", "nls"]
@@ -43,6 +43,7 @@ FINAL_REVIEWS = 6
 UNKNOWN_STATE_LOG_STD = 0.03
 """How well parameters must be known before an unknown initial state is estimated beside them."""
 BLOCK = 500
+EXCITED, EXCITED_WINDOW_S = 0.3, 0.2
 COARSE = 0.03  # of a standard error, while models are compared
 KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Knots of the leg error, in fractions of the largest current; beyond the last it has a hyperbolic tail."""
@@ -173,7 +174,7 @@ def _identify_axis(
         replace(s, current_a=s.current_a - offset) for s, offset in zip(stretches, batch.offsets_a, strict=True)
     ]
     # DC levels do not excite persistently: the recursion is for tones, the batch fit takes the staircase along.
-    tones = [s for s in centred if s.kind != "staircase"] or centred
+    tones = [_excited_part(s, period_s) for s in centred if s.kind != "staircase"] or centred
     seen, observer = _observe(tones, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
     flux = batch.peak_flux_wb
     at_flux, covariance = batch.inverse_gamma_at(flux)
@@ -188,6 +189,24 @@ def _identify_axis(
         residual_rms_a=batch.noise_a if estimator == "nls" else observer.residual_rms_a,
         peak_rotor_flux_wb=observer.peak_rotor_flux_wb, peak_stator_flux_wb=flux, staircase=stairs,
         energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
+    )
+
+
+def _excited_part(stretch: Stretch, period_s: float) -> Stretch:
+    """The stretch from where its current first stays above `EXCITED` of its largest.
+
+    While a test begins at small amplitude the inverter's dead band takes most of the command: what is left tells the
+    recursion about the band's shape, not about the motor.
+    """
+    size = np.abs(stretch.current_a)
+    window = max(1, round(EXCITED_WINDOW_S / period_s))
+    peaks = [float(np.max(size[a : a + window])) for a in range(0, size.size, window)]
+    first = window * next(k for k, peak in enumerate(peaks) if peak >= EXCITED * max(peaks))
+    if first == 0:
+        return stretch
+    return replace(
+        stretch, voltage_v=stretch.voltage_v[first:], current_a=stretch.current_a[first:],
+        cross_a=stretch.cross_a[first:], starts_at_rest=False, start_s=stretch.start_s + first * period_s,
     )
 
 
@@ -221,11 +240,23 @@ def _observe(
     if law == "fast":
         _review_until_still(observer)
     signals = observer.predicted(None if law == "fast" else average.parameters)
-    residuals = tuple(r.current_a - c for r, (c, _, _) in zip(observer.history, signals, strict=True))
+    settle = round(4.0 / -poles_per_s(observer.parameters)[0] / period_s)
+    residuals = tuple(_settled_residuals(observer.history, [current for current, _, _ in signals], settle))
     rotor = max(float(np.max(np.abs(flux))) for _, flux, _ in signals)
     rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
     parameters = observer.parameters if law == "fast" else average.parameters
     return parameters, _Observed(residuals, rms, rotor)
+
+
+def _settled_residuals(pieces: Sequence[StoredBlock], predicted: Sequence[Signal], settle: int) -> Iterator[Signal]:
+    """What is left of each piece, without the first `settle` samples after a state that was not known."""
+    unsettled = 0
+    for piece, current in zip(pieces, predicted, strict=True):
+        unsettled = settle if piece.restarts else unsettled
+        residual = (piece.current_a - current)[unsettled:]
+        unsettled = max(0, unsettled - current.size)
+        if residual.size:
+            yield residual
 
 
 class _Average:
@@ -263,7 +294,7 @@ def _first_estimate(
     if leg is not None:
         grid = np.linspace(0.0, span_a, 1025)
         compensation = Compensation(leg.on_axis(grid, stretches[0].axis_deg), span_a)
-    tones = [s for s in stretches if s.kind != "staircase"] or stretches
+    tones = [_excited_part(s, period_s) for s in stretches if s.kind != "staircase"] or stretches
     return _observe(tones, plate, box, period_s, compensation, "fast", guess)[0]
 
 

@@ -270,14 +270,9 @@ class _Problem:
             information, score = np.zeros((columns.size, columns.size)), np.zeros(columns.size)
             scores = np.zeros((segment.voltage_v.size // block + 1, columns.size))
             residual, flux = np.empty_like(segment.current_a), np.empty_like(segment.current_a)
-            before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
+            shared = (information, score, block, scores, residual, flux)
             with np.errstate(over="ignore", invalid="ignore"):
-                squares = output_error.simulate(
-                    segment.voltage_v, segment.current_a, self.weights[k], before, *held, theta,
-                    self.model.extra_powers, self.model.flux_scale_wb, self.bases[k], self.current_span_a,
-                    own[k], theta[DELAY] / self.period_s, self.free[columns].astype(np.float64),
-                    information, score, block, scores, residual, flux,
-                )
+                squares = self._simulate(k, held, theta, own[k], shared)
             scale = np.ones(columns.size)
             scale[DELAY] = 1.0 / self.period_s
             information = (information + np.tril(information, -1).T) * np.outer(scale, scale)
@@ -290,6 +285,32 @@ class _Problem:
             out.residuals.append(residual)
             out.flux.append(flux)
         return out
+
+    def _simulate(
+        self, k: int, held: tuple[Matrix, ...], theta: Matrix, own: Matrix,
+        shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix],
+    ) -> float:
+        """One segment's pass; what it finds is written into `shared`. The linear machine has a kernel of its own."""
+        segment, model = self.segments[k], self.model
+        wanted = self.free[self.columns[k]].astype(np.float64)
+        information, score, block, scores, residual, flux = shared
+        if model.size == SHARED and not model.with_delay and theta[DELAY] == 0.0:
+            kept = np.delete(np.arange(SHARED + OWN), DELAY)
+            small = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
+            ad, b1, _, dad, db1, _ = held
+            squares = output_error.simulate_linear(
+                segment.voltage_v, segment.current_a, self.weights[k], ad, b1, dad, db1, theta, own, wanted[kept],
+                small[0], small[1], block, small[2], residual, flux,
+            )
+            information[np.ix_(kept, kept)], score[kept], scores[:, kept] = small
+            return float(squares)
+        before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
+        ad, b1, b2, dad, db1, db2 = held
+        return float(output_error.simulate(
+            segment.voltage_v, segment.current_a, self.weights[k], before, ad, b1, b2, dad, db1, db2, theta,
+            model.extra_powers, model.flux_scale_wb, self.bases[k], self.current_span_a, own,
+            theta[DELAY] / self.period_s, wanted, information, score, block, scores, residual, flux,
+        ))
 
     def step(self, at: _Evaluation, theta: Matrix, damping: float) -> Matrix:
         free = np.flatnonzero(self.free)

@@ -136,6 +136,7 @@ class Staircase:
 
 KNEE_POINTS = np.concatenate([[0.0], np.geomspace(0.05, 200.0, 40)])
 """Where a fitted knee shape is tabulated, in knee currents."""
+SHAPE_DOUBT = 0.01
 TAILS = (1.0, 1.5, 2.0, 4.0)
 """Exponents n of the knee shapes tried, x / (1 + x^n)^(1/n): from a hyperbola, whose tail is long, to almost a corner."""
 
@@ -163,8 +164,10 @@ def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
     mean = weights @ values
     spread = np.sqrt(weights @ (values - mean) ** 2 + weights @ np.array([np.square(f.std) for f in fits]))
     shape = knee_shape(best.values[1], best.values[2], best.tail)
+    # A shape outside the family (an arc tangent) moves R_s by up to the hundredth part of the plateau over the largest current.
+    doubt = SHAPE_DOUBT * abs(float(best.values[1])) / largest
     return Staircase(
-        stator_resistance=Quantity(float(best.values[0]), float(spread[0] + abs(mean[0] - best.values[0]))),
+        stator_resistance=Quantity(float(best.values[0]), float(math.hypot(spread[0], doubt) + abs(mean[0] - best.values[0]))),
         error_voltage=Quantity(float(best.values[1]), float(spread[1] + abs(mean[1] - best.values[1]))),
         offset_a=float(best.values[3]),
         inverter=InverterError(shape.current_a, shape.voltage_v, (float(spread[1]),) * len(shape.current_a)),

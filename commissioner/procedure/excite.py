@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.errors import Aborted
+from commissioner.errors import Aborted, DataRefused
 from commissioner.identify import excitation, resistance
 from commissioner.identify.analysis import Identification, identify
 from commissioner.identify.compensation import Compensation
 from commissioner.identify.convergence import Settling, settled
-from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
+from commissioner.identify.excitation import DesignedExcitation, Excitation, ExcitationLimits, Tone
 from commissioner.identify.flux import FluxAdvice, FluxGuard, FluxReading
 from commissioner.identify.observer import BlockEstimate, ParallelObserver
-from commissioner.identify.resistance import DcLevel, InverterError, StaircaseLimits
+from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import ParameterBox, prior
+from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.assembly import assemble
 from commissioner.procedure.findings import (
@@ -40,18 +40,21 @@ TELL_EVERY_S = 0.1
 BIAS_RAMP_PER_S = 4.0
 """The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
 CLIMB_STEP_S = 0.02
+RISE_STEPS = 10
 RUNGS = (1.0, 0.6, 0.3)
-LATER_RUNGS = 2
-"""DC levels of one sign, of the top current; how many of them once the inverter is known."""
+"""DC levels of one sign, of the top current."""
+KNOWN_TOP = 0.95
+"""Flux of the top DC level, of the limit, once the inductance is known."""
 SETTLED = 0.006
 KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
 """Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
 LOOK_STD = 0.15
 """A value of the first look counts where its relative standard error is below this."""
 COMPENSATION_ROWS = 1025
+WARM_UP_SAMPLES = 6000
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
-FIRST_LOOK = 0.25
+FIRST_LOOK = 0.3
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
 
@@ -66,14 +69,13 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     yield Enable("DC staircase")
     findings.segment += 1
     yield from stair.zero()
-    voltages = findings.dc_voltages_v[:LATER_RUNGS] or (yield from stair.climb())
+    voltages = stair.known_voltages() or (yield from stair.climb())
     for voltage_v in (*voltages, *(-v for v in reversed(voltages))):
         yield from stair.hold(voltage_v)
         yield Tell(stair.progress(2 * len(voltages)))
     yield SetBias(0.0)
     yield from _ramp_down(findings, "DC staircase", axis_deg, 1.0 / BIAS_RAMP_PER_S)
     yield Disarm("staircase measured")
-    findings.dc_voltages_v = findings.dc_voltages_v or voltages
     findings.knee = findings.knee or tuple(stair.knee)
     fitted = resistance.fit_staircase((*stair.levels, *findings.knee), axis_deg)
     findings.staircases.append(fitted)
@@ -106,26 +108,47 @@ class _Stair:
         self.offset_a = yield from _measure_offset(self.findings, "DC staircase", self.axis_deg)
         self.seconds += OFFSET_S
 
+    def known_voltages(self) -> tuple[float, ...]:
+        """The rungs' voltages once the first look has told resistance, inductance and inverter; empty before."""
+        look = self.findings.first_look
+        if look is None:
+            return ()
+        machine = look.parameters
+        inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
+        limit_wb = self.job.flux_limit_wb(machine.stator_resistance_ohm)
+        top_a = min(KNOWN_TOP * limit_wb / inductance_h, self.job.test_current_a)
+        currents = np.array([rung * top_a for rung in RUNGS])
+        volts = machine.stator_resistance_ohm * currents + self.findings.inverter.on_axis(currents, self.axis_deg)
+        return tuple(float(min(v, self.job.test_voltage_v)) for v in volts)
+
     def climb(self) -> Generator[Command, Any, tuple[float, ...]]:
-        """Raise the bias slowly until the top current flows; the voltages of a few rungs below it, largest first."""
-        top_a, volts, reached = self._plan.top_current_a, [0.0], [0.0]
-        while reached[-1] < top_a and volts[-1] < self.job.test_voltage_v:
-            volts.append(min(volts[-1] + self._plan.climb_v_per_s * CLIMB_STEP_S, self.job.test_voltage_v))
-            yield SetBias(volts[-1])
+        """Raise the bias slowly until the top current flows; the voltages of a few rungs below it, largest first.
+
+        What the climb needs to build up flux would drive too much current once held: it is taken off, for the most
+        inductive motor the plate allows.
+        """
+        top_a, voltage_v, steady, reached = self._plan.top_current_a, 0.0, [0.0], [0.0]
+        while reached[-1] < top_a and voltage_v < self.job.test_voltage_v:
+            voltage_v = min(voltage_v + self._plan.climb_v_per_s * CLIMB_STEP_S, self.job.test_voltage_v)
+            yield SetBias(voltage_v)
             step_s, current = 0.0, np.zeros(0)
             while step_s < CLIMB_STEP_S:
                 block = yield from self._fetch()
                 current = self._current(block)
                 step_s += block.count * block.sample_period_s
-            self._note_climb(volts[-1], float(np.mean(current)), (float(np.mean(current)) - reached[-1]) / step_s)
-            reached.append(max(reached[-1], float(np.mean(current))))
+            seen_a = float(np.mean(current))
+            self._note_climb(voltage_v, seen_a, (seen_a - reached[-1]) / step_s)
+            reached.append(max(reached[-1], seen_a))
+            back = min(len(reached) - 1, RISE_STEPS)
+            rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
+            steady.append(max(steady[-1], voltage_v - self._plan.largest_inductance_h * rise))
         if reached[-1] < 0.3 * top_a:
             raise Aborted(
                 "no current flows", step=f"DC staircase, axis {self.axis_deg:g} deg", value=f"{reached[-1]:.3g} A",
                 limit=f"{top_a:.3g} A within {self.job.test_voltage_v:.3g} V",
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip
-        return tuple(float(np.interp(rung * reached[-1], reached, volts)) for rung in RUNGS)
+        return tuple(float(np.interp(rung * reached[-1], reached, steady)) for rung in RUNGS)
 
     def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
         """Points on the knee of the inverter's error, which no settled level shows; the iron's small lag taken off."""
@@ -187,7 +210,7 @@ def excite(job: Job, findings: Findings) -> Step:
     axis_deg = job.plan.tests_deg[findings.tests_done]
     seconds = job.plan.excitation.seconds * job.stretch
     limits = _excitation_limits(job, findings)
-    if findings.first_look is None:
+    if not findings.has_looked:
         look_s = FIRST_LOOK * seconds
         guess = excitation.design(
             job.nameplate, _known(job, findings), limits, _period_s(findings), findings.inverter, look_s
@@ -210,7 +233,12 @@ def _look_closer(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     """
     recording = assemble(findings.blocks, {}, "first look")
     assert recording is not None
-    look = identify(recording, job.nameplate, "nls", findings.inverter, findings.estimate)
+    findings.has_looked = True
+    try:
+        look = identify(recording, job.nameplate, "nls")
+    except DataRefused:
+        findings.estimate = _known(job, findings)  # too little in it: the test that follows is designed from the plate
+        return
     findings.first_look = look
     findings.estimate = _believable(look, _known(job, findings), prior(job.nameplate))
     error = look.inverter.plateau_v if look.inverter else 0.0
@@ -375,6 +403,20 @@ class _UnderTest:
 
     def _measured_fraction(self, reading: FluxReading) -> float:
         return max(reading.observer_wb, reading.model_free_wb) / self._limit_wb
+
+
+def warm_up(nameplate: Nameplate) -> None:
+    """Run observer and guard once on made-up samples: what has to be compiled is compiled before anything is energised."""
+    period_s = 2e-4
+    time_s = np.arange(WARM_UP_SAMPLES) * period_s
+    signal = np.cos(2.0 * np.pi * time_s)
+    tone = Excitation((Tone(1.0, 1.0, 0.0), Tone(1.0, 20.0, 0.0)), 0.0, float(time_s[-1]))
+    observer = ParallelObserver(
+        prior(nameplate), period_s, nameplate.rated_current_peak_a, compensation=_compensation(IDEAL_INVERTER, 0.0, 1.0)
+    )
+    guard = FluxGuard(1.0, 0.01, tone, period_s, 1.0)
+    for part in np.array_split(signal, 4):
+        guard.advance(part, part, observer.advance(part, part, 1), 0.1)
 
 
 # --- shared ---------------------------------------------------------------------------------------------------------

@@ -10,6 +10,11 @@ from commissioner.records import DriveIdentity, WrittenParameter
 
 
 @dataclass(frozen=True)
+class WarmingUp:
+    """Before anything is connected: the numerical kernels are compiled where this machine has not done so yet."""
+
+
+@dataclass(frozen=True)
 class StateEntered:
     state: str
     because: str

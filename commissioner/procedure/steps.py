@@ -100,9 +100,9 @@ class Findings:
     snapshot: ParameterSnapshot | None = None
     checks: tuple[CheckResult, ...] = ()
     tests_done: int = 0
-    dc_voltages_v: tuple[float, ...] = ()
     knee: tuple[DcLevel, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
+    has_looked: bool = False
     first_look: Identification | None = None
     estimate: InverseGamma | None = None
     blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)

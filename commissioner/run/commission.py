@@ -18,7 +18,8 @@ from commissioner.link.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
 from commissioner.procedure.course import Findings, Job, course
-from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.excite import warm_up
+from commissioner.procedure.findings import RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.verdict import PARAMETERS
 from commissioner.records import DriveIdentity
@@ -97,6 +98,8 @@ def commission(
     """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder."""
     profile = load_profile(profile_name)
     parse_url(url)
+    present(WarmingUp())
+    warm_up(nameplate)
     folder = RunFolder.create(runs, profile_name.rsplit("/", 1)[-1].removesuffix(".toml"))
     findings = Findings()
     try:
