@@ -193,3 +193,56 @@ def simulate(
                     for b in range(a + 1):
                         information[a, b] += wa * si[b]
     return total
+
+
+LINEAR = 7  # four of the circuit, offset, psi_s(0), psi_R(0)
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def simulate_linear(
+    u: Array, y: Array, weight: Array, ad: Array, b1: Array, dad: Array, db1: Array, theta: Array, own: Array,
+    wanted: Array, information: Array, score: Array, block: int, block_scores: Array, residual: Array, flux: Array,
+) -> float:
+    """`simulate` for ideal inverter, unsaturated iron and no delay: the same results in a tenth of the time.
+
+    Arrays have `LINEAR` columns: R_s, R_r, L_l, L_0, offset, psi_s(0), psi_R(0).
+    """
+    l_l, l_0 = theta[2], theta[3]
+    h_s, h_r = 1.0 / l_0 + 1.0 / l_l, -1.0 / l_l
+    a00, a01, a10, a11 = ad[0, 0], ad[0, 1], ad[1, 0], ad[1, 1]
+    g0, g1 = b1[0], b1[1]
+    s1, s2, j_row = np.zeros(6), np.zeros(6), np.zeros(LINEAR)
+    s1[4], s2[5] = 1.0, 1.0
+    x1, x2 = own[1], own[2]
+    summed = np.zeros((LINEAR, LINEAR))
+    total = 0.0
+    for k in range(u.size):
+        e = y[k] - (h_s * x1 + h_r * x2) - own[0]
+        residual[k], flux[k] = e, x1
+        for j in range(4):
+            j_row[j] = (h_s * s1[j] + h_r * s2[j]) * wanted[j]
+        j_row[2] += (x2 - x1) / (l_l * l_l) * wanted[2]
+        j_row[3] -= x1 / (l_0 * l_0) * wanted[3]
+        j_row[4] = wanted[4]
+        j_row[5] = (h_s * s1[4] + h_r * s2[4]) * wanted[5]
+        j_row[6] = (h_s * s1[5] + h_r * s2[5]) * wanted[6]
+        w = weight[k]
+        if w > 0.0:
+            total += w * e * e
+            row = k // block
+            for a in range(LINEAR):
+                wa = w * j_row[a]
+                score[a] += wa * e
+                block_scores[row, a] += wa * e
+                for b in range(a + 1):
+                    summed[a, b] += wa * j_row[b]
+        v = u[k]
+        for j in range(6):
+            d1, d2 = a00 * s1[j] + a01 * s2[j], a10 * s1[j] + a11 * s2[j]
+            if j < 4:
+                d1 += dad[j, 0, 0] * x1 + dad[j, 0, 1] * x2 + db1[j, 0] * v
+                d2 += dad[j, 1, 0] * x1 + dad[j, 1, 1] * x2 + db1[j, 1] * v
+            s1[j], s2[j] = d1, d2
+        x1, x2 = a00 * x1 + a01 * x2 + g0 * v, a10 * x1 + a11 * x2 + g1 * v
+    information += summed
+    return total

@@ -1,0 +1,184 @@
+"""From a recording to a result: the simulator's answer key, and named refusals for what cannot carry an answer."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.identify.analysis import identify
+from commissioner.records import StandstillRecording
+from tests.support.standstill import linear_current, multitone
+
+PERIOD_S = 2e-4
+TRUTH = (3.7, 2.09, 0.021, 0.224)
+TONES = [(14.0, 0.7, 0.0), (4.0, 2.3, 1.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)]
+PLATE = {
+    "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0,
+    "rated_speed_rpm": 1436.0, "power_factor": 0.8, "pole_pairs": 2.0, "connection": "star",
+}
+
+
+def recording(tones=TONES, seconds=5.0, axis_deg=30.0, noise=0.01, seed=1, truth=TRUTH) -> StandstillRecording:
+    voltage = multitone(tones, seconds, PERIOD_S)
+    current = linear_current(truth, voltage, PERIOD_S)
+    rng = np.random.default_rng(seed)
+    phases = [
+        current * np.cos(np.radians(axis_deg - shift)) + noise * rng.standard_normal(current.size) for shift in (0, 120, 240)
+    ]
+    n = voltage.size
+    return StandstillRecording(
+        np.arange(n) * PERIOD_S, np.zeros(n, dtype=np.int64), np.full(n, axis_deg), voltage, phases[0], phases[1], phases[2],
+        None, PERIOD_S, PLATE,
+    )
+
+
+@pytest.mark.parametrize("estimator", ["pao", "nls", "lyapunov"])
+def test_every_estimator_finds_the_machine(estimator):
+    seconds = 40.0 if estimator == "lyapunov" else 5.0
+    result = identify(recording(seconds=seconds), estimator=estimator)
+    relative = np.abs(np.array(result.parameters.as_tuple()) / TRUTH - 1.0)
+    assert np.all(relative < 0.01)
+    if estimator != "lyapunov":
+        assert np.all(relative * TRUTH < 4.5 * np.array(result.std))
+    assert result.axes[0].whiteness.is_white
+    assert result.inverter is None
+
+
+def test_the_document_is_json_with_the_contracts_keys():
+    document = identify(recording()).as_json()
+    again = json.loads(json.dumps(document, allow_nan=False))
+    assert {"outcome", "reason", "parameters", "axes", "rated_flux_wb", "inverter", "gaps", "duration_s", "t_model"} <= set(again)
+    assert set(again["parameters"]) == {
+        "stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h",
+        "rotor_time_constant_s",
+    }
+    assert again["t_model"]["assumption"]
+    assert {"axis_deg", "parameters", "whiteness", "peak_rotor_flux_wb"} <= set(again["axes"][0])
+
+
+def test_gaps_are_counted_and_leave_no_bias():
+    whole = recording(seconds=8.0)
+    keep = np.ones(whole.time_s.size, dtype=bool)
+    keep[9000:9300] = keep[20000:20050] = False
+    columns = {
+        f.name: getattr(whole, f.name)[keep] for f in dataclasses.fields(whole)
+        if isinstance(getattr(whole, f.name), np.ndarray)
+    }
+    result = identify(dataclasses.replace(whole, **columns))
+    assert (result.gaps, result.lost_samples) == (2, 350)
+    assert np.all(np.abs(np.array(result.parameters.as_tuple()) - TRUTH) < 4.5 * np.array(result.std))
+
+
+def test_resistance_is_referred_to_20_degrees_where_a_temperature_is_known():
+    result = identify(recording(), winding_temperature_degc=60.0)
+    assert result.stator_resistance_20degc_ohm is not None
+    assert result.stator_resistance_20degc_ohm[0] == pytest.approx(3.7 * 254.5 / 294.5, rel=0.01)
+
+
+def test_default_drive_recording_from_the_simulator_meets_the_issues_target():
+    """Real inverter, 12-bit sensors, saturating iron: three axes and a repeat, by the simulator's answer key.
+
+    The winding warms by 1 % over these 64 s, so that the cold resistance of the key is compared with the first axis.
+    """
+    from sim.recording import record
+    from sim.scenario import load
+
+    columns, metadata, truth = record(load("rich"), 3)
+    result = identify(
+        StandstillRecording(
+            columns["time_s"], columns["segment"].astype(np.int64), columns["axis_deg"], columns["voltage_axis_v"],
+            columns["current_u_a"], columns["current_v_a"], columns.get("current_w_a"), None,
+            float(metadata["sample_period_s"]), metadata,
+        )
+    )
+    key = truth["inverse_gamma"]["over_flux"]
+    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+    flux = [row["stator_flux_wb"] for row in key]
+    exact = np.array([np.interp(result.holds_for_flux_wb, flux, [row["secant"][n] for row in key]) for n in names])
+    exact[0] = truth["apparent_stator_resistance_ohm"]
+    found = np.array(result.parameters.as_tuple())
+    warmest = result.axes[-1].parameters.stator_resistance_ohm
+    found[0] = result.axes[0].parameters.stator_resistance_ohm
+    relative = np.abs(found / exact - 1.0)
+    assert np.all(relative < [0.005, 0.02, 0.01, 0.02]), relative
+    assert found[0] < warmest < 1.015 * exact[0]
+
+
+# -- refusals ------------------------------------------------------------------------------------------------------
+
+
+def refused(broken: StandstillRecording, **options) -> DataRefused:
+    with pytest.raises(DataRefused) as caught:
+        identify(broken, **options)
+    assert caught.value.exit_code == 3
+    assert caught.value.remedy
+    return caught.value
+
+
+def changed(**columns) -> StandstillRecording:
+    return dataclasses.replace(recording(), **columns)
+
+
+def test_one_tone_is_refused_and_told_which_combination_it_fixes():
+    error = refused(recording([(14.0, 5.0, 0.0)], noise=0.0))
+    assert "one tone" in str(error)
+    omega = 2 * np.pi * 5.0
+    r_s, r_r, l_sigma, l_m = TRUTH
+    real = r_s + r_r * (omega * l_m) ** 2 / (r_r**2 + (omega * l_m) ** 2)
+    number = float(error.remedy.split("= ")[1].split(" ohm")[0])
+    assert number == pytest.approx(real, rel=0.02)
+
+
+def test_short_nan_uneven_and_unexcited_recordings_are_refused_by_name():
+    assert "short" in str(refused(recording(seconds=0.2)))
+    good = recording()
+    bad = good.current_u_a.copy()
+    bad[77] = np.nan
+    error = refused(changed(current_u_a=bad))
+    assert "current_u_a" in str(error)
+    assert "77" in str(error.value)
+    time = good.time_s.copy()
+    time[100:] += 0.4 * PERIOD_S
+    assert "steps" in str(refused(changed(time_s=time)))
+    assert "excited" in str(refused(changed(voltage_axis_v=np.zeros_like(good.time_s))))
+
+
+def test_clipped_currents_are_refused_and_the_channel_named():
+    good = recording(axis_deg=0.0)
+    top = 0.8 * np.max(good.current_u_a)
+    error = refused(dataclasses.replace(good, current_u_a=np.clip(good.current_u_a, -top, top)))
+    assert "current_u_a is clipped" in str(error)
+
+
+def test_a_quantised_slow_sine_is_not_taken_for_clipping():
+    tones = [(14.0, 0.7, 0.0), (3.0, 2.3, 1.0), (2.0, 11.8, 2.0), (1.0, 40.1, 3.0)]
+    good = recording(tones, axis_deg=0.0, noise=0.0)
+    lsb = 25.0 / 2048
+    rounded = {n: np.round(getattr(good, n) / lsb) * lsb for n in ("current_u_a", "current_v_a", "current_w_a")}
+    identify(dataclasses.replace(good, **rounded))
+
+
+def test_a_wrong_axis_is_refused_with_the_one_that_was_seen():
+    error = refused(changed(axis_deg=np.full(recording().time_s.size, 90.0)))
+    assert "axis" in str(error)
+    assert "30.0" in str(error.value)
+
+
+def test_missing_and_impossible_nameplate_keys_are_named():
+    assert "rated_current_a" in str(refused(changed(metadata={k: v for k, v in PLATE.items() if k != "rated_current_a"})))
+    assert "rated_speed_rpm" in str(refused(changed(metadata=PLATE | {"rated_speed_rpm": 1600.0})))
+
+
+def test_an_unknown_estimator_is_a_usage_error():
+    with pytest.raises(UsageError):
+        identify(recording(), estimator="ekf")  # type: ignore[arg-type]
+
+
+def test_an_axis_that_changes_inside_a_segment_is_refused():
+    axis = recording().axis_deg.copy()
+    axis[5000:] = 60.0
+    assert "changes its axis" in str(refused(changed(axis_deg=axis)))
