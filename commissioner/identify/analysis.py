@@ -1,4 +1,5 @@
-"""From a standstill recording to the motor's parameters: the same code offline and for the final judgement of a live run.
+"""From a standstill recording to the motor's parameters: the same code offline and for the final judgement of a live
+run.
 
 Per axis: staircase -> R_s and inverter error; online observer over every stretch -> start values; batch fit with the
 extensions the data ask for (delay, inverter error, saturating iron; Bayesian information criterion); observer once more
@@ -7,6 +8,7 @@ with what the batch fit found taken off; agreement and whiteness. Then the axes 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -52,7 +54,8 @@ COPPER_ZERO_DEGC = -234.5
 
 @dataclass(frozen=True)
 class AxisResult:
-    """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard errors."""
+    """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard
+    errors."""
 
     axis_deg: float
     parameters: InverseGamma
@@ -70,7 +73,8 @@ class AxisResult:
 
 @dataclass(frozen=True)
 class Identification:
-    """The whole answer. Parameters hold for the peak stator flux `holds_for_flux_wb` (secant values of saturating iron)."""
+    """The whole answer. Parameters hold for the peak stator flux `holds_for_flux_wb` (secant values of saturating
+    iron)."""
 
     estimator: Estimator
     parameters: InverseGamma
@@ -96,7 +100,7 @@ class Identification:
 
     def as_json(self) -> dict[str, object]:
         """The document of the contract (`run` / `identify`), ready for `json.dumps`."""
-        from commissioner.identify.document import document  # noqa: PLC0415  document reads this class
+        from commissioner.identify.document import document
 
         return document(self)
 
@@ -117,7 +121,10 @@ def identify(
     """
     if estimator not in ("pao", "lyapunov", "nls"):
         raise UsageError(
-            f"there is no estimator {estimator!r}", step="choose estimator", value=estimator, limit="pao, lyapunov or nls",
+            f"there is no estimator {estimator!r}",
+            step="choose estimator",
+            value=estimator,
+            limit="pao, lyapunov or nls",
             remedy="give one of these names",
         )
     plate = nameplate or nameplate_from(recording.metadata)
@@ -128,7 +135,9 @@ def identify(
     for stretches in tests:
         like = results[0].batch if results else None
         results.append(_identify_axis(stretches, plate, recording.sample_period_s, estimator, start, inverter, like))
-    return _summary(results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption)
+    return _summary(
+        results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption
+    )
 
 
 def _temperature(recording: StandstillRecording) -> float | None:
@@ -153,8 +162,13 @@ def _by_test(examined: Audit) -> list[list[Stretch]]:
 
 
 def _identify_axis(
-    stretches: Sequence[Stretch], plate: Nameplate, period_s: float, estimator: Estimator, guess: InverseGamma | None,
-    leg: InverterError | None, like: BatchFit | None,
+    stretches: Sequence[Stretch],
+    plate: Nameplate,
+    period_s: float,
+    estimator: Estimator,
+    guess: InverseGamma | None,
+    leg: InverterError | None,
+    like: BatchFit | None,
 ) -> AxisResult:
     box = prior(plate)
     stairs = _staircase(stretches)
@@ -170,9 +184,7 @@ def _identify_axis(
     _require_conditioned(batch)
     compensation = batch.compensation(axis_deg, span)
     law: Literal["fast", "lyapunov"] = "lyapunov" if estimator == "lyapunov" else "fast"
-    centred = [
-        replace(s, current_a=s.current_a - offset) for s, offset in zip(stretches, batch.offsets_a, strict=True)
-    ]
+    centred = [replace(s, current_a=s.current_a - offset) for s, offset in zip(stretches, batch.offsets_a, strict=True)]
     # DC levels do not excite persistently: the recursion is for tones, the batch fit takes the staircase along.
     tones = [_excited_part(s, period_s) for s in centred if s.kind != "staircase"] or centred
     seen, observer = _observe(tones, plate, box, period_s, compensation, law, batch.gamma.as_inverse_gamma())
@@ -183,11 +195,17 @@ def _identify_axis(
     chosen = at_flux if estimator == "nls" else pao
     difference = np.array(pao.as_tuple()) - np.array(at_flux.as_tuple())
     return AxisResult(
-        axis_deg=axis_deg, parameters=chosen, covariance=covariance, batch=batch, observer_parameters=pao,
+        axis_deg=axis_deg,
+        parameters=chosen,
+        covariance=covariance,
+        batch=batch,
+        observer_parameters=pao,
         disagreement_sigmas=float(np.max(np.abs(difference) / np.sqrt(np.diag(covariance)))),
         whiteness=batch.whiteness() if estimator == "nls" else whiteness(observer.residuals),
         residual_rms_a=batch.noise_a if estimator == "nls" else observer.residual_rms_a,
-        peak_rotor_flux_wb=observer.peak_rotor_flux_wb, peak_stator_flux_wb=flux, staircase=stairs,
+        peak_rotor_flux_wb=observer.peak_rotor_flux_wb,
+        peak_stator_flux_wb=flux,
+        staircase=stairs,
         energised_s=sum(s.voltage_v.size for s in stretches) * period_s,
     )
 
@@ -205,8 +223,12 @@ def _excited_part(stretch: Stretch, period_s: float) -> Stretch:
     if first == 0:
         return stretch
     return replace(
-        stretch, voltage_v=stretch.voltage_v[first:], current_a=stretch.current_a[first:],
-        cross_a=stretch.cross_a[first:], starts_at_rest=False, start_s=stretch.start_s + first * period_s,
+        stretch,
+        voltage_v=stretch.voltage_v[first:],
+        current_a=stretch.current_a[first:],
+        cross_a=stretch.cross_a[first:],
+        starts_at_rest=False,
+        start_s=stretch.start_s + first * period_s,
     )
 
 
@@ -218,12 +240,22 @@ class _Observed:
 
 
 def _observe(
-    stretches: Sequence[Stretch], plate: Nameplate, box: ParameterBox, period_s: float, compensation: Compensation,
-    law: Literal["fast", "lyapunov"], start: InverseGamma | None,
+    stretches: Sequence[Stretch],
+    plate: Nameplate,
+    box: ParameterBox,
+    period_s: float,
+    compensation: Compensation,
+    law: Literal["fast", "lyapunov"],
+    start: InverseGamma | None,
 ) -> tuple[InverseGamma, _Observed]:
     """The online observer over all stretches in turn; segments are holes of unknown length to it."""
     observer = ParallelObserver(
-        box, period_s, plate.rated_current_peak_a, law=law, start=start, compensation=compensation,
+        box,
+        period_s,
+        plate.rated_current_peak_a,
+        law=law,
+        start=start,
+        compensation=compensation,
         starts_at_rest=stretches[0].starts_at_rest,
         start_log_std=PRIOR_LOG_STD if stretches[0].starts_at_rest or start is None else UNKNOWN_STATE_LOG_STD,
         expected_voltage_v=np.concatenate([s.voltage_v for s in stretches]) if law == "lyapunov" else None,
@@ -240,7 +272,8 @@ def _observe(
     if law == "fast":
         _review_until_still(observer)
     signals = observer.predicted(None if law == "fast" else average.parameters)
-    settle = round(4.0 / -poles_per_s(observer.parameters)[0] / period_s)
+    shortest = min(s.voltage_v.size for s in stretches)
+    settle = min(round(4.0 / -poles_per_s(observer.parameters)[0] / period_s), shortest // 3)
     residuals = tuple(_settled_residuals(observer.history, [current for current, _, _ in signals], settle))
     rotor = max(float(np.max(np.abs(flux))) for _, flux, _ in signals)
     rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
@@ -260,7 +293,8 @@ def _settled_residuals(pieces: Sequence[StoredBlock], predicted: Sequence[Signal
 
 
 class _Average:
-    """The seed's result of the gradient law: the mean of its estimates over the last sixth of the run (150-180 s of 180)."""
+    """The seed's result of the gradient law: the mean of its estimates over the last sixth of the run (150-180 s of
+    180)."""
 
     def __init__(self, total: int) -> None:
         self._from = total * 5 // 6
@@ -287,8 +321,13 @@ def _review_until_still(observer: ParallelObserver) -> None:
 
 
 def _first_estimate(
-    stretches: Sequence[Stretch], plate: Nameplate, box: ParameterBox, period_s: float, guess: InverseGamma | None,
-    leg: InverterError | None, span_a: float,
+    stretches: Sequence[Stretch],
+    plate: Nameplate,
+    box: ParameterBox,
+    period_s: float,
+    guess: InverseGamma | None,
+    leg: InverterError | None,
+    span_a: float,
 ) -> InverseGamma:
     compensation = NOTHING
     if leg is not None:
@@ -298,11 +337,9 @@ def _first_estimate(
     return _observe(tones, plate, box, period_s, compensation, "fast", guess)[0]
 
 
-def _select(
-    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None
-) -> BatchFit:
-    """Greedy choice by the Bayesian criterion: whichever of delay, inverter error and saturation helps most is added, then
-    the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start."""
+def _select(segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None) -> BatchFit:
+    """Greedy choice by the Bayesian criterion: whichever of delay, inverter error and saturation helps most is added,
+    then the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start."""
     largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
     knots = tuple(f * largest for f in KNOT_FRACTIONS)
     model = ModelChoice(knots_a=knots if leg else ())
@@ -312,12 +349,14 @@ def _select(
     while True:
         m = best.model
         toggled = (
-            replace(m, extra_powers=0 if m.extra_powers else EXTRA_POWERS), replace(m, with_delay=not m.with_delay),
+            replace(m, extra_powers=0 if m.extra_powers else EXTRA_POWERS),
+            replace(m, with_delay=not m.with_delay),
             replace(m, knots_a=() if m.knots_a and not _loses_voltage(best) else knots),
         )
         trials = [
             fit_segments(segments, period_s, start, t, extended(best, t), tolerance=COARSE)
-            for t in toggled if t not in tried
+            for t in toggled
+            if t not in tried
         ]
         tried.update(toggled)
         better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
@@ -352,9 +391,9 @@ def dc_levels(voltage_v: Signal, current_a: Signal, tail: float = 0.4) -> list[D
     top = float(np.max(np.abs(voltage_v)))
     edges = np.flatnonzero(np.abs(np.diff(voltage_v)) > 1e-6 * top) + 1
     bounds = [0, *edges.tolist(), voltage_v.size]
-    longest = max(b - a for a, b in zip(bounds[:-1], bounds[1:], strict=True))
+    longest = max(b - a for a, b in itertools.pairwise(bounds))
     levels = []
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in itertools.pairwise(bounds):
         if b - a < max(0.3 * longest, 20) or abs(voltage_v[a]) < 1e-6 * top:
             continue
         part = current_a[b - int(tail * (b - a)) : b]
@@ -380,7 +419,9 @@ def _require_tones(examined: Audit, period_s: float) -> None:
     carrier = np.exp(-2j * np.pi * frequency * time) * np.hanning(time.size)
     impedance = complex(np.sum(stretch.voltage_v * carrier) / np.sum(stretch.current_a * carrier))
     raise DataRefused(
-        "one tone cannot fix four parameters", step="check the excitation", value=f"one tone of {frequency:.4g} Hz",
+        "one tone cannot fix four parameters",
+        step="check the excitation",
+        value=f"one tone of {frequency:.4g} Hz",
         limit="two tones at least, four for a check of the model",
         remedy=(
             f"only this combination can be had: R_s + R_R w^2 L_M^2/(R_R^2 + w^2 L_M^2) = {impedance.real:.5g} ohm and "
@@ -398,8 +439,10 @@ def _require_conditioned(batch: BatchFit) -> None:
         worst = int(np.argmax(np.where(np.isfinite(relative), relative, np.inf)))
         impedance = 1.0 / admittance_s(machine, np.array([1.0, 10.0]))
         raise DataRefused(
-            f"the excitation does not fix {names[worst]}", step="identify",
-            value=f"relative standard error {relative[worst]:.0%}", limit=f"{WORST_RELATIVE_STD:.0%}",
+            f"the excitation does not fix {names[worst]}",
+            step="identify",
+            value=f"relative standard error {relative[worst]:.0%}",
+            limit=f"{WORST_RELATIVE_STD:.0%}",
             remedy="excite more tones between the machine's poles, or record longer; the fit's impedance at 1 Hz is "
             f"{impedance[0]:.4g} ohm, at 10 Hz {impedance[1]:.4g} ohm",
         )
@@ -409,11 +452,15 @@ def _require_conditioned(batch: BatchFit) -> None:
 
 
 def _summary(
-    results: Sequence[AxisResult], examined: Audit, plate: Nameplate, estimator: Estimator, temperature: float | None,
+    results: Sequence[AxisResult],
+    examined: Audit,
+    plate: Nameplate,
+    estimator: Estimator,
+    temperature: float | None,
     assumption: str,
 ) -> Identification:
     rated = rated_flux(plate, float(np.mean([r.parameters.stator_resistance_ohm for r in results])))
-    flux = min(rated.stator_peak_wb, min(r.peak_stator_flux_wb for r in results))
+    flux = min(rated.stator_peak_wb, *(r.peak_stator_flux_wb for r in results))
     at_flux = [_axis_at(r, flux, estimator) for r in results]
     combined = combine(at_flux)
     first = min(results, key=lambda r: float(np.trace(r.covariance)))
@@ -427,11 +474,21 @@ def _summary(
         at_20 = (r_s * factor, math.sqrt(combined.covariance[0, 0]) * factor)
     delay = first.batch.delay
     return Identification(
-        estimator=estimator, parameters=combined.parameters, covariance=combined.covariance, holds_for_flux_wb=flux,
-        t_model=to_t_model(combined.parameters, combined.covariance, assumption), axes=tuple(results), combined=combined,
-        rated_flux=rated, inverter=first.batch.inverter(), delay_s=(delay.value, delay.std),
-        magnetizing_curve=tuple(curve), gaps=examined.gaps, lost_samples=examined.lost_samples,
-        duration_s=examined.duration_s, stator_resistance_20degc_ohm=at_20,
+        estimator=estimator,
+        parameters=combined.parameters,
+        covariance=combined.covariance,
+        holds_for_flux_wb=flux,
+        t_model=to_t_model(combined.parameters, combined.covariance, assumption),
+        axes=tuple(results),
+        combined=combined,
+        rated_flux=rated,
+        inverter=first.batch.inverter(),
+        delay_s=(delay.value, delay.std),
+        magnetizing_curve=tuple(curve),
+        gaps=examined.gaps,
+        lost_samples=examined.lost_samples,
+        duration_s=examined.duration_s,
+        stator_resistance_20degc_ohm=at_20,
         remarks=(*examined.remarks, *combined.remarks, *_remarks(results, rated, flux)),
     )
 
@@ -449,8 +506,8 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) ->
     for result in results:
         if result.disagreement_sigmas > 3.0:
             remarks.append(
-                f"axis {result.axis_deg:g} deg: observer and batch fit differ by {result.disagreement_sigmas:.1f} standard "
-                "errors: the model misses something"
+                f"axis {result.axis_deg:g} deg: observer and batch fit differ by {result.disagreement_sigmas:.1f} "
+                "standard " "errors: the model misses something"
             )
         if not result.whiteness.is_white:
             remarks.append(
@@ -459,7 +516,8 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) ->
             )
     if flux_wb < 0.7 * rated.stator_peak_wb:
         remarks.append(
-            f"the flux reached {flux_wb:.3g} Wb of rated {rated.stator_peak_wb:.3g} Wb: L_M holds there and is not extrapolated"
+            f"the flux reached {flux_wb:.3g} Wb of rated {rated.stator_peak_wb:.3g} Wb: L_M holds there and is not "
+            "extrapolated"
         )
     remarks.append("gain errors of current and DC-link sensors scale all values and are not in the standard errors")
     return remarks
@@ -470,8 +528,11 @@ def inverter_json(inverter: InverterError | None, staircase: Staircase | None) -
     if inverter is None:
         return {"identified": False}
     out: dict[str, object] = {
-        "identified": True, "leg_error_v": {"value": inverter.plateau_v, "std": inverter.std_v[-1] if inverter.std_v else None},
-        "knee_a": inverter.knee_a, "leg_current_a": list(inverter.current_a), "leg_voltage_v": list(inverter.voltage_v),
+        "identified": True,
+        "leg_error_v": {"value": inverter.plateau_v, "std": inverter.std_v[-1] if inverter.std_v else None},
+        "knee_a": inverter.knee_a,
+        "leg_current_a": list(inverter.current_a),
+        "leg_voltage_v": list(inverter.voltage_v),
     }
     if staircase is not None:
         r = staircase.stator_resistance
