@@ -67,8 +67,11 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
     for other in recordings[1:]:
         if abs(other.sample_period_s / first.sample_period_s - 1.0) > 1e-6:
             raise DataRefused(
-                f"{other.source}: sampled at another rate than {first.source}", step="join recordings",
-                value=other.sample_period_s, limit=first.sample_period_s, remedy="identify the files one by one",
+                f"{other.source}: sampled at another rate than {first.source}",
+                step="join recordings",
+                value=other.sample_period_s,
+                limit=first.sample_period_s,
+                remedy="identify the files one by one",
             )
     has_w = all(r.current_w_a is not None for r in recordings)
     time, segment, time_offset, segment_offset = [], [], 0.0, 0
@@ -78,13 +81,16 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
         time_offset = float(time[-1][-1]) + 10.0
         segment_offset = int(segment[-1].max()) + 1
     return StandstillRecording(
-        time_s=np.concatenate(time), segment=np.concatenate(segment),
+        time_s=np.concatenate(time),
+        segment=np.concatenate(segment),
         axis_deg=np.concatenate([r.axis_deg for r in recordings]),
         voltage_axis_v=np.concatenate([r.voltage_axis_v for r in recordings]),
         current_u_a=np.concatenate([r.current_u_a for r in recordings]),
         current_v_a=np.concatenate([r.current_v_a for r in recordings]),
         current_w_a=np.concatenate([r.current_w_a for r in recordings if r.current_w_a is not None]) if has_w else None,
-        dc_link_v=None, sample_period_s=first.sample_period_s, metadata=first.metadata,
+        dc_link_v=None,
+        sample_period_s=first.sample_period_s,
+        metadata=first.metadata,
         source=", ".join(r.source for r in recordings),
     )
 
@@ -108,7 +114,9 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     console.print(f"L_M holds for {flux:.3g} Wb peak stator flux ({flux / rated:.0%} of rated {rated:.3g} Wb).")
     inverter = document["inverter"]
     if inverter["identified"]:
-        console.print(f"Inverter: each leg loses {inverter['leg_error_v']['value']:.2f} V (knee {inverter['knee_a']:.2g} A).")
+        console.print(
+            f"Inverter: each leg loses {inverter['leg_error_v']['value']:.2f} V (knee {inverter['knee_a']:.2g} A)."
+        )
     white = [a["whiteness"]["is_white"] for a in document["axes"]]
     console.print(
         f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "

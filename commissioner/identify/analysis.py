@@ -507,7 +507,7 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) ->
         if result.disagreement_sigmas > 3.0:
             remarks.append(
                 f"axis {result.axis_deg:g} deg: observer and batch fit differ by {result.disagreement_sigmas:.1f} "
-                "standard " "errors: the model misses something"
+                "standard errors: the model misses something"
             )
         if not result.whiteness.is_white:
             remarks.append(

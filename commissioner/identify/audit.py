@@ -1,4 +1,5 @@
-"""Can this recording carry an answer? Cuts it into stretches, names what each is, refuses by name what cannot be used."""
+"""Can this recording carry an answer? Cuts it into stretches, names what each is, refuses by name what cannot be
+used."""
 
 from __future__ import annotations
 
@@ -48,34 +49,44 @@ class Audit:
 
 
 def audit(recording: StandstillRecording) -> Audit:
-    """The recording's stretches; DataRefused where it is too short, not finite, clipped, unevenly sampled, off its axis or
-    without excitation."""
+    """The recording's stretches; DataRefused where it is too short, not finite, clipped, unevenly sampled, off its
+    axis or without excitation."""
     _require_finite(recording)
     _require_even_steps(recording)
     stretches = _cut(recording)
     excited = [s for s in stretches if s.is_excited]
     if not excited:
         raise _refuse(
-            "no segment is excited", f"largest |voltage_axis_v| {np.max(np.abs(recording.voltage_axis_v), initial=0):.3g} V",
-            "a voltage that drives current along the axis", "record with the test voltage on, in the commanded unit (volts)",
+            "no segment is excited",
+            f"largest |voltage_axis_v| {np.max(np.abs(recording.voltage_axis_v), initial=0):.3g} V",
+            "a voltage that drives current along the axis",
+            "record with the test voltage on, in the commanded unit (volts)",
         )
     seconds = sum(s.voltage_v.size for s in excited) * recording.sample_period_s
     if seconds < SHORTEST_S:
-        raise _refuse("the recording is too short", f"{seconds:.3g} s excited", f"{SHORTEST_S} s", "record several seconds")
+        raise _refuse(
+            "the recording is too short", f"{seconds:.3g} s excited", f"{SHORTEST_S} s", "record several seconds"
+        )
     for stretch in excited:
         _require_current(stretch)
         _require_on_axis(stretch)
     _require_unclipped(recording)
     remarks = tuple(
         f"segment {s.segment} holds no excitation and was used for noise and offset only"
-        for s in stretches if not s.is_excited and s.voltage_v.size * recording.sample_period_s > SHORTEST_S
+        for s in stretches
+        if not s.is_excited and s.voltage_v.size * recording.sample_period_s > SHORTEST_S
     )
     gaps = [s.lost_before for s in stretches if s.lost_before > 0]
     return Audit(tuple(stretches), len(gaps), sum(gaps), seconds, remarks)
 
 
 NAMEPLATE_KEYS = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
+    "rated_power_w",
+    "rated_voltage_v",
+    "rated_frequency_hz",
+    "rated_current_a",
+    "rated_speed_rpm",
+    "power_factor",
     "pole_pairs",
 )
 
@@ -85,20 +96,28 @@ def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:
     for key in NAMEPLATE_KEYS:
         if not isinstance(metadata.get(key), float | int):
             raise DataRefused(
-                f"the recording's metadata lack {key}", step="read the nameplate", value=metadata.get(key),
-                limit="a number in SI units", remedy=f"add '# {key}: ...' to the file, or give --motor",
+                f"the recording's metadata lack {key}",
+                step="read the nameplate",
+                value=metadata.get(key),
+                limit="a number in SI units",
+                remedy=f"add '# {key}: ...' to the file, or give --motor",
             )
     number = {key: float(metadata[key]) for key in NAMEPLATE_KEYS}
     pole_pairs = int(number.pop("pole_pairs"))
     inertia = metadata.get("inertia_kg_m2")
     plate = Nameplate(
-        **number, pole_pairs=pole_pairs, connection=str(metadata.get("connection", "star")),
+        **number,
+        pole_pairs=pole_pairs,
+        connection=str(metadata.get("connection", "star")),
         inertia_kg_m2=float(inertia) if isinstance(inertia, float | int) else None,
     )
     for problem in check(plate):
         raise DataRefused(
-            f"the nameplate cannot be right: {problem.key}", step="read the nameplate", value=problem.value,
-            limit=problem.expected, remedy=f"correct {problem.key}, or give --motor",
+            f"the nameplate cannot be right: {problem.key}",
+            step="read the nameplate",
+            value=problem.value,
+            limit=problem.expected,
+            remedy=f"correct {problem.key}, or give --motor",
         )
     return plate
 
@@ -126,7 +145,9 @@ def _cut(recording: StandstillRecording) -> list[Stretch]:
         axes = np.unique(recording.axis_deg[segment == number])
         if axes.size > 1:
             raise _refuse(
-                f"segment {int(number)} changes its axis", f"{axes[0]:g} and {axes[1]:g} deg", "one axis per segment",
+                f"segment {int(number)} changes its axis",
+                f"{axes[0]:g} and {axes[1]:g} deg",
+                "one axis per segment",
                 "number the segments so that each has one axis",
             )
     steps = np.diff(recording.time_s)
@@ -149,9 +170,15 @@ def _stretch(recording: StandstillRecording, a: int, b: int, begins: bool, lost:
     voltage = np.ascontiguousarray(recording.voltage_axis_v[a:b])
     current = axis_current_a(*phases, axis)
     return Stretch(
-        segment=int(recording.segment[a]), axis_deg=axis, voltage_v=voltage, current_a=current,
-        cross_a=orthogonal_current_a(*phases, axis), kind=_kind(voltage, recording.voltage_axis_v),
-        starts_at_rest=begins and _is_still(current, voltage), lost_before=lost, start_s=float(recording.time_s[a]),
+        segment=int(recording.segment[a]),
+        axis_deg=axis,
+        voltage_v=voltage,
+        current_a=current,
+        cross_a=orthogonal_current_a(*phases, axis),
+        kind=_kind(voltage, recording.voltage_axis_v),
+        starts_at_rest=begins and _is_still(current, voltage),
+        lost_before=lost,
+        start_s=float(recording.time_s[a]),
     )
 
 
@@ -177,8 +204,12 @@ def _kind(voltage: Signal, everything: Signal) -> str:
 
 def _require_finite(recording: StandstillRecording) -> None:
     columns = {
-        "time_s": recording.time_s, "axis_deg": recording.axis_deg, "voltage_axis_v": recording.voltage_axis_v,
-        "current_u_a": recording.current_u_a, "current_v_a": recording.current_v_a, "current_w_a": recording.current_w_a,
+        "time_s": recording.time_s,
+        "axis_deg": recording.axis_deg,
+        "voltage_axis_v": recording.voltage_axis_v,
+        "current_u_a": recording.current_u_a,
+        "current_v_a": recording.current_v_a,
+        "current_w_a": recording.current_w_a,
     }
     for name, values in columns.items():
         if values is None:
@@ -186,8 +217,10 @@ def _require_finite(recording: StandstillRecording) -> None:
         bad = ~np.isfinite(values)
         if bad.any():
             raise _refuse(
-                f"column {name} holds values that are not numbers", f"{int(bad.sum())}, first in row {int(np.argmax(bad))}",
-                "finite numbers", "leave lost samples out as missing rows",
+                f"column {name} holds values that are not numbers",
+                f"{int(bad.sum())}, first in row {int(np.argmax(bad))}",
+                "finite numbers",
+                "leave lost samples out as missing rows",
             )
     if recording.time_s.size < 2:
         raise _refuse("the recording is too short", f"{recording.time_s.size} samples", "2 or more", "record longer")
@@ -202,8 +235,10 @@ def _require_even_steps(recording: StandstillRecording) -> None:
     if np.max(off) > 0.05:
         worst = int(np.argmax(off))
         raise _refuse(
-            "the time steps are not equal", f"{steps[worst] * recording.sample_period_s:.6g} s",
-            f"multiples of {recording.sample_period_s:.6g} s", "record at a fixed rate",
+            "the time steps are not equal",
+            f"{steps[worst] * recording.sample_period_s:.6g} s",
+            f"multiples of {recording.sample_period_s:.6g} s",
+            "record at a fixed rate",
         )
 
 
@@ -211,7 +246,9 @@ def _require_current(stretch: Stretch) -> None:
     rms = float(np.std(stretch.current_a)) + abs(float(np.mean(stretch.current_a)))
     if rms <= 0.0:
         raise _refuse(
-            f"segment {stretch.segment} carries no current", "0 A", "a current along the axis",
+            f"segment {stretch.segment} carries no current",
+            "0 A",
+            "a current along the axis",
             "check the current channels and that the drive was enabled",
         )
 
@@ -221,13 +258,14 @@ def _require_on_axis(stretch: Stretch) -> None:
     along = float(np.sqrt(np.mean(stretch.current_a**2)))
     across = float(np.sqrt(np.mean((stretch.cross_a - np.mean(stretch.cross_a)) ** 2)))
     matched = abs(float(np.mean(stretch.cross_a * stretch.current_a))) / max(along, 1e-12)
-    if stretch.kind != "staircase" and max(matched, 0.0) > LARGEST_CROSS_CURRENT * along or across > 2.0 * along:
+    if (stretch.kind != "staircase" and max(matched, 0.0) > LARGEST_CROSS_CURRENT * along) or across > 2.0 * along:
         moment = np.mean((stretch.current_a + 1j * stretch.cross_a) ** 2)
         seen = (stretch.axis_deg + math.degrees(0.5 * float(np.angle(moment)))) % 180.0
         raise _refuse(
             f"segment {stretch.segment}: the current does not flow along the named axis",
             f"axis_deg {stretch.axis_deg:g}, current along {seen:.1f} deg (modulo 180)",
-            f"at most {LARGEST_CROSS_CURRENT:.0%} of the current across the axis", "correct axis_deg, or the order of the phases",
+            f"at most {LARGEST_CROSS_CURRENT:.0%} of the current across the axis",
+            "correct axis_deg, or the order of the phases",
         )
 
 
@@ -242,8 +280,10 @@ def _require_unclipped(recording: StandstillRecording) -> None:
             piled = _piled_up(sign * values[moving])
             if piled is not None:
                 raise _refuse(
-                    f"{name} is clipped", f"{piled} samples at {sign * float(np.max(sign * values)):.4g} A",
-                    "samples inside the sensor's range", "lower the amplitude or widen the sensor's range, and record again",
+                    f"{name} is clipped",
+                    f"{piled} samples at {sign * float(np.max(sign * values)):.4g} A",
+                    "samples inside the sensor's range",
+                    "lower the amplitude or widen the sensor's range, and record again",
                 )
 
 

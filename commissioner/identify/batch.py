@@ -1,8 +1,9 @@
 """Batch nonlinear least squares over segments: shared machine, inverter and iron, each segment's own offset and state.
 
-Levenberg-Marquardt on the output error with the exact sensitivities of `output_error` (one compiled pass per iteration).
-Covariance: inverse information times the residual variance, widened where scores of stretches of the record scatter more
-than a white residual would make them (block sandwich; P. J. Huber 1967, H. White, Econometrica 48, 1980).
+Levenberg-Marquardt on the output error with the exact sensitivities of `output_error` (one compiled pass per
+iteration). Covariance: inverse information times the residual variance, widened where scores of stretches of the
+record scatter more than a white residual would make them (block sandwich; P. J. Huber 1967, H. White, Econometrica 48,
+1980).
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from commissioner.identify.compensation import Compensation
 from commissioner.identify.resistance import InverterError
 from commissioner.identify.whiteness import Whiteness, whiteness
 from commissioner.motor.circuit import Gamma, InverseGamma, Quantity
-from commissioner.motor.space_vector import phase_cosines
 from commissioner.motor.standstill import held_input
 from commissioner.records import Signal
 
@@ -35,7 +35,8 @@ CIRCUIT, DELAY, SHARED, OWN = output_error.CIRCUIT, output_error.DELAY, output_e
 
 @dataclass(frozen=True)
 class Segment:
-    """One uninterrupted stretch: voltage along the axis held over each period, current along it at the period's start."""
+    """One uninterrupted stretch: voltage along the axis held over each period, current along it at the period's
+    start."""
 
     voltage_v: Signal
     current_a: Signal
@@ -47,9 +48,9 @@ class Segment:
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """What beyond the linear circuit is fitted: `extra_powers` odd powers (3, 5, ...) of flux in the magnetizing current
-    relative to `flux_scale_wb`, the inverter's leg error at `knots_a` (the first, 0, is not among them) and the height of its
-    tail beyond the last knot, v_K + t (1 - x_K / x), a delay."""
+    """What beyond the linear circuit is fitted: `extra_powers` odd powers (3, 5, ...) of flux in the magnetizing
+    current relative to `flux_scale_wb`, the inverter's leg error at `knots_a` (the first, 0, is not among them) and
+    the height of its tail beyond the last knot, v_K + t (1 - x_K / x), a delay."""
 
     extra_powers: int = 0
     flux_scale_wb: float = 1.0
@@ -94,8 +95,8 @@ class ModelChoice:
 
 @dataclass(frozen=True)
 class BatchFit:
-    """The fit. `theta` holds (R_s, R_r, L_l, L_0, delay in s, magnetizing coefficients in A, leg voltages in V) of the Gamma
-    circuit, `covariance` theirs (zero rows where not fitted)."""
+    """The fit. `theta` holds (R_s, R_r, L_l, L_0, delay in s, magnetizing coefficients in A, leg voltages in V) of the
+    Gamma circuit, `covariance` theirs (zero rows where not fitted)."""
 
     model: ModelChoice
     theta: Matrix
@@ -197,8 +198,9 @@ def fit_segments(
     problem.bounds = (theta[:CIRCUIT] / WIDEST, theta[:CIRCUIT] * WIDEST)
     own = np.zeros((len(segments), OWN))
     present = problem.evaluate(theta, own)
-    damping, converged, iteration = 1e-4, False, 0
-    for iteration in range(1, max_iterations + 1):
+    damping, converged, iterations = 1e-4, False, 0
+    for _ in range(max_iterations):
+        iterations += 1
         step = problem.step(present, theta, damping)
         new_theta, new_own = problem.apply(theta, own, step)
         trial = problem.evaluate(new_theta, new_own)
@@ -217,7 +219,7 @@ def fit_segments(
             if problem.is_small(step, present, theta, tolerance):
                 converged = True
                 break
-    return problem.result(theta, own, present, iteration, converged)
+    return problem.result(theta, own, present, iterations, converged)
 
 
 @dataclass
@@ -244,9 +246,7 @@ class _Problem:
         self.bases = [self._basis(s.axis_deg) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
-        self.columns = [
-            np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)
-        ]
+        self.columns = [np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)]
         self.total = shared + OWN * count
 
     def _own_free(self, segment: Segment) -> NDArray[np.bool_]:
@@ -287,7 +287,11 @@ class _Problem:
         return out
 
     def _simulate(
-        self, k: int, held: tuple[Matrix, ...], theta: Matrix, own: Matrix,
+        self,
+        k: int,
+        held: tuple[Matrix, ...],
+        theta: Matrix,
+        own: Matrix,
         shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix],
     ) -> float:
         """One segment's pass; what it finds is written into `shared`. The linear machine has a kernel of its own."""
@@ -299,18 +303,55 @@ class _Problem:
             small = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
             ad, b1, _, dad, db1, _ = held
             squares = output_error.simulate_linear(
-                segment.voltage_v, segment.current_a, self.weights[k], ad, b1, dad, db1, theta, own, wanted[kept],
-                small[0], small[1], block, small[2], residual, flux,
+                segment.voltage_v,
+                segment.current_a,
+                self.weights[k],
+                ad,
+                b1,
+                dad,
+                db1,
+                theta,
+                own,
+                wanted[kept],
+                small[0],
+                small[1],
+                block,
+                small[2],
+                residual,
+                flux,
             )
             information[np.ix_(kept, kept)], score[kept], scores[:, kept] = small
             return float(squares)
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
         ad, b1, b2, dad, db1, db2 = held
-        return float(output_error.simulate(
-            segment.voltage_v, segment.current_a, self.weights[k], before, ad, b1, b2, dad, db1, db2, theta,
-            model.extra_powers, model.flux_scale_wb, self.bases[k], self.current_span_a, own,
-            theta[DELAY] / self.period_s, wanted, information, score, block, scores, residual, flux,
-        ))
+        return float(
+            output_error.simulate(
+                segment.voltage_v,
+                segment.current_a,
+                self.weights[k],
+                before,
+                ad,
+                b1,
+                b2,
+                dad,
+                db1,
+                db2,
+                theta,
+                model.extra_powers,
+                model.flux_scale_wb,
+                self.bases[k],
+                self.current_span_a,
+                own,
+                theta[DELAY] / self.period_s,
+                wanted,
+                information,
+                score,
+                block,
+                scores,
+                residual,
+                flux,
+            )
+        )
 
     def step(self, at: _Evaluation, theta: Matrix, damping: float) -> Matrix:
         free = np.flatnonzero(self.free)
@@ -356,10 +397,19 @@ class _Problem:
         covariance[np.ix_(free, free)] = white * np.outer(widen, widen)
         shared = self.model.size
         return BatchFit(
-            model=self.model, theta=theta, covariance=covariance[:shared, :shared], sum_of_squares=at.squares,
-            samples=self.samples, free_parameters=int(free.size), residuals=tuple(at.residuals),
-            stator_flux_wb=tuple(at.flux), offsets_a=tuple(map(float, own[:, 0])), iterations=iterations,
-            has_converged=converged, condition=float(np.linalg.cond(normal)), sample_period_s=self.period_s,
+            model=self.model,
+            theta=theta,
+            covariance=covariance[:shared, :shared],
+            sum_of_squares=at.squares,
+            samples=self.samples,
+            free_parameters=int(free.size),
+            residuals=tuple(at.residuals),
+            stator_flux_wb=tuple(at.flux),
+            offsets_a=tuple(map(float, own[:, 0])),
+            iterations=iterations,
+            has_converged=converged,
+            condition=float(np.linalg.cond(normal)),
+            sample_period_s=self.period_s,
             sandwich_ratio=float(np.max(ratio[:CIRCUIT])),
         )
 
@@ -380,7 +430,8 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
 
 
 def cramer_rao(machine: InverseGamma, voltage_v: Signal, sample_period_s: float, noise_a: float) -> Matrix:
-    """(4, 4): the bound on the covariance of (R_s, R_R, L_sigma, L_M) from this voltage, white noise, known start at rest."""
+    """(4, 4): the bound on the covariance of (R_s, R_R, L_sigma, L_M) from this voltage, white noise, known start at
+    rest."""
     columns = []
     for j, value in enumerate(machine.as_tuple()):
         pair = []
@@ -401,7 +452,10 @@ def start_theta(start: InverseGamma, model: ModelChoice, leg: InverterError | No
     gamma = Gamma.from_inverse_gamma(start)
     theta = np.zeros(model.size)
     theta[:CIRCUIT] = (
-        gamma.stator_resistance_ohm, gamma.rotor_resistance_ohm, gamma.leakage_inductance_h, gamma.stator_inductance_h
+        gamma.stator_resistance_ohm,
+        gamma.rotor_resistance_ohm,
+        gamma.leakage_inductance_h,
+        gamma.stator_inductance_h,
     )
     if leg is not None and model.knots_a:
         theta[SHARED + model.extra_powers :] = model.leg_coefficients(leg)
@@ -443,5 +497,3 @@ def _held(circuit: NDArray[np.complex128], period_s: float) -> tuple[NDArray[np.
     block[2, 3] = 1.0
     exponential = expm(block)
     return exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
-
-

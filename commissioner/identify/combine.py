@@ -23,7 +23,8 @@ Matrix = NDArray[np.float64]
 NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 SIGNIFICANCE = 0.01
 FLOOR = 2e-4
-"""No axis result is believed better than this, relatively, when axes are compared: what models leave out varies with them."""
+"""No axis result is believed better than this, relatively, when axes are compared: what models leave out varies with
+them."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Combined:
-    """Information-weighted mean, its covariance widened by the dispersion where that is larger, relative dispersion `(4,)`."""
+    """Information-weighted mean, its covariance widened by the dispersion where that is larger, relative dispersion
+    `(4,)`."""
 
     parameters: InverseGamma
     covariance: Matrix
@@ -106,11 +108,11 @@ def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[M
     chi_square, degrees, _, _ = _fit(axes, logs, covariances, chosen)
     while True:
         gains = []
-        for cause in _GROUPS:
+        for cause, columns in _GROUPS.items():
             if cause in chosen or (cause is Cause.HEATING and not _order_is_visible(axes)):
                 continue
             trial, _, _, _ = _fit(axes, logs, covariances, [*chosen, cause])
-            gains.append((float(chi2.sf(max(chi_square - trial, 0.0), len(_GROUPS[cause]))), cause, trial))
+            gains.append((float(chi2.sf(max(chi_square - trial, 0.0), len(columns))), cause, trial))
         if not gains or min(gains, key=lambda g: g[0])[0] > SIGNIFICANCE / len(_GROUPS):
             break
         _, cause, chi_square = min(gains, key=lambda g: g[0])
@@ -141,9 +143,9 @@ def _fit(
         right += design.T @ weight @ logs[k]
         total += float(logs[k] @ weight @ logs[k])
     part = np.ix_(columns, columns)
-    covariance = np.linalg.pinv(normal[part])
+    covariance: Matrix = np.asarray(np.linalg.pinv(normal[part]), dtype=np.float64)
     solution = covariance @ right[columns]
-    return total - float(right[columns] @ solution), 4 * len(axes) - len(columns), solution, covariance
+    return total - float(right[columns] @ solution), 4 * len(axes) - len(columns), solution, np.asarray(covariance)
 
 
 def _design(axis_deg: float, order: float) -> Matrix:
@@ -158,8 +160,13 @@ def _design(axis_deg: float, order: float) -> Matrix:
 
 
 def _finding(
-    cause: Cause, axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix], chosen: Sequence[Cause],
-    solution: Matrix, covariance: Matrix,
+    cause: Cause,
+    axes: Sequence[AxisEstimate],
+    logs: Matrix,
+    covariances: Sequence[Matrix],
+    chosen: Sequence[Cause],
+    solution: Matrix,
+    covariance: Matrix,
 ) -> Finding:
     offset = 4 + sum(len(_GROUPS[c]) for c in chosen[: chosen.index(cause)])
     mine = slice(offset, offset + len(_GROUPS[cause]))
@@ -204,7 +211,9 @@ TEMPERATURE_K = 25.0
 RESISTANCE_PER_K = 0.0039
 
 
-def compare(before: Combined, after: Combined, temperature_is_known: bool = False, limit_sigmas: float = 3.5) -> Comparison:
+def compare(
+    before: Combined, after: Combined, temperature_is_known: bool = False, limit_sigmas: float = 3.5
+) -> Comparison:
     """Whether two results belong to one motor. Resistances may move together with an unknown temperature; a motor of
     which both inductances, or three parameters, have moved by more than a tenth is another one."""
     old, new = np.log(before.parameters.as_tuple()), np.log(after.parameters.as_tuple())
@@ -216,15 +225,18 @@ def compare(before: Combined, after: Combined, temperature_is_known: bool = Fals
         covariance = covariance + np.outer(heat, heat) + np.diag([0.0, (0.3 * heat[1]) ** 2, 0.0, 0.0])
     difference = new - old
     sigmas = np.abs(difference) / np.sqrt(np.diag(covariance))
-    changes = tuple(
-        Change(NAMES[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas)
-    )
+    changes = tuple(Change(NAMES[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas))
     far = (np.abs(difference) > 0.1) & (sigmas > limit_sigmas)
     if (far[2] and far[3]) or far.sum() >= 3:
         return Comparison(Identity.OTHER, changes, limit_sigmas, _sentence(changes, limit_sigmas))
     if np.any(sigmas > limit_sigmas):
         return Comparison(Identity.CHANGED, changes, limit_sigmas, _sentence(changes, limit_sigmas))
-    return Comparison(Identity.SAME, changes, limit_sigmas, f"largest difference {changes[0].sigmas:.1f} sigma, {changes[0].parameter}")
+    return Comparison(
+        Identity.SAME,
+        changes,
+        limit_sigmas,
+        f"largest difference {changes[0].sigmas:.1f} sigma, {changes[0].parameter}",
+    )
 
 
 def _sentence(changes: Sequence[Change], limit: float) -> str:

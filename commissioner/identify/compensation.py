@@ -1,4 +1,5 @@
-"""What the observers take off before they see a linear machine: inverter voltage error, extra magnetizing current, delay."""
+"""What the observers take off before they see a linear machine: inverter voltage error, extra magnetizing current,
+delay."""
 
 from __future__ import annotations
 

@@ -39,8 +39,12 @@ def settled(
         if s > allowed:
             return Settling(False, _four(drift), _four(std), f"{name}: standard error {s:.2%}, allowed {allowed:.2%}")
         if moved > max(3.0 * s, allowed / 3.0):
-            return Settling(False, _four(drift), _four(std), f"{name}: moved {moved:.2%} in {window_s:g} s, error {s:.2%}")
-    return Settling(True, _four(drift), _four(std), "all four parameters within their allowed standard errors and at rest")
+            return Settling(
+                False, _four(drift), _four(std), f"{name}: moved {moved:.2%} in {window_s:g} s, error {s:.2%}"
+            )
+    return Settling(
+        True, _four(drift), _four(std), "all four parameters within their allowed standard errors and at rest"
+    )
 
 
 def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:

@@ -33,12 +33,18 @@ def document(result: Identification) -> dict[str, object]:
         "dispersion": dict(zip(_NAMES, result.combined.relative_dispersion, strict=True)),
         "findings": [
             {
-                "cause": f.cause.name.lower(), "sentence": f.cause.value, "relative_size": f.relative_size,
-                "relative_std": f.relative_std, "probability_by_chance": f.probability_by_chance,
+                "cause": f.cause.name.lower(),
+                "sentence": f.cause.value,
+                "relative_size": f.relative_size,
+                "relative_std": f.relative_std,
+                "probability_by_chance": f.probability_by_chance,
             }
             for f in result.combined.findings
         ],
-        "rated_flux_wb": {"stator_rms": result.rated_flux.stator_rms_wb, "stator_peak": result.rated_flux.stator_peak_wb},
+        "rated_flux_wb": {
+            "stator_rms": result.rated_flux.stator_rms_wb,
+            "stator_peak": result.rated_flux.stator_peak_wb,
+        },
         "inverter": dict(inverter_json(result.inverter, result.axes[0].staircase)),
         "delay_s": {"value": result.delay_s[0], "std": result.delay_s[1]},
         "magnetizing_curve": [
@@ -56,7 +62,11 @@ def document(result: Identification) -> dict[str, object]:
 
 _NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 _T_NAMES = (
-    "stator_resistance_ohm", "rotor_resistance_ohm", "stator_leakage_h", "rotor_leakage_h", "magnetizing_inductance_h",
+    "stator_resistance_ohm",
+    "rotor_resistance_ohm",
+    "stator_leakage_h",
+    "rotor_leakage_h",
+    "magnetizing_inductance_h",
 )
 
 
@@ -82,7 +92,11 @@ def _axis(axis: AxisResult) -> dict[str, object]:
         "parameters": parameters_json(axis.parameters, np.asarray(axis.covariance)),
         "batch_parameters": parameters_json(*axis.batch.inverse_gamma_at(axis.peak_stator_flux_wb)),
         "disagreement_sigmas": axis.disagreement_sigmas,
-        "whiteness": {"statistic": axis.whiteness.statistic, "limit": axis.whiteness.limit, "is_white": axis.whiteness.is_white},
+        "whiteness": {
+            "statistic": axis.whiteness.statistic,
+            "limit": axis.whiteness.limit,
+            "is_white": axis.whiteness.is_white,
+        },
         "peak_rotor_flux_wb": axis.peak_rotor_flux_wb,
         "peak_stator_flux_wb": axis.peak_stator_flux_wb,
         "residual_rms_a": axis.residual_rms_a,

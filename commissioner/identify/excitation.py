@@ -82,10 +82,15 @@ class DesignedExcitation:
         return 4.0 * self.seconds
 
 
-def first_guess(nameplate: Nameplate, stator_resistance_ohm: float | None, limits: ExcitationLimits) -> DesignedExcitation:
-    """An excitation from the plate (and the DC resistance, if measured), for a drive that starts it at a small scale."""
+def first_guess(
+    nameplate: Nameplate, stator_resistance_ohm: float | None, limits: ExcitationLimits
+) -> DesignedExcitation:
+    """An excitation from the plate (and the DC resistance, if measured), for a drive that starts it at a small
+    scale."""
     typical = prior(nameplate).typical
-    machine = typical if stator_resistance_ohm is None else replace(typical, stator_resistance_ohm=stator_resistance_ohm)
+    machine = (
+        typical if stator_resistance_ohm is None else replace(typical, stator_resistance_ohm=stator_resistance_ohm)
+    )
     return design(nameplate, machine, limits, 2e-4)
 
 
@@ -106,14 +111,18 @@ def design(
     time_s = seconds or DEFAULT_SECONDS * max(1.0, estimate.rotor_time_constant_s / 0.5)
     frequencies, shares = _minimax(estimate, limits, time_s, sample_period_s)
     grid_hz = 10.0 ** math.floor(math.log10(min(frequencies) / 3.0))
-    frequencies = separated(frequencies, grid_hz)
+    frequencies = np.array(separated(frequencies.tolist(), grid_hz))
     phases = _schroeder_phases(shares)
     amplitudes = _scaled(estimate, frequencies, shares, limits)
     information = _information(estimate, frequencies, amplitudes) * time_s / (2.0 * sample_period_s * limits.noise_a**2)
     relative = np.sqrt(np.diag(np.linalg.inv(information)))
-    commanded = amplitudes * np.abs(1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a))
+    commanded = amplitudes * np.abs(
+        1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a)
+    )
     top = min(1.0, limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
-    tones = tuple(Tone(float(a * top), float(f), float(p)) for a, f, p in zip(commanded, frequencies, phases, strict=True))
+    tones = tuple(
+        Tone(float(a * top), float(f), float(p)) for a, f, p in zip(commanded, frequencies, phases, strict=True)
+    )
     excitation = Excitation(tones, dc_bias_v, time_s)
     peak_flux, peak_current = predicted_peaks(estimate, replace_tones(excitation, amplitudes), sample_period_s)
     r = [float(v) for v in relative]
@@ -128,12 +137,12 @@ def replace_tones(excitation: Excitation, amplitudes: Sequence[float] | NDArray[
 
 def predicted_peaks(machine: InverseGamma, excitation: Excitation, period_s: float) -> tuple[float, float]:
     """(stator flux, current) peaks of the linear machine under the full excitation, from rest, no inverter error."""
-    from scipy.signal import lfilter  # noqa: PLC0415
+    from scipy.signal import lfilter
 
     time_s = np.arange(int(excitation.duration_s / period_s)) * period_s
     matrix, gain = held_input(machine, period_s)
     a = [1.0, -float(np.trace(matrix)), float(np.linalg.det(matrix))]
-    voltage = excitation.voltage_v(time_s)
+    voltage = excitation.voltage_v(np.asarray(time_s, dtype=np.float64))
     current = lfilter([0.0, gain[0], matrix[0, 1] * gain[1] - matrix[1, 1] * gain[0]], a, voltage)
     rotor = lfilter([0.0, gain[1], matrix[1, 0] * gain[0] - matrix[0, 0] * gain[1]], a, voltage)
     stator = rotor + machine.leakage_inductance_h * current
@@ -167,7 +176,8 @@ def _misses(candidate: int, others: Sequence[int]) -> bool:
 def _minimax(
     machine: InverseGamma, limits: ExcitationLimits, seconds: float, period_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(frequencies, amplitude shares) that minimise the worst relative standard error, by simplex search in logarithms."""
+    """(frequencies, amplitude shares) that minimise the worst relative standard error, by simplex search in
+    logarithms."""
     slow, fast = (-p / (2.0 * math.pi) for p in poles_per_s(machine))
     lowest = max(3.0 / seconds, 0.15 * slow)
     highest = min(0.05 / period_s, 3.0 * fast)  # above, skin effect and timing say more than the machine
@@ -183,7 +193,9 @@ def _minimax(
             errors = np.diag(np.linalg.inv(information + 1e-12 * np.trace(information) * np.eye(4)))
         except np.linalg.LinAlgError:
             return math.inf
-        crowding = sum(max(0.0, 0.4 - abs(math.log(a / b))) for a, b in zip(np.sort(f)[1:], np.sort(f)[:-1], strict=True))
+        crowding = sum(
+            max(0.0, 0.4 - abs(math.log(a / b))) for a, b in zip(np.sort(f)[1:], np.sort(f)[:-1], strict=True)
+        )
         return float(math.log(np.max(errors)) + 5.0 * crowding)
 
     found = minimize(worst, start, method="Nelder-Mead", options={"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}).x
@@ -209,7 +221,10 @@ def _gains(machine: InverseGamma, f: Sequence[float] | NDArray[np.float64]) -> t
 
 
 def _scaled(
-    machine: InverseGamma, f: Sequence[float] | NDArray[np.float64], shares: NDArray[np.float64], limits: ExcitationLimits
+    machine: InverseGamma,
+    f: Sequence[float] | NDArray[np.float64],
+    shares: NDArray[np.float64],
+    limits: ExcitationLimits,
 ) -> NDArray[np.float64]:
     """Voltages that use each tone's share of whichever limit it presses most, scaled so that no sum of peaks passes."""
     current, flux = _gains(machine, f)
@@ -223,7 +238,9 @@ def _scaled(
     return np.asarray(amplitudes / use)
 
 
-def _information(machine: InverseGamma, f: Sequence[float] | NDArray[np.float64], amplitudes: Signal) -> NDArray[np.float64]:
+def _information(
+    machine: InverseGamma, f: Sequence[float] | NDArray[np.float64], amplitudes: Signal
+) -> NDArray[np.float64]:
     """Fisher information of the logarithms of the parameters per unit of 2 sigma^2 / N, (4, 4).
 
     An unknown delay between voltage and current is carried along and eliminated (Schur complement): two tones could fix
@@ -246,14 +263,17 @@ def _information(machine: InverseGamma, f: Sequence[float] | NDArray[np.float64]
 
 
 def _schroeder_phases(shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Phases that spread the peaks (M. R. Schroeder, IEEE Trans. Inf. Theory 16, 1970), all starting the flux near zero."""
+    """Phases that spread the peaks (M. R. Schroeder, IEEE Trans. Inf. Theory 16, 1970), all starting the flux near
+    zero."""
     power = shares**2 / np.sum(shares**2)
     n = power.size
-    return np.array([-2.0 * math.pi * float(np.sum((k - np.arange(k)) * power[:k])) for k in range(n)]) % (2.0 * math.pi)
+    return np.array([-2.0 * math.pi * float(np.sum((k - np.arange(k)) * power[:k])) for k in range(n)]) % (
+        2.0 * math.pi
+    )
 
 
 def _lost_resistance(
-    machine: InverseGamma, frequencies: Sequence[float], amplitudes: Signal, inverter: InverterError, current_a: float
+    machine: InverseGamma, frequencies: Signal, amplitudes: Signal, inverter: InverterError, current_a: float
 ) -> NDArray[np.complex128]:
     """R_eq Y per tone: what the inverter takes, seen as a resistance in series.
 

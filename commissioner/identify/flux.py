@@ -3,10 +3,10 @@
 What saturates is the stator flux, so that is what is limited; the rotor flux is reported beside it. Estimates: (a) the
 observer's; (b) model-free, the integral of u - R_s i - inverter error with drift removed by a second-order high-pass a
 decade below the lowest tone. The excitation is known in advance: (c) both are carried forward over link latency plus
-reaction time. Amplitude: a tone of amplitude A cannot make more flux than A / omega (1 - R_s Y is at most 1 for a passive
-machine), so a first scale is safe for any motor; from there it is raised in steps of at most `MAX_RAISE`, to what the
-estimated machine (its standard errors taken threefold to the bad side) keeps within `TARGET` of the limit, as long as
-(a) and (b) agree.
+reaction time. Amplitude: a tone of amplitude A cannot make more flux than A / omega (1 - R_s Y is at most 1 for a
+passive machine), so a first scale is safe for any motor; from there it is raised in steps of at most `MAX_RAISE`, to
+what the estimated machine (its standard errors taken threefold to the bad side) keeps within `TARGET` of the limit, as
+long as (a) and (b) agree.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class FluxReading:
 
 @dataclass
 class FluxGuard:
-    """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking effect
-    (link both ways); `reaction_s` what the drive's amplitude ramp takes."""
+    """One per energised stretch, starting at rest. `latency_s` is from sample to the command that answers it taking
+    effect (link both ways); `reaction_s` what the drive's amplitude ramp takes."""
 
     limit_wb: float
     latency_s: float
@@ -113,9 +113,7 @@ class FluxGuard:
             self._scale_since_s = time_s
         self._last_scale = present_scale
         permitted = self._permit(estimate, present_scale, time_s, current_a)
-        advice, permitted = self._advise(
-            fraction, min(observer_wb, model_free_wb), present_scale, permitted, time_s
-        )
+        advice, permitted = self._advise(fraction, min(observer_wb, model_free_wb), present_scale, permitted, time_s)
         rotor_wb = float(np.max(np.abs(estimate.rotor_flux_wb)))
         return FluxReading(observer_wb, model_free_wb, predicted_wb, rotor_wb, fraction, advice, permitted)
 
@@ -131,9 +129,11 @@ class FluxGuard:
 
     def _integrate(self, voltage_v: Signal, current_a: Signal) -> Signal:
         """psi' = u - R_s i - F(i) - 2 zeta w psi - w^2 integral(psi); mean current over the period by trapezoid."""
-        from scipy.signal import lfilter  # noqa: PLC0415
+        from scipy.signal import lfilter
 
-        following = np.append(current_a[1:], 2.0 * current_a[-1] - current_a[-2] if current_a.size > 1 else current_a[-1])
+        following = np.append(
+            current_a[1:], 2.0 * current_a[-1] - current_a[-2] if current_a.size > 1 else current_a[-1]
+        )
         mean = 0.5 * (current_a + following)
         emf = voltage_v - self.stator_resistance_ohm * mean - self.inverter.on_axis(mean, self.axis_deg)
         corner = 2.0 * math.pi * 0.08 * self._lowest_hz * self.sample_period_s
@@ -150,7 +150,7 @@ class FluxGuard:
         stride = max(1, steps // 200)
         period = self.sample_period_s * stride
         future = time_s + (np.arange(steps // stride + 1) + 0.5) * period
-        voltage = self.excitation.voltage_v(future, scale)
+        voltage = self.excitation.voltage_v(np.asarray(future, dtype=np.float64), scale)
         matrix, gain = held_input(estimate.parameters, period)
         current, rotor = float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1])
         leakage = estimate.parameters.leakage_inductance_h
@@ -200,7 +200,7 @@ class FluxGuard:
             is_quiet = max(r[2] for r in self._recent) < QUIET * self.limit_wb
             self._granted = max(safe, min(1.0, (SMALL_RAISE if is_quiet else 1.0) * scale))
             return self._granted
-        r_s, r_r, l_s, l_m = estimate.parameters.as_tuple()
+        r_s, _r_r, _l_s, l_m = estimate.parameters.as_tuple()
         s = estimate.std
         worst = replace(
             estimate.parameters,
@@ -230,8 +230,8 @@ class FluxGuard:
     ) -> tuple[FluxAdvice, float]:
         """Back off on the larger of the estimates; abort only where both say that a back-off in effect did not help.
 
-        A back-off is given time to reach the flux before the next one, and never asks for less than the scale with which
-        no motor can pass the limit.
+        A back-off is given time to reach the flux before the next one, and never asks for less than the scale with
+        which no motor can pass the limit.
         """
         permitted = min(permitted, self._ceiling)
         if fraction <= BACK_OFF_ABOVE:

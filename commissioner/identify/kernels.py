@@ -33,7 +33,8 @@ ABSORBING = 18  # 1 while the unknown initial state is still being estimated
 REJECTED, COUNT, SQUARES = 19, 20, 21
 STATE_SIZE = 38
 
-# Initial state first: dropping it then leaves the factor of the marginal covariance. Then the sensor's offset, then theta.
+# Initial state first: dropping it then leaves the factor of the marginal covariance. Then the sensor's offset, then
+# theta.
 OFFSET, THETA, PARAMETERS = 2, 3, 7
 
 FAST, LYAPUNOV, FROZEN = 0, 1, 2
@@ -87,7 +88,7 @@ def lookup(table: Array, span: float, x: float) -> float:
     """Odd function tabulated at 0 ... span; constant beyond."""
     a = abs(x) * (table.size - 1) / span
     if a >= table.size - 1:
-        value = table[-1]
+        value = float(table[-1])
     else:
         k = int(a)
         value = table[k] + (a - k) * (table[k + 1] - table[k])
@@ -129,16 +130,35 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
 
 @njit(cache=True)
 def advance(
-    u: Array, y: Array, f: Array, period: float, law: int, noise_memory: float, dead_zone: float, noise_floor: float,
-    delay: float, lost_v: Array, lost_span: float, extra_a: Array, extra_span: float,
-    state: Array, theta_in: Array, upper: Array, diagonal: Array, gamma: Array, machine: Array,
-    current: Array, rotor_flux: Array, stator_flux: Array,
+    u: Array,
+    y: Array,
+    f: Array,
+    period: float,
+    law: int,
+    noise_memory: float,
+    dead_zone: float,
+    noise_floor: float,
+    delay: float,
+    lost_v: Array,
+    lost_span: float,
+    extra_a: Array,
+    extra_span: float,
+    state: Array,
+    theta_in: Array,
+    upper: Array,
+    diagonal: Array,
+    gamma: Array,
+    machine: Array,
+    current: Array,
+    rotor_flux: Array,
+    stator_flux: Array,
 ) -> None:
     """Run the observer over one block of held voltages u and sampled currents y, `(n,)` each, updating all state.
 
-    `theta_in` (5,) is theta and the current offset. `upper` (7, 7) and `diagonal` (7,) factor the covariance (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov
-    law. `lost_v` tabulates the inverter's voltage error along the axis over current 0 ... lost_span, `extra_a` the
-    magnetizing current beyond the linear one over stator flux 0 ... extra_span; size 1 = none.
+    `theta_in` (5,) is theta and the current offset. `upper` (7, 7) and `diagonal` (7,) factor the covariance
+    (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov law. `lost_v` tabulates the inverter's voltage error
+    along the axis over current 0 ... lost_span, `extra_a` the magnetizing current beyond the linear one over stator
+    flux 0 ... extra_span; size 1 = none.
     """
     f1, f2 = f[0], f[1]
     g1, g2 = 1.0 - f1, 1.0 - f2

@@ -1,11 +1,12 @@
 """The parallel adaptive observer: sample by sample from held voltages and sampled currents to the four parameters.
 
-Two laws on the same observer (equations: `kernels`). `fast` is the recursive prediction-error method: least-squares gain
-with the exact sensitivity, in UD form, no forgetting. What forgetting is usually needed for - a start far from the truth -
-is done by (a) weighting each sample with the present residual's spectral density, so that data seen with a wrong model
-weigh little, and (b) going over the stored data again from the present estimate whenever their number has doubled, until
-`memory_s`; from then on the recursion runs alone in constant memory. `lyapunov` is the gradient law of Castaldi & Tilli
-2005 (h = 0, k = 1) with a constant gain matrix, dead zone and the SPR condition checked over the prior box.
+Two laws on the same observer (equations: `kernels`). `fast` is the recursive prediction-error method: least-squares
+gain with the exact sensitivity, in UD form, no forgetting. What forgetting is usually needed for - a start far from
+the truth - is done by (a) weighting each sample with the present residual's spectral density, so that data seen with a
+wrong model weigh little, and (b) going over the stored data again from the present estimate whenever their number has
+doubled, until `memory_s`; from then on the recursion runs alone in constant memory. `lyapunov` is the gradient law of
+Castaldi & Tilli 2005 (h = 0, k = 1) with a constant gain matrix, dead zone and the SPR condition checked over the
+prior box.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ class ParallelObserver:
 
     `prior` bounds the machine (from the nameplate), `current_scale_a` its currents (rated peak). `starts_at_rest` says
     that current and flux are zero at the first sample; otherwise, and after every gap, the unknown state is estimated
-    along with the parameters, which needs parameters known to some per cent (`start`, `start_log_std`). Raises UsageError where the Lyapunov law has no positive-real margin over the prior.
+    along with the parameters, which needs parameters known to some per cent (`start`, `start_log_std`). Raises
+    UsageError where the Lyapunov law has no positive-real margin over the prior.
     """
 
     prior: ParameterBox
@@ -160,8 +162,11 @@ class ParallelObserver:
             due = int(self._next_review) - self._samples
             cut = min(total, done + due) if self._remembers and due > 0 else total
             part = StoredBlock(
-                piece.voltage_v[done:cut], piece.current_a[done:cut], piece.restarts and done == 0,
-                piece.begins_at_rest and done == 0, piece.open_loop_v if done == 0 else None,
+                piece.voltage_v[done:cut],
+                piece.current_a[done:cut],
+                piece.restarts and done == 0,
+                piece.begins_at_rest and done == 0,
+                piece.open_loop_v if done == 0 else None,
             )
             signals.append(self._run(self._shell, part))
             squares += float(self._shell.state[kernels.SQUARES])
@@ -236,11 +241,26 @@ class ParallelObserver:
         signals = tuple(np.empty_like(voltage_v) for _ in range(3))
         compensation = self.compensation
         kernels.advance(
-            np.ascontiguousarray(voltage_v, dtype=np.float64), current_a, self._filter, self.sample_period_s, law,
-            NOISE_MEMORY_S / self.sample_period_s, self.dead_zone_a, (1e-9 * self.current_scale_a) ** 2,
-            compensation.delay_s / self.sample_period_s, compensation.lost_v, compensation.lost_span_a,
-            compensation.extra_a, compensation.extra_span_wb,
-            shell.state, shell.theta, shell.upper, shell.diagonal, self._gamma, shell.machine, *signals,
+            np.ascontiguousarray(voltage_v, dtype=np.float64),
+            current_a,
+            self._filter,
+            self.sample_period_s,
+            law,
+            NOISE_MEMORY_S / self.sample_period_s,
+            self.dead_zone_a,
+            (1e-9 * self.current_scale_a) ** 2,
+            compensation.delay_s / self.sample_period_s,
+            compensation.lost_v,
+            compensation.lost_span_a,
+            compensation.extra_a,
+            compensation.extra_span_wb,
+            shell.state,
+            shell.theta,
+            shell.upper,
+            shell.diagonal,
+            self._gamma,
+            shell.machine,
+            *signals,
         )
         return signals[0], signals[1], signals[2]
 
@@ -259,7 +279,9 @@ class ParallelObserver:
         """(4, 4) of (R_s, R_R, L_sigma, L_M); for the Lyapunov law, which has none, zeros."""
         if self.law != "fast":
             return np.zeros((4, 4))
-        back = np.linalg.inv(_jacobian(InverseGamma(*map(float, self._shell.machine)), self._filter, self.sample_period_s))
+        back = np.linalg.inv(
+            _jacobian(InverseGamma(*map(float, self._shell.machine)), self._filter, self.sample_period_s)
+        )
         upper, diagonal = self._shell.upper[kernels.THETA :, kernels.THETA :], self._shell.diagonal[kernels.THETA :]
         root = back @ upper * np.sqrt(diagonal)
         return np.asarray(root @ root.T)
@@ -284,7 +306,8 @@ class ParallelObserver:
         return _Shell(state, np.append(theta, 0.0), upper, diagonal, np.array(machine.as_tuple()))
 
     def _gain_matrix(self, voltage_v: Signal) -> Matrix:
-        """Gamma = (T / time constant) x (regressor power of the typical machine)^-1: the same speed for every machine."""
+        """Gamma = (T / time constant) x (regressor power of the typical machine)^-1: the same speed for every
+        machine."""
         w = _regressor(self.prior.typical, self._filter, self.sample_period_s, voltage_v)
         power = w.T @ w / max(w.shape[0], 1)
         power += 1e-6 * np.trace(power) * np.eye(4) + 1e-30 * np.eye(4)
@@ -299,7 +322,8 @@ def filter_poles(prior: ParameterBox, period_s: float) -> Matrix:
 
 def positive_real_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> float:
     """The smallest Re(Lambda/A) over |z| = 1 and the machines of the box's corners and middles, with Lambda/A = 1 at
-    z = infinity. The gradient law converges where it is positive (observer error passive), the least-squares law above 1/2."""
+    z = infinity. The gradient law converges where it is positive (observer error passive), the least-squares law above
+    1/2."""
     omega = np.concatenate([[0.0], np.geomspace(1e-3, math.pi / period_s, 400)])
     z = np.exp(1j * omega * period_s)
     top = (z - filter_z[0]) * (z - filter_z[1])
@@ -317,7 +341,9 @@ def _require_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> N
     if not margin > 0.0:
         raise UsageError(
             "the Lyapunov law has no positive-real margin over the machines this nameplate allows",
-            step="choose observer gains", value=f"margin {margin:.3g}", limit="above 0",
+            step="choose observer gains",
+            value=f"margin {margin:.3g}",
+            limit="above 0",
             remedy="use the fast law, or correct the nameplate: rated slip and current set the box",
         )
 
@@ -328,10 +354,14 @@ def to_theta(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix
     f1, f2 = filter_z
     g1, g2 = 1.0 - f1, 1.0 - f2
     spread = f1 - f2
-    return np.array([
-        -(f1 * f1 + t.a1 * f1 + t.a0) / (g1 * spread), (f2 * f2 + t.a1 * f2 + t.a0) / (g2 * spread),
-        (t.b1 * f1 + t.b0) / (g1 * spread), -(t.b1 * f2 + t.b0) / (g2 * spread),
-    ])
+    return np.array(
+        [
+            -(f1 * f1 + t.a1 * f1 + t.a0) / (g1 * spread),
+            (f2 * f2 + t.a1 * f2 + t.a0) / (g2 * spread),
+            (t.b1 * f1 + t.b0) / (g1 * spread),
+            -(t.b1 * f2 + t.b0) / (g2 * spread),
+        ]
+    )
 
 
 def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
@@ -366,7 +396,7 @@ def _prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) ->
 
 def _regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage_v: Signal) -> Matrix:
     """w = (zeta_y, zeta_u) of the machine under the voltage, `(n, 4)`."""
-    from scipy.signal import lfilter  # noqa: PLC0415  the only use; keeps the import of the observer light
+    from scipy.signal import lfilter
 
     t = to_pulse_transfer(machine, period_s)
     current = lfilter([0.0, t.b1, t.b0], [1.0, t.a1, t.a0], voltage_v)

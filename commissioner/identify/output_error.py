@@ -9,8 +9,8 @@ Gamma circuit at standstill, everything nonlinear in it taken as extra voltage o
 g(psi) is the magnetizing current beyond psi / L_0, F(i) the inverter's voltage error along the axis, both linear in
 their coefficients. Linear part exact for held u and for n linear over the period (first-order hold); the steep F is
 solved implicitly at the end of each period (A-stable), so that currents caught at zero do not chatter. Sensitivities
-differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m, F_1..F_k, then the segment's
-own: offset, psi_s(0), psi_R(0).
+differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m, F_1..F_k, then the
+segment's own: offset, psi_s(0), psi_R(0).
 """
 
 from __future__ import annotations
@@ -29,18 +29,37 @@ OWN = 3
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate(
-    u: Array, y: Array, weight: Array, u_before: float,
-    ad: Array, b1: Array, b2: Array, dad: Array, db1: Array, db2: Array,
-    theta: Array, extra_powers: int, flux_scale: float, basis: Array, current_span: float,
-    own: Array, delay: float, wanted: Array,
-    information: Array, score: Array, block: int, block_scores: Array, residual: Array, flux: Array,
+    u: Array,
+    y: Array,
+    weight: Array,
+    u_before: float,
+    ad: Array,
+    b1: Array,
+    b2: Array,
+    dad: Array,
+    db1: Array,
+    db2: Array,
+    theta: Array,
+    extra_powers: int,
+    flux_scale: float,
+    basis: Array,
+    current_span: float,
+    own: Array,
+    delay: float,
+    wanted: Array,
+    information: Array,
+    score: Array,
+    block: int,
+    block_scores: Array,
+    residual: Array,
+    flux: Array,
 ) -> float:
     """Residuals y - i into `residual`, stator flux into `flux`, J^T W J and J^T W e added to `information`, `score`.
 
-    `ad` (2, 2), `b1`, `b2` (2,): held-input and ramp response; `dad` (4, 2, 2), `db1`, `db2` (4, 2) their derivatives by
-    the circuit's four. `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span. `wanted` (p,) is 1
-    where a sensitivity is to be carried. `block_scores` (blocks, p) collects J^T W e by stretches of `block` samples.
-    `weight` is 0 for samples that were lost. Returns sum W e^2.
+    `ad` (2, 2), `b1`, `b2` (2,): held-input and ramp response; `dad` (4, 2, 2), `db1`, `db2` (4, 2) their derivatives
+    by the circuit's four. `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span. `wanted`
+    (p,) is 1 where a sensitivity is to be carried. `block_scores` (blocks, p) collects J^T W e by stretches of `block`
+    samples. `weight` is 0 for samples that were lost. Returns sum W e^2.
     """
     p = wanted.size
     k_f = basis.shape[1]
@@ -121,13 +140,11 @@ def simulate(
                 s_cell = (lost[cell + 1] - lower) * per_a
                 i_abs = (size - b_live * (lower - s_cell * cell / per_a)) / (1.0 + b_live * s_cell)
                 new = int(i_abs * per_a) if i_abs > 0.0 else 0
-                if new > rows - 2:
-                    new = rows - 2
+                new = min(new, rows - 2)
                 if new == cell:
                     break
                 cell = new
-            if i_abs < 0.0:
-                i_abs = 0.0
+            i_abs = max(i_abs, 0.0)
             fraction = i_abs * per_a - cell
             if fraction > 1.0 and cell == rows - 2:
                 fraction, slope_f = 1.0, 0.0
@@ -200,8 +217,22 @@ LINEAR = 7  # four of the circuit, offset, psi_s(0), psi_R(0)
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate_linear(
-    u: Array, y: Array, weight: Array, ad: Array, b1: Array, dad: Array, db1: Array, theta: Array, own: Array,
-    wanted: Array, information: Array, score: Array, block: int, block_scores: Array, residual: Array, flux: Array,
+    u: Array,
+    y: Array,
+    weight: Array,
+    ad: Array,
+    b1: Array,
+    dad: Array,
+    db1: Array,
+    theta: Array,
+    own: Array,
+    wanted: Array,
+    information: Array,
+    score: Array,
+    block: int,
+    block_scores: Array,
+    residual: Array,
+    flux: Array,
 ) -> float:
     """`simulate` for ideal inverter, unsaturated iron and no delay: the same results in a tenth of the time.
 

@@ -138,23 +138,27 @@ KNEE_POINTS = np.concatenate([[0.0], np.geomspace(0.05, 200.0, 40)])
 """Where a fitted knee shape is tabulated, in knee currents."""
 SHAPE_DOUBT = 0.01
 TAILS = (1.0, 1.5, 2.0, 4.0)
-"""Exponents n of the knee shapes tried, x / (1 + x^n)^(1/n): from a hyperbola, whose tail is long, to almost a corner."""
+"""Exponents n of the knee shapes tried, x / (1 + x^n)^(1/n): from a hyperbola, whose tail is long, to almost a
+corner."""
 
 
 def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
-    """Least squares of u = R_s i + F(i - offset) over the levels, leg error f(x) = V s(x / knee), for several knee shapes.
+    """Least squares of u = R_s i + F(i - offset) over the levels, leg error f(x) = V s(x / knee), for several knee
+    shapes.
 
-    Shapes weigh with how well they fit; what they disagree about is part of the standard errors. Fewer than three levels
-    with current, or fewer than two of one sign, cannot separate resistance from lost voltage: DataRefused.
+    Shapes weigh with how well they fit; what they disagree about is part of the standard errors. Fewer than three
+    levels with current, or fewer than two of one sign, cannot separate resistance from lost voltage: DataRefused.
     """
     largest = max((abs(level.current_a) for level in levels), default=0.0)
     carrying = [level for level in levels if abs(level.current_a) > 0.1 * largest]
     positive = sum(level.current_a > 0 for level in carrying)
     if largest <= 0.0 or len(carrying) < 3 or max(positive, len(carrying) - positive) < 2:
         raise DataRefused(
-            "the DC staircase has too few levels that carry current", step="fit DC staircase",
+            "the DC staircase has too few levels that carry current",
+            step="fit DC staircase",
             value=f"{len(carrying)} levels above a tenth of the largest current",
-            limit="3 levels, 2 of one sign", remedy="raise the DC levels or the current limit",
+            limit="3 levels, 2 of one sign",
+            remedy="raise the DC levels or the current limit",
         )
     fits = [_fit_shape(levels, axis_deg, tail, largest, 0 < positive < len(carrying)) for tail in TAILS]
     best = min(fits, key=lambda f: f.misfit)
@@ -164,10 +168,13 @@ def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
     mean = weights @ values
     spread = np.sqrt(weights @ (values - mean) ** 2 + weights @ np.array([np.square(f.std) for f in fits]))
     shape = knee_shape(best.values[1], best.values[2], best.tail)
-    # A shape outside the family (an arc tangent) moves R_s by up to the hundredth part of the plateau over the largest current.
+    # A shape outside the family (an arc tangent) moves R_s by up to the hundredth part of the plateau over the largest
+    # current.
     doubt = SHAPE_DOUBT * abs(float(best.values[1])) / largest
     return Staircase(
-        stator_resistance=Quantity(float(best.values[0]), float(math.hypot(spread[0], doubt) + abs(mean[0] - best.values[0]))),
+        stator_resistance=Quantity(
+            float(best.values[0]), float(math.hypot(spread[0], doubt) + abs(mean[0] - best.values[0]))
+        ),
         error_voltage=Quantity(float(best.values[1]), float(spread[1] + abs(mean[1] - best.values[1]))),
         offset_a=float(best.values[3]),
         inverter=InverterError(shape.current_a, shape.voltage_v, (float(spread[1]),) * len(shape.current_a)),
@@ -178,7 +185,8 @@ def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
 
 @dataclass(frozen=True)
 class _ShapeFit:
-    """(R_s, V, knee, offset) for one knee shape, their standard errors and the mean square misfit of the levels in V^2."""
+    """(R_s, V, knee, offset) for one knee shape, their standard errors and the mean square misfit of the levels in
+    V^2."""
 
     tail: float
     values: Signal
@@ -219,7 +227,8 @@ def knee_shape(plateau_v: float, knee_a: float, tail: float) -> InverterError:
 
 
 def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[Signal, Signal, Signal]:
-    """(R_s, V, knee, offset): resistance and plateau from the straight line through the upper levels; scales, lower bounds."""
+    """(R_s, V, knee, offset): resistance and plateau from the straight line through the upper levels; scales, lower
+    bounds."""
     upper = np.abs(current) > 0.4 * largest
     if upper.sum() < 2:
         upper = np.abs(current) > 0.1 * largest

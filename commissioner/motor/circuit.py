@@ -39,7 +39,10 @@ class InverseGamma:
     def as_tuple(self) -> tuple[float, float, float, float]:
         """(R_s, R_R, L_sigma, L_M)."""
         return (
-            self.stator_resistance_ohm, self.rotor_resistance_ohm, self.leakage_inductance_h, self.magnetizing_inductance_h
+            self.stator_resistance_ohm,
+            self.rotor_resistance_ohm,
+            self.leakage_inductance_h,
+            self.magnetizing_inductance_h,
         )
 
 
@@ -109,7 +112,7 @@ def to_t_model(
     share = STATOR_SHARE_OF_LEAKAGE[assumption]
     values = _t_values(machine.as_tuple(), share)
     if covariance is None:
-        return TModel(*(Quantity(value, 0.0) for value in values), assumption)
+        return _named([Quantity(value, 0.0) for value in values], assumption)
     jacobian = np.empty((5, 4))
     for column, value in enumerate(machine.as_tuple()):
         moved = [[*machine.as_tuple()], [*machine.as_tuple()]]
@@ -120,7 +123,7 @@ def to_t_model(
         jacobian[:, column] = (np.array(high) - np.array(low)) / (2.0 * step)
     variance = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
     stds = np.sqrt(np.maximum(variance, 0.0))
-    return TModel(*(Quantity(value, float(std)) for value, std in zip(values, stds, strict=True)), assumption)
+    return _named([Quantity(value, float(std)) for value, std in zip(values, stds, strict=True)], assumption)
 
 
 def from_t_model(
@@ -136,6 +139,11 @@ def from_t_model(
     magnetizing_h = ratio * magnetizing_inductance_h
     leakage_h = stator_leakage_h + magnetizing_inductance_h - magnetizing_h
     return InverseGamma(stator_resistance_ohm, ratio * ratio * rotor_resistance_ohm, leakage_h, magnetizing_h)
+
+
+def _named(quantities: list[Quantity], assumption: str) -> TModel:
+    r_s, r_r, l_ls, l_lr, l_m = quantities
+    return TModel(r_s, r_r, l_ls, l_lr, l_m, assumption)
 
 
 def _t_values(inverse_gamma: tuple[float, float, float, float], share: float) -> tuple[float, ...]:

@@ -45,7 +45,8 @@ class Nameplate:
 
 @dataclass(frozen=True)
 class RatedFlux:
-    """Rated stator-flux linkage per phase of the star equivalent; `peak` = sqrt(2) x `rms` is the space vector's length."""
+    """Rated stator-flux linkage per phase of the star equivalent; `peak` = sqrt(2) x `rms` is the space vector's
+    length."""
 
     stator_rms_wb: float
     stator_peak_wb: float
@@ -87,7 +88,8 @@ def rated_flux(nameplate: Nameplate, stator_resistance_ohm: float) -> RatedFlux:
 
 
 # Per-unit ranges (base U_N / (sqrt(3) I_N)); they cover with margin the 35 machines of 0.18 kW ... 1.7 MW in
-# tests/data/motors: R_R / slip 0.57 ... 1.50, X_M sin(phi) 0.72 ... 1.49, X_sigma 0.068 ... 0.245, R_s / slip 0.29 ... 3.2.
+# tests/data/motors: R_R / slip 0.57 ... 1.50, X_M sin(phi) 0.72 ... 1.49, X_sigma 0.068 ... 0.245, R_s / slip 0.29 ...
+# 3.2.
 _STATOR_OVER_SLIP = (0.15, 1.25, 5.0)
 _ROTOR_OVER_SLIP = (0.35, 0.95, 2.2)
 _LEAKAGE_PU = (0.03, 0.14, 0.45)
@@ -104,15 +106,17 @@ def prior(nameplate: Nameplate) -> ParameterBox:
     slip = min(max(nameplate.rated_slip, 0.004), 0.15)
     sin_phi = math.sqrt(1.0 - min(nameplate.power_factor, 0.95) ** 2)
     omega = nameplate.rated_frequency_rad_per_s
-    return ParameterBox(*(
-        InverseGamma(
-            stator_resistance_ohm=_STATOR_OVER_SLIP[k] * slip * base,
-            rotor_resistance_ohm=_ROTOR_OVER_SLIP[k] * slip * base,
-            leakage_inductance_h=_LEAKAGE_PU[k] * base / omega,
-            magnetizing_inductance_h=_MAGNETIZING_TIMES_SIN_PHI[k] / sin_phi * base / omega,
+    return ParameterBox(
+        *(
+            InverseGamma(
+                stator_resistance_ohm=_STATOR_OVER_SLIP[k] * slip * base,
+                rotor_resistance_ohm=_ROTOR_OVER_SLIP[k] * slip * base,
+                leakage_inductance_h=_LEAKAGE_PU[k] * base / omega,
+                magnetizing_inductance_h=_MAGNETIZING_TIMES_SIN_PHI[k] / sin_phi * base / omega,
+            )
+            for k in range(3)
         )
-        for k in range(3)
-    ))
+    )
 
 
 def check(nameplate: Nameplate) -> tuple[PlateProblem, ...]:
@@ -141,13 +145,15 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
     synchronous_rpm = 60.0 * plate.rated_frequency_hz / plate.pole_pairs
     if not 0.0 < plate.rated_slip < 0.25:
         yield PlateProblem(
-            "rated_speed_rpm", plate.rated_speed_rpm,
+            "rated_speed_rpm",
+            plate.rated_speed_rpm,
             f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs by at most a quarter",
         )
     input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
     efficiency = plate.rated_power_w / input_w
     if not 0.25 < efficiency < 1.0:
         yield PlateProblem(
-            "rated_power_w", plate.rated_power_w,
+            "rated_power_w",
+            plate.rated_power_w,
             f"0.25 ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate",
         )

@@ -61,7 +61,7 @@ def held_input(machine: InverseGamma, period_s: float) -> tuple[Matrix, Matrix]:
 
 def to_pulse_transfer(machine: InverseGamma, period_s: float) -> PulseTransfer:
     """The z-transform of the machine behind a zero-order hold."""
-    r_s, r_r, l_s, l_m = machine.as_tuple()
+    _r_s, r_r, l_s, l_m = machine.as_tuple()
     alpha = r_r / l_m
     slow, fast = poles_per_s(machine)
     slow_z, fast_z = math.exp(slow * period_s), math.exp(fast * period_s)

@@ -1,7 +1,8 @@
 """Side by side: our observer, an EKF, series-parallel RLS, simplex and our least squares.
 
 `python -m tests.benchmarks.bench_identify` prints time per sample and errors after 5, 10, 20 and 60 s with 10 % noise.
-EKF, RLS and simplex are written for this comparison only, in the form the literature gives them, compiled where ours is.
+EKF, RLS and simplex are written for this comparison only, in the form the literature gives them, compiled where ours
+is.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ START = (5.5, 1.3, 0.029, 0.14)
 
 @njit(cache=True)
 def ekf(u, y, period, start, relative, noise_variance):
-    """State (i, psi_R, ln R_s, ln R_R, ln L_sigma, ln L_M): explicit midpoint rule, Jacobian by its own differentiation."""
+    """State (i, psi_R, ln R_s, ln R_R, ln L_sigma, ln L_M): explicit midpoint rule, Jacobian by its own
+    differentiation."""
     x = np.array([0.0, 0.0, np.log(start[0]), np.log(start[1]), np.log(start[2]), np.log(start[3])])
     p = np.zeros((6, 6))
     for j in range(2, 6):
@@ -98,13 +100,19 @@ def simplex(u, y):
 
 
 def pao(u, y):
-    observer = ParallelObserver(prior(MOTOR.plate), PERIOD_S, MOTOR.plate.rated_current_peak_a, start=InverseGamma(*START))
+    observer = ParallelObserver(
+        prior(MOTOR.plate), PERIOD_S, MOTOR.plate.rated_current_peak_a, start=InverseGamma(*START)
+    )
     return np.array(observer.advance(u, y).parameters.as_tuple())
 
 
 def lyapunov(u, y):
     observer = ParallelObserver(
-        prior(MOTOR.plate), PERIOD_S, MOTOR.plate.rated_current_peak_a, law="lyapunov", start=InverseGamma(*START),
+        prior(MOTOR.plate),
+        PERIOD_S,
+        MOTOR.plate.rated_current_peak_a,
+        law="lyapunov",
+        start=InverseGamma(*START),
         expected_voltage_v=u[:30000],
     )
     return np.array(observer.advance(u, y).parameters.as_tuple())
@@ -120,8 +128,12 @@ def kalman(u, y):
 
 
 METHODS = {
-    "fast PAO (ours)": pao, "Lyapunov PAO (ours)": lyapunov, "EKF": kalman, "RLS, series-parallel": rls,
-    "simplex NLS": simplex, "NLS (ours)": nls,
+    "fast PAO (ours)": pao,
+    "Lyapunov PAO (ours)": lyapunov,
+    "EKF": kalman,
+    "RLS, series-parallel": rls,
+    "simplex NLS": simplex,
+    "NLS (ours)": nls,
 }
 
 
@@ -137,7 +149,9 @@ def table(seeds: int = 5) -> list[tuple[str, float, float, list[float]]]:
         errors = []
         for seconds in SECONDS:
             n = round(seconds / PERIOD_S)
-            found = np.array([method(voltage[:n], y[:n]) for y in records[: 2 if name.startswith("simplex") else seeds]])
+            found = np.array(
+                [method(voltage[:n], y[:n]) for y in records[: 2 if name.startswith("simplex") else seeds]]
+            )
             errors.append(100 * float(np.max(np.sqrt(np.mean((found / MOTOR.truth - 1) ** 2, axis=0)))))
         started = time.perf_counter()
         method(voltage, records[0])
@@ -174,9 +188,10 @@ def test_side_by_side(capsys):
 
 def main(seeds: int = 5) -> None:
     print(f"\nfast law, recursion alone: {kernel_rate() / 1e6:.1f} million samples/s on one core")
-    print(f"{'10 % noise, 300 us, worst parameter':36s}{'ns/sample':>10s}{'60 s, ms':>10s}" + "".join(
-        f"{s:7.0f} s" for s in SECONDS
-    ))
+    print(
+        f"{'10 % noise, 300 us, worst parameter':36s}{'ns/sample':>10s}{'60 s, ms':>10s}"
+        + "".join(f"{s:7.0f} s" for s in SECONDS)
+    )
     for name, per_sample, whole, errors in table(seeds):
         print(f"{name:36s}{per_sample:10.0f}{whole:10.1f}" + "".join(f"{e:8.2f}%" for e in errors))
 

@@ -1,8 +1,9 @@
 """Random cases for the flux guard: `python -m tests.campaigns.flux_guard 1000` prints overshoots and aborts.
 
 Each case: a published machine with its parameters moved (R +-30 %, leakage +-30 %, L_M -30 ... +20 %), iron that begins
-to saturate between 0.7 and 1.3 of rated flux, a DC resistance known to 1 %, an inverter known to 5 % or ideal, an observer
-that starts from the plate alone or from a wrong machine, a link of 5-100 ms, and the amplitude following the guard's advice.
+to saturate between 0.7 and 1.3 of rated flux, a DC resistance known to 1 %, an inverter known to 5 % or ideal, an
+observer that starts from the plate alone or from a wrong machine, a link of 5-100 ms, and the amplitude following the
+guard's advice.
 """
 
 from __future__ import annotations
@@ -49,15 +50,23 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
     true = InverseGamma(*(np.array(motor.truth) * spread))
     ratio = (true.leakage_inductance_h + true.magnetizing_inductance_h) / true.magnetizing_inductance_h
     rated_wb = rated_flux(motor.plate, true.stator_resistance_ohm).stator_peak_wb
-    machine = np.array([
-        true.stator_resistance_ohm, ratio**2 * true.rotor_resistance_ohm, ratio * true.leakage_inductance_h,
-        true.leakage_inductance_h + true.magnetizing_inductance_h, 1.0 / (rated_wb * rng.uniform(0.7, 1.3)), 7.0,
-    ])
+    machine = np.array(
+        [
+            true.stator_resistance_ohm,
+            ratio**2 * true.rotor_resistance_ohm,
+            ratio * true.leakage_inductance_h,
+            true.leakage_inductance_h + true.magnetizing_inductance_h,
+            1.0 / (rated_wb * rng.uniform(0.7, 1.3)),
+            7.0,
+        ]
+    )
     plate, box = motor.plate, prior(motor.plate)
     current_a = 1.2 * plate.rated_current_peak_a
     axis_deg = float(rng.choice([0.0, 60.0, 90.0]))
     has_inverter = rng.random() < 0.5
-    plateau = 0.2 * true.stator_resistance_ohm * plate.rated_current_peak_a * rng.uniform(0.2, 1.5) if has_inverter else 0.0
+    plateau = (
+        0.2 * true.stator_resistance_ohm * plate.rated_current_peak_a * rng.uniform(0.2, 1.5) if has_inverter else 0.0
+    )
     knee = 0.03 * plate.rated_current_peak_a
     known = IDEAL_INVERTER
     if has_inverter:
@@ -68,7 +77,9 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
     if rng.random() < 0.5:
         start = InverseGamma(resistance, *(np.array(start.as_tuple())[1:] * np.exp(0.4 * rng.standard_normal(3))))
     limit_wb = FLUX_FRACTION * rated_flux(plate, resistance).stator_peak_wb
-    limits = ExcitationLimits(limit_wb, 0.9 * current_a, 0.3 * plate.rated_voltage_v, 0.005 * plate.rated_current_peak_a)
+    limits = ExcitationLimits(
+        limit_wb, 0.9 * current_a, 0.3 * plate.rated_voltage_v, 0.005 * plate.rated_current_peak_a
+    )
     chosen = design(plate, start, limits, PERIOD_S, known, seconds)
     compensation = NOTHING
     if has_inverter:
@@ -77,12 +88,12 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
     observer = ParallelObserver(box, PERIOD_S, plate.rated_current_peak_a, start=start, compensation=compensation)
     latency = rng.uniform(0.005, 0.1)
     guard = FluxGuard(limit_wb, latency, chosen.excitation, PERIOD_S, resistance, known, axis_deg, reaction_s=0.02)
-    return _drive(seed, motor.name, machine, plateau, knee, axis_deg, chosen.excitation, observer, guard, latency, seconds, rng)
+    return _drive(
+        seed, motor.name, machine, plateau, knee, axis_deg, chosen.excitation, observer, guard, latency, seconds, rng
+    )
 
 
-def _drive(  # noqa: PLR0917
-    seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng
-) -> Outcome:
+def _drive(seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng) -> Outcome:
     block = max(50, round(0.5 * latency / PERIOD_S))
     cosines = np.array(phase_cosines(axis_deg))
     scale, wanted = 0.0, min(FIRST_SCALE, guard.safe_scale)
@@ -109,7 +120,9 @@ def _drive(  # noqa: PLR0917
         if reading.advice is FluxAdvice.ABORT:
             aborted = True
             pending.append((due, 0.0))
-        elif reading.advice is FluxAdvice.BACK_OFF or (reading.advice is FluxAdvice.RAISE and abs(scale - wanted) < 1e-6):
+        elif reading.advice is FluxAdvice.BACK_OFF or (
+            reading.advice is FluxAdvice.RAISE and abs(scale - wanted) < 1e-6
+        ):
             pending.append((due, min(1.0, reading.permitted_scale)))
     return Outcome(seed, name, peak / guard.limit_wb, aborted, scale, latency)
 
@@ -118,11 +131,13 @@ def main(count: int, first: int = 0) -> None:
     outcomes = [run_case(seed) for seed in range(first, first + count)]
     worst = sorted(outcomes, key=lambda o: -o.peak)[:8]
     unnecessary = [o for o in outcomes if o.aborted and o.peak < 1.0]
-    print(f"{count} cases: largest true peak {worst[0].peak:.4f} of the limit; "
-          f"{sum(o.peak > 1.02 for o in outcomes)} above 1.02; {sum(o.aborted for o in outcomes)} aborts, "
-          f"{len(unnecessary)} of them below the limit; "
-          f"peak reached: median {np.median([o.peak for o in outcomes]):.2f}, 10th percentile "
-          f"{np.percentile([o.peak for o in outcomes], 10):.2f}")
+    print(
+        f"{count} cases: largest true peak {worst[0].peak:.4f} of the limit; "
+        f"{sum(o.peak > 1.02 for o in outcomes)} above 1.02; {sum(o.aborted for o in outcomes)} aborts, "
+        f"{len(unnecessary)} of them below the limit; "
+        f"peak reached: median {np.median([o.peak for o in outcomes]):.2f}, 10th percentile "
+        f"{np.percentile([o.peak for o in outcomes], 10):.2f}"
+    )
     for o in worst:
         print(o)
     low = sorted(outcomes, key=lambda o: o.peak)[:8]

@@ -35,7 +35,8 @@ def test_the_generator_of_these_tests_is_the_continuous_circuit():
 
         def rate(_t, x, u=u):
             return [
-                (u - (r_s + r_r) * x[0] + r_r / l_m * x[1]) / l_sigma, r_r * x[0] - r_r / l_m * x[1],
+                (u - (r_s + r_r) * x[0] + r_r / l_m * x[1]) / l_sigma,
+                r_r * x[0] - r_r / l_m * x[1],
             ]
 
         state = solve_ivp(rate, (0.0, 1e-3), state, rtol=1e-11, atol=1e-13).y[:, -1]

@@ -1,4 +1,5 @@
-"""The seed's story (Castaldi & Tilli 2005, section IV): 180 s, averages over 150-180 s, noise in per cent of rms current."""
+"""The seed's story (Castaldi & Tilli 2005, section IV): 180 s, averages over 150-180 s, noise in per cent of rms
+current."""
 
 from __future__ import annotations
 
@@ -25,8 +26,13 @@ def story(noise_percent: float) -> tuple[float, float, float]:
     measured = current + noise_percent / 100 * np.std(current) * rng.standard_normal(current.size)
     start = InverseGamma(*(np.array(MOTOR.truth) * [1.5, 0.6, 1.4, 0.6]))
     observer = ParallelObserver(
-        prior(MOTOR.plate), PERIOD_S, MOTOR.plate.rated_current_peak_a, law="lyapunov", start=start,
-        dead_zone_a=0.025 if noise_percent else 0.0, expected_voltage_v=voltage[:60000],
+        prior(MOTOR.plate),
+        PERIOD_S,
+        MOTOR.plate.rated_current_peak_a,
+        law="lyapunov",
+        start=start,
+        dead_zone_a=0.025 if noise_percent else 0.0,
+        expected_voltage_v=voltage[:60000],
     )
     averages, residual = [], []
     for part in np.array_split(np.arange(voltage.size), 180):
@@ -36,7 +42,11 @@ def story(noise_percent: float) -> tuple[float, float, float]:
             residual.append(measured[part] - block.current_a)
     found, truth = np.mean(averages, axis=0), np.array(MOTOR.truth)
     error_percent = 100 * np.linalg.norm(found - truth) / np.linalg.norm(truth)
-    return float(error_percent), whiteness([np.concatenate(residual)]).statistic, float(np.max(np.abs(found / truth - 1)))
+    return (
+        float(error_percent),
+        whiteness([np.concatenate(residual)]).statistic,
+        float(np.max(np.abs(found / truth - 1))),
+    )
 
 
 @pytest.mark.parametrize("noise_percent", NOISE_PERCENT)

@@ -49,7 +49,9 @@ def test_traction_motor_reactance_is_measured_near_150_a_and_its_resistance_show
     assert len(near) == 2
     for row in near:
         seen, model = measured(row), impedance(machine, float(row["frequency_hz"]))
-        assert model.imag == pytest.approx(seen.imag, rel=0.06)  # the leakage itself falls 11 % over the test's currents
+        assert model.imag == pytest.approx(
+            seen.imag, rel=0.06
+        )  # the leakage itself falls 11 % over the test's currents
         hot = 0.5 * float(row["winding_resistance_uv_ohm"])
         bars = (seen.real - hot) / (model.real - machine.stator_resistance_ohm)
         assert 1.3 < bars < 1.8  # 0.102 ohm at 50 Hz, 0.115 ohm at 60.7 Hz against 0.072 ohm at rated slip
@@ -81,8 +83,10 @@ def test_traction_motor_plate_bounds_what_its_type_test_found():
 def test_rated_flux_of_the_traction_motor_lies_between_the_no_load_points_that_enclose_it():
     plate = MOTORS["siemens_1tb1817"].plate
     flux = rated_flux(plate, 0.069).stator_rms_wb
-    no_load = [float(r["voltage_line_v"]) / math.sqrt(3) / (2 * math.pi * 60.7) for r in
-               rows("siemens_200kw_type_test", "no_load.csv")]
+    no_load = [
+        float(r["voltage_line_v"]) / math.sqrt(3) / (2 * math.pi * 60.7)
+        for r in rows("siemens_200kw_type_test", "no_load.csv")
+    ]
     assert no_load[4] < flux < no_load[2]  # between 1075 and 1272 V, the plate says 1146 V
 
 

@@ -1,4 +1,5 @@
-"""Motors and standstill currents for tests, from other code than the estimators': matrix exponentials and Runge-Kutta."""
+"""Motors and standstill currents for tests, from other code than the estimators': matrix exponentials and
+Runge-Kutta."""
 
 from __future__ import annotations
 
@@ -40,11 +41,20 @@ def usable_motors() -> Iterator[KnownMotor]:
             frequency, pairs = float(row["f_Hz"]), int(row["poles"]) // 2
             speed = float(row["n_n_rpm"] or 0) or 60 * frequency / pairs * (1 - float(row["slip_calc"]))
             plate = Nameplate(
-                1e3 * float(row["P_kW"]), float(row["V_LL"]), frequency, float(row["I_n_A"] or row["I_calc_A"]), speed,
-                float(row["pf_n"] or row["pf_calc"]), pairs, "star",
+                1e3 * float(row["P_kW"]),
+                float(row["V_LL"]),
+                frequency,
+                float(row["I_n_A"] or row["I_calc_A"]),
+                speed,
+                float(row["pf_n"] or row["pf_calc"]),
+                pairs,
+                "star",
             )
             truth = (
-                float(row["Rs_ohm"]), float(row["R_R_ohm"]), 1e-3 * float(row["L_sgm_mH"]), 1e-3 * float(row["L_M_mH"]),
+                float(row["Rs_ohm"]),
+                float(row["R_R_ohm"]),
+                1e-3 * float(row["L_sgm_mH"]),
+                1e-3 * float(row["L_M_mH"]),
             )
             yield KnownMotor(row["id"], plate, truth)
 
@@ -76,8 +86,15 @@ def multitone(tones: list[tuple[float, float, float]], seconds: float, period_s:
 
 @njit(cache=True)
 def saturating_block(
-    u: np.ndarray, period: float, state: np.ndarray, machine: np.ndarray, plateau: float, knee: float, c: np.ndarray,
-    current: np.ndarray, flux: np.ndarray,
+    u: np.ndarray,
+    period: float,
+    state: np.ndarray,
+    machine: np.ndarray,
+    plateau: float,
+    knee: float,
+    c: np.ndarray,
+    current: np.ndarray,
+    flux: np.ndarray,
 ) -> None:
     """Gamma machine, L_s = L_0 / (1 + (a psi)^S), behind legs that lose plateau x tanh(i / knee): midpoint rule."""
     r_s, r_r, l_l, l_0, a, order = machine

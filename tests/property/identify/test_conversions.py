@@ -15,20 +15,28 @@ from commissioner.motor.standstill import from_pulse_transfer, to_pulse_transfer
 positive = st.floats(1e-3, 1e2)
 machines = st.builds(
     lambda r_s, ratio, tau, share: InverseGamma(r_s, ratio * r_s, share * tau * ratio * r_s, tau * ratio * r_s),
-    positive, st.floats(0.2, 3.0), st.floats(0.02, 2.0), st.floats(0.02, 0.3),
+    positive,
+    st.floats(0.2, 3.0),
+    st.floats(0.02, 2.0),
+    st.floats(0.02, 0.3),
 )
 
 
 @given(machines)
 def test_gamma_and_back_is_the_same_machine(machine):
-    assert Gamma.from_inverse_gamma(machine).as_inverse_gamma().as_tuple() == pytest.approx(machine.as_tuple(), rel=1e-10)
+    assert Gamma.from_inverse_gamma(machine).as_inverse_gamma().as_tuple() == pytest.approx(
+        machine.as_tuple(), rel=1e-10
+    )
 
 
 @given(machines)
 def test_t_and_back_is_the_same_machine(machine):
     t = to_t_model(machine)
     back = from_t_model(
-        t.stator_resistance_ohm.value, t.rotor_resistance_ohm.value, t.stator_leakage_h.value, t.rotor_leakage_h.value,
+        t.stator_resistance_ohm.value,
+        t.rotor_resistance_ohm.value,
+        t.stator_leakage_h.value,
+        t.rotor_leakage_h.value,
         t.magnetizing_inductance_h.value,
     )
     assert back.as_tuple() == pytest.approx(machine.as_tuple(), rel=1e-9)

@@ -17,8 +17,14 @@ PERIOD_S = 2e-4
 TRUTH = (3.7, 2.09, 0.021, 0.224)
 TONES = [(14.0, 0.7, 0.0), (4.0, 2.3, 1.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)]
 PLATE = {
-    "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0,
-    "rated_speed_rpm": 1436.0, "power_factor": 0.8, "pole_pairs": 2.0, "connection": "star",
+    "rated_power_w": 2200.0,
+    "rated_voltage_v": 400.0,
+    "rated_frequency_hz": 50.0,
+    "rated_current_a": 5.0,
+    "rated_speed_rpm": 1436.0,
+    "power_factor": 0.8,
+    "pole_pairs": 2.0,
+    "connection": "star",
 }
 
 
@@ -27,12 +33,21 @@ def recording(tones=TONES, seconds=5.0, axis_deg=30.0, noise=0.01, seed=1, truth
     current = linear_current(truth, voltage, PERIOD_S)
     rng = np.random.default_rng(seed)
     phases = [
-        current * np.cos(np.radians(axis_deg - shift)) + noise * rng.standard_normal(current.size) for shift in (0, 120, 240)
+        current * np.cos(np.radians(axis_deg - shift)) + noise * rng.standard_normal(current.size)
+        for shift in (0, 120, 240)
     ]
     n = voltage.size
     return StandstillRecording(
-        np.arange(n) * PERIOD_S, np.zeros(n, dtype=np.int64), np.full(n, axis_deg), voltage, phases[0], phases[1], phases[2],
-        None, PERIOD_S, PLATE,
+        np.arange(n) * PERIOD_S,
+        np.zeros(n, dtype=np.int64),
+        np.full(n, axis_deg),
+        voltage,
+        phases[0],
+        phases[1],
+        phases[2],
+        None,
+        PERIOD_S,
+        PLATE,
     )
 
 
@@ -51,9 +66,22 @@ def test_every_estimator_finds_the_machine(estimator):
 def test_the_document_is_json_with_the_contracts_keys():
     document = identify(recording()).as_json()
     again = json.loads(json.dumps(document, allow_nan=False))
-    assert {"outcome", "reason", "parameters", "axes", "rated_flux_wb", "inverter", "gaps", "duration_s", "t_model"} <= set(again)
+    assert {
+        "outcome",
+        "reason",
+        "parameters",
+        "axes",
+        "rated_flux_wb",
+        "inverter",
+        "gaps",
+        "duration_s",
+        "t_model",
+    } <= set(again)
     assert set(again["parameters"]) == {
-        "stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h",
+        "stator_resistance_ohm",
+        "rotor_resistance_ohm",
+        "leakage_inductance_h",
+        "magnetizing_inductance_h",
         "rotor_time_constant_s",
     }
     assert again["t_model"]["assumption"]
@@ -65,7 +93,8 @@ def test_gaps_are_counted_and_leave_no_bias():
     keep = np.ones(whole.time_s.size, dtype=bool)
     keep[9000:9300] = keep[20000:20050] = False
     columns = {
-        f.name: getattr(whole, f.name)[keep] for f in dataclasses.fields(whole)
+        f.name: getattr(whole, f.name)[keep]
+        for f in dataclasses.fields(whole)
         if isinstance(getattr(whole, f.name), np.ndarray)
     }
     result = identify(dataclasses.replace(whole, **columns))
@@ -90,9 +119,16 @@ def test_default_drive_recording_from_the_simulator_meets_the_issues_target():
     columns, metadata, truth = record(load("rich"), 3)
     result = identify(
         StandstillRecording(
-            columns["time_s"], columns["segment"].astype(np.int64), columns["axis_deg"], columns["voltage_axis_v"],
-            columns["current_u_a"], columns["current_v_a"], columns.get("current_w_a"), None,
-            float(metadata["sample_period_s"]), metadata,
+            columns["time_s"],
+            columns["segment"].astype(np.int64),
+            columns["axis_deg"],
+            columns["voltage_axis_v"],
+            columns["current_u_a"],
+            columns["current_v_a"],
+            columns.get("current_w_a"),
+            None,
+            float(metadata["sample_period_s"]),
+            metadata,
         )
     )
     key = truth["inverse_gamma"]["over_flux"]
@@ -127,7 +163,7 @@ def test_one_tone_is_refused_and_told_which_combination_it_fixes():
     error = refused(recording([(14.0, 5.0, 0.0)], noise=0.0))
     assert "one tone" in str(error)
     omega = 2 * np.pi * 5.0
-    r_s, r_r, l_sigma, l_m = TRUTH
+    r_s, r_r, _l_sigma, l_m = TRUTH
     real = r_s + r_r * (omega * l_m) ** 2 / (r_r**2 + (omega * l_m) ** 2)
     number = float(error.remedy.split("= ")[1].split(" ohm")[0])
     assert number == pytest.approx(real, rel=0.02)
@@ -169,7 +205,9 @@ def test_a_wrong_axis_is_refused_with_the_one_that_was_seen():
 
 
 def test_missing_and_impossible_nameplate_keys_are_named():
-    assert "rated_current_a" in str(refused(changed(metadata={k: v for k, v in PLATE.items() if k != "rated_current_a"})))
+    assert "rated_current_a" in str(
+        refused(changed(metadata={k: v for k, v in PLATE.items() if k != "rated_current_a"}))
+    )
     assert "rated_speed_rpm" in str(refused(changed(metadata=PLATE | {"rated_speed_rpm": 1600.0})))
 
 

@@ -36,7 +36,8 @@ def test_segments_share_the_machine_and_keep_their_own_offset_and_state():
     current = linear_response(TRUTH, voltage, PERIOD_S)[0]
     cut = 11111
     parts = [
-        Segment(voltage[:cut], current[:cut] + 0.1, 0.0, True), Segment(voltage[cut:], current[cut:] - 0.2, 60.0, False),
+        Segment(voltage[:cut], current[:cut] + 0.1, 0.0, True),
+        Segment(voltage[cut:], current[cut:] - 0.2, 60.0, False),
     ]
     fit = fit_segments(parts, PERIOD_S, START)
     assert np.max(np.abs(relative(fit))) < 1e-8

@@ -24,7 +24,10 @@ def test_all_39_published_t_circuits_have_their_published_inverse_gamma_values()
     assert len(rows) == 39
     for row in rows:
         found = from_t_model(
-            float(row["Rs_ohm"]), float(row["Rr_ohm"]), 1e-3 * float(row["Lls_mH"]), 1e-3 * float(row["Llr_mH"]),
+            float(row["Rs_ohm"]),
+            float(row["Rr_ohm"]),
+            1e-3 * float(row["Lls_mH"]),
+            1e-3 * float(row["Llr_mH"]),
             1e-3 * float(row["Lm_mH"]),
         )
         assert found.rotor_resistance_ohm == pytest.approx(float(row["R_R_ohm"]), rel=2e-5)
@@ -41,9 +44,18 @@ def test_published_gamma_machine_is_the_published_inverse_gamma_machine():
 def test_t_model_under_an_assumption_has_the_same_terminals_and_keeps_the_assumption(assumption):
     machine = InverseGamma(3.7, 2.09, 0.021, 0.224)
     t = to_t_model(machine, assumption=assumption)
-    back = from_t_model(*(getattr(t, name).value for name in (
-        "stator_resistance_ohm", "rotor_resistance_ohm", "stator_leakage_h", "rotor_leakage_h", "magnetizing_inductance_h",
-    )))
+    back = from_t_model(
+        *(
+            getattr(t, name).value
+            for name in (
+                "stator_resistance_ohm",
+                "rotor_resistance_ohm",
+                "stator_leakage_h",
+                "rotor_leakage_h",
+                "magnetizing_inductance_h",
+            )
+        )
+    )
     assert back.as_tuple() == pytest.approx(machine.as_tuple(), rel=1e-12)
     share = STATOR_SHARE_OF_LEAKAGE[assumption]
     assert t.stator_leakage_h.value / (t.stator_leakage_h.value + t.rotor_leakage_h.value) == pytest.approx(share)

@@ -78,7 +78,8 @@ def test_the_design_beats_the_same_peak_flux_spent_on_decade_spaced_tones():
 
     ours = chosen.excitation.voltage_v(np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S)
     worst = [
-        np.max(np.sqrt(np.diag(cramer_rao(machine, u, PERIOD_S, limits.noise_a))) / motor.truth) for u in (ours, plain / use)
+        np.max(np.sqrt(np.diag(cramer_rao(machine, u, PERIOD_S, limits.noise_a))) / motor.truth)
+        for u in (ours, plain / use)
     ]
     assert worst[0] < worst[1]
     assert predicted_peaks(machine, chosen.excitation, PERIOD_S)[0] <= 1.02 * limits.flux_wb

@@ -96,7 +96,9 @@ def test_nothing_winds_up_while_the_excitation_is_gone():
     decay = linear_response(MOTOR.truth, np.concatenate([voltage, zero]), PERIOD_S)[0][voltage.size :]
     faded = machine.advance(zero, decay + noise)
     assert np.all(np.array(faded.std) <= 1.001 * np.array(before.std))
-    assert np.all(np.abs(np.array(faded.parameters.as_tuple()) - before.parameters.as_tuple()) < 4 * np.array(before.std))
+    assert np.all(
+        np.abs(np.array(faded.parameters.as_tuple()) - before.parameters.as_tuple()) < 4 * np.array(before.std)
+    )
 
 
 def test_an_hour_of_samples_leaves_a_sound_covariance_and_no_drift():

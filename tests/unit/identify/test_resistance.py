@@ -52,9 +52,7 @@ def test_an_ideal_inverter_is_seen_as_one():
     assert abs(fitted.error_voltage.value) < 0.03 * 3.7 * 2.0
 
 
-@pytest.mark.parametrize(
-    "levels", [[], [DcLevel(5.0, 1.0, 0.0)], [DcLevel(5.0, 1.0, 0.0), DcLevel(-5.0, -1.0, 0.0)]]
-)
+@pytest.mark.parametrize("levels", [[], [DcLevel(5.0, 1.0, 0.0)], [DcLevel(5.0, 1.0, 0.0), DcLevel(-5.0, -1.0, 0.0)]])
 def test_too_few_levels_are_refused_with_a_remedy(levels):
     with pytest.raises(DataRefused) as refused:
         fit_staircase(levels, 0.0)
