@@ -1,0 +1,253 @@
+"""The whole diagnosis of standstill recordings: one call, one result with the numbers that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from commissioner.diagnose import calibration
+from commissioner.diagnose.audit import Audit, prepare
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.evidence import (
+    TIE_CHI2,
+    HeldOut,
+    Leftover,
+    alternatives,
+    claim_features,
+    confidence,
+    hold_out,
+    leftover,
+    on_part,
+    setting_for,
+    sizes_with_spread,
+)
+from commissioner.diagnose.experiment import next_experiment
+from commissioner.diagnose.extended import model_document
+from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.noise import Noise, measure_noise
+from commissioner.diagnose.record import Record
+from commissioner.diagnose.search import EXPLORED_SAMPLES, Found, search
+from commissioner.diagnose.split import Split, split_lines
+from commissioner.motor.circuit import Quantity
+from commissioner.records import StandstillRecording
+
+MOSTLY_EXPLAINED_SIGMA, UNEXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.3, 0.95
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.7
+ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+NEVER_NAMEABLE = (
+    "common gain of the current sensors | DC-link scale | all impedances",
+    "slope resistance of the devices | cable resistance | R_s",
+    "dead time | device threshold (one switching frequency and link voltage)",
+    "networks of the same order: deep bar | eddy loss (named by their corner frequency)",
+    "delay | first-order lag below an eighth of a sample period",
+)
+
+
+class Verdict(Enum):
+    EXPLAINED = "explained"
+    NOTHING_SIGNIFICANT = "nothing_significant"
+    NOT_DISTINGUISHABLE = "not_distinguishable"
+    UNEXPLAINED = "unexplained"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause. `sizes`: name -> (value, std, unit); `strength_sigma` rms contribution over the noise rms."""
+
+    name: str
+    title: str
+    sizes: Mapping[str, tuple[float, float, str]]
+    gain_share: float
+    strength_sigma: float
+    delta_chi2: float
+    confidence: float
+    equivalent: tuple[str, ...] = ()
+    rivals: Mapping[str, float] = field(default_factory=dict)
+    features: tuple[float, ...] = ()
+    from_audit: bool = False
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything the report shows. `found` is None where the data were refused."""
+
+    verdict: Verdict
+    reason: str
+    causes: tuple[Cause, ...]
+    below_materiality: tuple[str, ...]
+    audit: Audit
+    noise: Noise | None = None
+    held_out: HeldOut | None = None
+    left: Leftover | None = None
+    parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
+    parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
+    detection_limits: Mapping[str, float] = field(default_factory=dict)
+    next_experiment: Mapping[str, object] | None = None
+    model: Mapping[str, object] = field(default_factory=dict)
+    found: Found | None = None
+    split: Split | None = None
+    explained_share: float = 0.0
+    remarks: tuple[str, ...] = ()
+
+
+def diagnose(
+    recordings: Sequence[StandstillRecording], *, excluded: Sequence[str] = (), report: Callable[[str], None] = lambda _: None
+) -> Diagnosis:
+    """Names what a four-parameter simulation gets wrong about the recordings of one motor.
+
+    Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason.
+    """
+    record, audit = prepare(recordings)
+    if audit.refusal:
+        return Diagnosis(Verdict.REFUSED, audit.refusal, (), (), audit)
+    noise = measure_noise(record)
+    report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
+    found = search(record, noise, excluded=excluded, report=report)
+    mixed = _mixed_motors(found)
+    if mixed:
+        return Diagnosis(Verdict.REFUSED, mixed, (), (), audit, noise)
+    return _conclude(found, audit, noise, report)
+
+
+def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], None]) -> Diagnosis:
+    record, layout = found.record, found.layout
+    numbers = 4 + len(found.fit.model.terms)
+    rest = leftover(found.fit.model, record, layout, noise, numbers)
+    held = hold_out(found.nominal, found.fit, record, layout, noise)
+    part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
+    rivals = alternatives(
+        part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples
+    )
+    causes = [_cause(found, name, rest, rivals.get(name, {}), noise) for name in found.accepted]
+    causes += _audit_causes(audit, record, noise)
+    count = float(found.fit.normal.count.sum())
+    structured = max(found.nominal.chi2 - count, 0.0)
+    share = 1.0 - min(rest.sigma**2 * count / max(structured, rest.sigma**2 * count, 1.0), 1.0)
+    verdict, reason = _verdict(causes, rest, share, noise)
+    experiment = next_experiment(verdict.value, causes, record)
+    return Diagnosis(
+        verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
+        rest, _parameters(found.nominal), _parameters(found.fit), _limits(found), experiment,
+        model_document(found, causes), found, split_lines(record), share, _remarks(noise, record),
+    )
+
+
+def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float], noise: Noise) -> Cause:
+    gain = found.gains[name]
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
+    close = tuple(r for r, loss in rivals.items() if loss < TIE_CHI2)
+    features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=1e6), total)
+    sure = confidence(features, calibration.WEIGHTS)
+    if not noise.is_known:
+        sure *= calibration.UNKNOWN_NOISE_FACTOR
+    return Cause(
+        name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
+        float(np.sqrt(gain / count)), gain, sure, (*fixed, *(c for c in close if c not in fixed)), rivals, tuple(features),
+    )
+
+
+def _audit_causes(audit: Audit, record: Record, noise: Noise) -> list[Cause]:
+    """Causes that leave no waveform: coarse converter steps, clipped and missing samples."""
+    out = []
+    step = max(audit.step_a, default=0.0)
+    if step > COARSE_STEP_SHARE * record.facts.rated_current_peak_a and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
+        out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
+    if audit.clipped:
+        out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
+                                       "samples": (audit.clipped["samples"], 0.0, "1")}))
+    if audit.holes:
+        lost = float(sum(h[2] for h in audit.holes))
+        out.append(_plain("lost_samples", {"samples": (lost, 0.0, "1"), "holes": (float(len(audit.holes)), 0.0, "1")}))
+    return out
+
+
+def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
+    return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)
+
+
+def _verdict(causes: Sequence[Cause], rest: Leftover, share: float, noise: Noise) -> tuple[Verdict, str]:
+    if rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE) or (
+        not any(not c.from_audit for c in causes) and rest.sigma > MOSTLY_EXPLAINED_SIGMA
+    ):
+        names = ", ".join(c.name for c in causes)
+        seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
+        return Verdict.UNEXPLAINED, (
+            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes."
+            f"{seen}"
+        )
+    if not causes:
+        return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
+    tied = [c for c in causes if c.equivalent]
+    if tied:
+        classes = "; ".join(" or ".join((c.name, *c.equivalent)) for c in tied)
+        return Verdict.NOT_DISTINGUISHABLE, f"These data cannot tell apart: {classes}."
+    return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
+
+
+def _parameters(one: Fit) -> dict[str, Quantity]:
+    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+    covariance = np.linalg.pinv(one.normal.total_gram, rcond=1e-12, hermitian=True)
+    out = {
+        n: Quantity(float(v), float(v * np.sqrt(max(covariance[k, k], 0.0))))
+        for k, (n, v) in enumerate(zip(names, one.model.nominal, strict=True))
+    }
+    r_r, l_m = out[names[1]], out[names[3]]
+    spread = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3]
+    t = l_m.value / r_r.value
+    out["rotor_time_constant_s"] = Quantity(t, float(t * np.sqrt(max(spread, 0.0))))
+    return out
+
+
+def _limits(found: Found) -> dict[str, float]:
+    """Smallest size of each effect (its step's multiple) that would have been found, in its first number's unit."""
+    out = {}
+    screening = found.first_screening
+    scale = found.record.samples / max(sum(screening.normal.count) / found.record.facts.phases, 1.0)
+    for name, score in screening.scores.items():
+        k = list(screening.columns[name])
+        power = screening.projected[np.ix_(k, k)]
+        best = float(np.linalg.eigvalsh(power)[-1]) * max(scale, 1.0)
+        if best > 0:
+            out[name] = float(np.sqrt(score.threshold / best) * score.terms[0].step)
+    return out
+
+
+def _mixed_motors(found: Found) -> str | None:
+    """Files whose own four-parameter fits differ by more than a tenth and a thousand standard deviations' worth."""
+    files = sorted({s.file for s in found.record.segments})
+    if len(files) < 2:
+        return None
+    normal, model = found.fit.normal, found.fit.model
+    estimates = []
+    for file in files:
+        rows = [k for k, s in enumerate(found.record.segments) if s.file == file]
+        gram, slope = normal.gram[rows].sum(axis=0)[:4, :4], normal.slope[rows].sum(axis=0)[:4]
+        estimates.append(np.linalg.solve(gram, slope))
+    spread = np.ptp(np.array(estimates), axis=0)
+    names = ("R_s", "R_R", "L_sigma", "L_M")
+    worst = int(np.argmax(spread[:3]))
+    if spread[worst] > 0.2:
+        return (
+            f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
+            f"(fitted together: {model.nominal[worst]:.4g}); diagnose them one by one"
+        )
+    return None
+
+
+def _remarks(noise: Noise, record: Record) -> tuple[str, ...]:
+    out = []
+    if not noise.is_known:
+        out.append(
+            "No repeated segment, no repeated period, no zero-voltage stretch and no third sensor: the noise had to be "
+            "taken from quiet frequencies of the same record. Broadband structure would be counted as noise, so "
+            "`explained` means no line is left, and confidences are lowered. Repeat one segment to measure the noise."
+        )
+    if len({round(s.axis_deg % 180.0, 3) for s in record.segments}) < 2:
+        out.append("One axis only: anisotropy cannot be told from the machine's own L_sigma and resistances.")
+    return tuple(out)

@@ -1,0 +1,190 @@
+"""How far the accepted causes can be trusted: what is left, the hold-out, the alternatives, the confidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, whiten
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.record import Record
+from commissioner.diagnose.screen import screen
+from commissioner.diagnose.search import is_plausible, loss_without
+
+Array = NDArray[np.float64]
+TIE_CHI2 = 10.0
+ALTERNATIVE_SHARE = 0.9
+"""An alternative is refitted only if it promises this share of the cause's own gain."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Structured error after the fit, in units of the noise rms; 0 where the noise explains everything."""
+
+    sigma: float
+    from_power_sigma: float
+    from_lines_sigma: float
+    strongest_hz: float
+
+
+def leftover(model: Model, record: Record, layout: Layout, noise: Noise, numbers: int) -> Leftover:
+    """Two measures, the larger one counts: total power above the noise (beyond three standard errors of the noise
+    estimate), and power in single frequencies that noise would not show once in a thousand recordings."""
+    power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
+    for k, segment in enumerate(record.segments):
+        residual = segment.currents_a - predict(model, record, k, layout).currents_a
+        white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
+        power += float(white @ white)
+        count += int(segment.is_good.sum()) * record.facts.phases
+        period = record.facts.sample_period_s
+        n = segment.count
+        masked = np.where(segment.is_good, residual, 0.0)
+        spectrum = np.abs(np.fft.rfft(masked, axis=1)[:, 1:]) ** 2 / n / noise.weights(n, period)[:, 1:] ** 2
+        limit = np.log(spectrum.size * len(record.segments)) + 7.0
+        high = spectrum > limit
+        line_power += 2.0 * float((spectrum[high] - 1.0).sum())
+        if high.any():
+            _, column = np.unravel_index(int(np.argmax(spectrum)), spectrum.shape)
+            if float(spectrum.max()) > strongest[0]:
+                strongest = (float(spectrum.max()), float(np.fft.rfftfreq(n, period)[1:][column]))
+    excess = power / max(count - numbers, 1) - 1.0
+    doubt = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
+    by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
+    by_lines = float(np.sqrt(line_power / count))
+    return Leftover(max(by_power, by_lines), by_power, by_lines, strongest[1])
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Error on segments the fit did not see, rms over phases and samples, A; `share` of the structured error power
+
+    removed there. `is_measured` False with a single segment: then these are in-sample figures.
+    """
+
+    rmse_before_a: float
+    rmse_after_a: float
+    share: float
+    is_measured: bool
+    worst_share: float
+
+
+def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noise) -> HeldOut:
+    """Every segment predicted by the model fitted to all others (numbers bound to one segment keep their value)."""
+    many = len(record.segments) > 1
+    powers = []
+    for k, segment in enumerate(record.segments):
+        row = []
+        for one in (before, after):
+            model = _without_segment(one, k) if many else one.model
+            residual = segment.currents_a - predict(model, record, k, layout).currents_a
+            row.append(float((residual[:, segment.is_good] ** 2).sum()))
+        powers.append((*row, int(segment.is_good.sum()) * record.facts.phases))
+    table = np.array(powers)
+    floor = noise.floor_a**2 * table[:, 2]
+    removed = table[:, 0] - table[:, 1]
+    structured = np.maximum(table[:, 0] - floor, 1e-12 * floor)
+    mean = table.sum(axis=0)
+    return HeldOut(
+        float(np.sqrt(mean[0] / mean[2])), float(np.sqrt(mean[1] / mean[2])),
+        float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)), many,
+        float(np.clip((removed / structured).min(), -1.0, 1.0)),
+    )
+
+
+def _without_segment(one: Fit, k: int) -> Model:
+    """The estimate without segment k, from the normal equations (one Gauss-Newton step at the optimum)."""
+    gram = one.normal.total_gram - one.normal.gram[k]
+    slope = one.normal.total_slope - one.normal.slope[k]
+    free = np.array([t.segment < 0 for t in one.model.terms], dtype=bool)
+    keep = np.r_[np.ones(4, dtype=bool), free]
+    theta = one.model.theta
+    low, high = limits(one.model)
+    step = np.zeros(theta.shape[0])
+    inside = np.ix_(keep, keep)
+    step[keep] = bounded_step(gram[inside], slope[keep], (low - theta)[keep], (high - theta)[keep], 1e-9)
+    return one.model.moved(theta + step)
+
+
+def alternatives(
+    found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
+) -> dict[str, dict[str, float]]:
+    """For every accepted cause: what takes its place, with the loss in chi2 scaled to the whole recording."""
+    out: dict[str, dict[str, float]] = {}
+    for name in accepted:
+        without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
+        gain = without.chi2 - found.chi2
+        absent = [n for n in CATALOGUE if n not in accepted]
+        screening = screen(without.model, record, layout, noise, setting, absent)
+        rivals: dict[str, float] = {}
+        for score in screening.ranked()[:3]:
+            if score.delta_chi2 < ALTERNATIVE_SHARE * gain:
+                continue
+            trial = fit(without.model.with_terms(score.terms), record, layout, noise)
+            if is_plausible(score.name, CATALOGUE[score.name].sizes(setting, trial.model.of(score.name)), record.facts.current_peak_a):
+                rivals[score.name] = (trial.chi2 - found.chi2) * whole / record.samples
+        out[name] = rivals
+    return out
+
+
+def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tuple[float, float, str]]:
+    """Engineering sizes with standard deviation (linear propagation of the fit's covariance) and unit."""
+    terms = found.model.terms
+    mine = [k for k, t in enumerate(terms) if t.effect == name]
+    covariance = np.linalg.pinv(found.normal.total_gram, rcond=1e-12, hermitian=True)
+    sizes = CATALOGUE[name].sizes(setting, found.model.of(name))
+    out = {}
+    slopes: dict[str, list[float]] = {key: [] for key in sizes}
+    for k in mine:
+        h = 0.5 * float(np.sqrt(max(covariance[4 + k, 4 + k], 1e-20)))
+        theta = found.model.theta
+        theta = theta.copy()
+        theta[4 + k] += h
+        moved = CATALOGUE[name].sizes(setting, found.model.moved(theta).of(name))
+        for key in sizes:
+            slopes[key].append((moved[key][0] - sizes[key][0]) / h)
+    rows = np.array([4 + k for k in mine])
+    for key, (value, unit) in sizes.items():
+        slope = np.array(slopes[key])
+        variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope) if rows.size else 0.0
+        out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
+    return out
+
+
+def confidence(features: Sequence[float], weights: Sequence[float]) -> float:
+    """Logistic of the weighted features (first weight is the constant)."""
+    z = weights[0] + float(np.dot(weights[1:], features))
+    return float(1.0 / (1.0 + np.exp(-np.clip(z, -30.0, 30.0))))
+
+
+def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftover, rival_loss: float, total_gain: float) -> list[float]:
+    """Log strength in sigma, log of what is left, log ratio of the two, log gain over the strongest other cause's,
+    share of all gain, closeness of the best alternative."""
+    count = float(found.normal.count.sum())
+    gain = max(loss_without(found, name), 1.0)
+    others = max((loss_without(found, n) for n in accepted if n != name), default=0.0)
+    strength = float(np.sqrt(gain / count))
+    left = max(rest.sigma, 0.03)
+    return [
+        float(np.log10(strength)), float(np.log10(left)), float(np.log10(max(strength / left, 1e-3))),
+        float(np.log10(min(gain / max(others, 1.0), 1e4)) if others else 4.0),
+        float(min(gain / max(total_gain, 1.0), 1.0)),
+        float(np.log10(max(rival_loss, 1.0))),
+    ]
+
+
+def on_part(fitted: Fit, record: Record, layout: Layout, noise: Noise, samples: int) -> tuple[Fit, Record]:
+    """The fit repeated on the first samples of every segment."""
+    share = max(samples // max(len(record.segments), 1), 1500)
+    if record.samples <= 1.4 * share * len(record.segments):
+        return fitted, record
+    part = record.subset(tuple(range(len(record.segments))), share)
+    return fit(fitted.model, part, layout, noise, rounds=5), part
+
+
+def setting_for(setting: Setting, record: Record) -> Setting:
+    return replace(setting, record=record)
