@@ -56,8 +56,6 @@ class Lines:
     current_influence: Vector
     voltage_influence: Vector
     supply_rad_per_s: float
-    residual_current_a: Vector
-    residual_voltage_v: Vector
 
 
 def synchronous_average(signal: Vector, sample_period_s: float, period_s: float) -> Vector:
@@ -90,42 +88,80 @@ def _zero_padded(signal: Vector, factor: int) -> Vector:
 def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> Lines:
     """All combs and the mains harmonics in one weighted least squares on the segment `part`.
 
-    Columns: the mean, e^{+-j h phi} of each comb, e^{j k theta_e} for k = +-1 ... +-supply_orders, and a cubic drift of the
-    mean (only to keep it out of the rest). Comb phases are `(n,)` over the segment.
+    Columns: the mean, cos and sin of each order of each comb and of k theta_e for k = 1 ... supply_orders, and a cubic drift
+    of the mean (only to keep it out of the rest); real columns, complex coefficients, turned into e^{+-j} pairs at the end.
+    The normal equations are summed block by block; block b's score A_b^T W r_b is then its right-hand side minus its part
+    of the matrix times the solution. Comb phases are `(n,)` over the segment.
     """
     time = frame.time_s[part]
-    count = time.size
-    window = windows.tukey(count + 2, TAPERED)[1:-1]
-    rows: list[Vector] = [np.ones(count, dtype=np.complex128)]
-    comb_index, order, rate = [-1], [0], [0.0]
-    for p, comb in enumerate(combs):
-        powers = _powers(comb.phase_rad, max(comb.orders, default=0))
-        for h in comb.orders:
-            row = powers[h - 1]
-            rows += [row, np.conj(row)]
-            comb_index += [p, p]
-            order += [h, -h]
-            rate += [2 * np.pi * h * comb.frequency_hz, -2 * np.pi * h * comb.frequency_hz]
+    window = windows.tukey(time.size + 2, TAPERED)[1:-1]
+    phases = [*(comb.phase_rad for comb in combs), frame.supply_angle_rad[part]]
+    orders = [*(comb.orders for comb in combs), tuple(range(1, supply_orders + 1))]
+    drift = _drift(time, window)
+    data = np.stack([frame.current_a[part], frame.voltage_v[part]], axis=1).view(np.float64)
+    edges = np.linspace(0, time.size, BLOCKS + 1).astype(np.int64)
+    grams, sides = [], []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        columns = _columns([phase[low:high] for phase in phases], orders, drift[:, low:high])
+        weighted = columns * window[low:high]
+        grams.append(weighted @ columns.T)
+        sides.append(weighted @ data[low:high])
+    gram, side = np.sum(grams, axis=0), np.sum(sides, axis=0)
+    solve = linalg.cho_factor(gram + 1e-12 * np.trace(gram) / gram.shape[0] * np.eye(gram.shape[0]))
+    real = linalg.cho_solve(solve, side)
+    scores = np.concatenate([s - g @ real for g, s in zip(grams, sides, strict=True)], axis=1)
+    moved = linalg.cho_solve(solve, scores).reshape(real.shape[0], BLOCKS, 4) * np.sqrt(BLOCKS / (BLOCKS - 1))
     supply = float(np.average(frame.supply_rad_per_s[part], weights=window))
-    for k, row in enumerate(_powers(frame.supply_angle_rad[part], supply_orders), start=1):
-        rows += [row, np.conj(row)]
-        comb_index += [len(combs)] * 2
-        order += [k, -k]
-        rate += [k * supply, -k * supply]
-    wanted = len(rows)
-    rows += _drift(time, window)
-    design = np.array(rows)
-    both = np.stack([frame.current_a[part], frame.voltage_v[part]])
-    weighted = np.conj(design) * window
-    gram = weighted @ design.T
-    solve = linalg.cho_factor(gram + 1e-12 * np.trace(gram).real / len(rows) * np.eye(len(rows)))
-    amplitudes = linalg.cho_solve(solve, weighted @ both.T)
-    residual = both - amplitudes.T @ design
-    influence = _influence(weighted, residual, solve)[:, :wanted]
+    rates = [*(2 * np.pi * comb.frequency_hz for comb in combs), supply]
+    comb_index, order, rate = _labels(orders, rates)
+    amplitude = _pairs(np.ascontiguousarray(real[: -DRIFT_ORDERS]).view(np.complex128), len(comb_index))
+    influence = _pairs(np.ascontiguousarray(moved[: -DRIFT_ORDERS]).view(np.complex128), len(comb_index))
     return Lines(
-        np.array(comb_index), np.array(order), np.array(rate), amplitudes[:wanted, 0], amplitudes[:wanted, 1],
-        influence[..., 0], influence[..., 1], supply, residual[0], residual[1],
+        comb_index, order, rate, amplitude[:, 0], amplitude[:, 1], influence[..., 0].T.copy(), influence[..., 1].T.copy(), supply
     )
+
+
+def residual_current(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> Vector:
+    """What `separate` leaves of the segment's current, its mean removed."""
+    lines = separate(frame, part, combs, supply_orders)
+    phases = [*(comb.phase_rad for comb in combs), frame.supply_angle_rad[part]]
+    left = frame.current_a[part] - lines.current_a[0]
+    for p, phase in enumerate(phases):
+        own = lines.comb == p
+        amplitude = dict(zip(lines.order[own].tolist(), lines.current_a[own], strict=True))
+        for h, row in enumerate(_powers(phase, max(amplitude, default=0)), start=1):
+            if h in amplitude:
+                left = left - amplitude[h] * row - amplitude[-h] * np.conj(row)
+    return left
+
+
+def _columns(phases: list[Signal], orders: list[tuple[int, ...]], drift: Signal) -> Signal:
+    """`(columns, samples)`: 1, then cos and sin of every order of every phase, then the drift."""
+    rows: list[Signal] = [np.ones(drift.shape[1])]
+    for phase, wanted in zip(phases, orders, strict=True):
+        powers = _powers(phase, max(wanted, default=0))
+        for h in wanted:
+            rows += [powers[h - 1].real, powers[h - 1].imag]
+    return np.array([*rows, *drift])
+
+
+def _labels(orders: list[tuple[int, ...]], rates: list[float]) -> tuple[NDArray[np.int64], NDArray[np.int64], Signal]:
+    """Comb, signed order and rate of each line: the mean, then +h and -h in turn."""
+    labels = [(-1, 0, 0.0)]
+    for p, (wanted, rate) in enumerate(zip(orders, rates, strict=True)):
+        labels += [(p, sign * h, sign * h * rate) for h in wanted for sign in (1, -1)]
+    comb, order, turning = zip(*labels, strict=True)
+    return np.array(comb), np.array(order), np.array(turning)
+
+
+def _pairs(real_basis: Vector, count: int) -> Vector:
+    """Coefficients of (1, cos, sin, cos, sin, ...) along the first axis as those of (1, e^+, e^-, e^+, e^-, ...)."""
+    out = np.empty((count, *real_basis.shape[1:]), dtype=np.complex128)
+    out[0] = real_basis[0]
+    cosine, sine = real_basis[1:count:2], real_basis[2:count:2]
+    out[1::2] = 0.5 * (cosine - 1j * sine)
+    out[2::2] = 0.5 * (cosine + 1j * sine)
+    return out
 
 
 def _powers(phase_rad: Signal, highest: int) -> list[Vector]:
@@ -136,25 +172,11 @@ def _powers(phase_rad: Signal, highest: int) -> list[Vector]:
     return rows
 
 
-def _drift(time: Signal, window: Signal) -> list[Vector]:
-    """Polynomials without a weighted mean, so that line 0 stays the weighted mean."""
+def _drift(time: Signal, window: Signal) -> Signal:
+    """Polynomials without a weighted mean `(orders, n)`, so that line 0 stays the weighted mean."""
     place = (time - time.mean()) / max(0.5 * (time[-1] - time[0]), 1e-9)
-    rows = []
-    for k in range(1, DRIFT_ORDERS + 1):
-        row = place**k
-        rows.append((row - np.average(row, weights=window)).astype(np.complex128))
-    return rows
-
-
-def _influence(weighted: Vector, residual: Vector, solve: tuple[Vector, bool]) -> Vector:
-    """`(blocks, lines, 2)`: G^-1 A_b^H W r_b, scaled so that the sum of outer products is the covariance."""
-    edges = np.linspace(0, residual.shape[1], BLOCKS + 1).astype(np.int64)
-    scores = np.stack([
-        weighted[:, a:b] @ residual[:, a:b].T for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ])
-    flat = np.moveaxis(scores, 1, 0).reshape(weighted.shape[0], -1)
-    solved = linalg.cho_solve(solve, flat).reshape(weighted.shape[0], BLOCKS, 2)
-    return np.asarray(np.moveaxis(solved, 0, 1) * np.sqrt(BLOCKS / (BLOCKS - 1)), dtype=np.complex128)
+    rows = [place**k for k in range(1, DRIFT_ORDERS + 1)]
+    return np.array([row - np.average(row, weights=window) for row in rows])
 
 
 def free_orders(
@@ -177,5 +199,5 @@ def keep(lines: Lines, wanted: NDArray[np.bool_]) -> Lines:
     return Lines(
         lines.comb[wanted], lines.order[wanted], lines.rate_rad_per_s[wanted], lines.current_a[wanted],
         lines.voltage_v[wanted], lines.current_influence[:, wanted], lines.voltage_influence[:, wanted],
-        lines.supply_rad_per_s, lines.residual_current_a, lines.residual_voltage_v,
+        lines.supply_rad_per_s,
     )

@@ -258,9 +258,9 @@ def _trim(lines: Lines, mains: int, circuit: TCircuit, pairs: int) -> Lines:
 
 
 def _last_order(orders: NDArray[np.int64], power: Signal, variance: Signal) -> int:
-    """The cut with the least expected error of the acceleration: the sum of order^2 (|Omega|^2 - 3 var) is largest there.
+    """The cut with the least expected error of the acceleration: the sum of order^2 (|Omega|^2 - 4 var) is largest there.
 
-    Mallows' C_p with 3 for 2, because the cut is the best of many. At least `LEAST_ORDERS`.
+    Mallows' C_p with 4 for 2, because the cut is the best of many. At least `LEAST_ORDERS`.
     """
     rank = np.argsort(orders)
     gain = np.cumsum((orders[rank] ** 2) * (power[rank] - SELECTION_PRICE * variance[rank]))
@@ -268,7 +268,7 @@ def _last_order(orders: NDArray[np.int64], power: Signal, variance: Signal) -> i
 
 
 LEAST_ORDERS = 4
-SELECTION_PRICE = 3.0
+SELECTION_PRICE = 4.0
 
 
 def _with_wobble(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.monitor import periods
-from commissioner.monitor.averaging import Comb, free_orders, separate
+from commissioner.monitor.averaging import Comb, free_orders, residual_current
 from commissioner.monitor.periods import PairSpectrum, Periodicity, ShaftSearch
 from commissioner.monitor.supply import TurningFrame
 from commissioner.records import Signal
@@ -33,7 +33,7 @@ class Found:
 
 def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[float, ...] = ()) -> Found:
     """Shaft and load periods of the segment. Loads at rational multiples of the shaft are the shaft's own comb."""
-    residual = separate(frame, part, [], SUPPLY_ORDERS).residual_current_a
+    residual = residual_current(frame, part, [], SUPPLY_ORDERS)
     highest = frame.band_hz * 0.95
     spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest)
     shaft, candidates = _find_shaft(frame, part, residual, spectrum, search)
@@ -43,7 +43,7 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
         known.append(_refined(frame, part, residual, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
     for _ in range(periods.MOST_LOADS):
         combs = [comb_of(frame, part, found, [c.frequency_hz for c in known[:k]]) for k, found in enumerate(known)]
-        left_current = separate(frame, part, combs, SUPPLY_ORDERS).residual_current_a
+        left_current = residual_current(frame, part, combs, SUPPLY_ORDERS)
         left = periods.pair_spectrum(left_current, frame.sample_period_s, highest)
         new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
         if new is None:
@@ -134,7 +134,7 @@ def _next_load(
             continue
         if periods.is_product(frequency, combs_hz, supply_hz, left.cell_hz):
             continue
-        fundamental, seen = periods.lowest_fundamental(left, frequency, combs_hz)
+        fundamental, seen = periods.lowest_fundamental(left, frequency, combs_hz, supply_hz)
         found = _refined(frame, part, residual, f"load {fundamental:.4g} Hz", fundamental, seen)
         return replace(found, name=f"load {found.frequency_hz:.4g} Hz")
     return None

@@ -77,7 +77,8 @@ def torus(lines: Lines, points_per_comb: int = 8) -> Torus:
     partner = np.array([
         int(np.flatnonzero((lines.comb == lines.comb[k]) & (lines.order == -lines.order[k]))[0]) for k in positive
     ], dtype=np.int64)
-    return Torus(basis, np.linalg.pinv(basis), positive, partner)
+    project = np.linalg.solve(np.conj(basis.T) @ basis, np.conj(basis.T))
+    return Torus(basis, project, positive, partner)
 
 
 def basis_of(lines: Lines, comb_phases_rad: Mapping[int, Signal], count: int) -> Vector:

@@ -264,10 +264,13 @@ def _line_at(spectrum: PairSpectrum, frequency_hz: Signal) -> Signal:
     return np.asarray(spectrum.power[place])
 
 
-def lowest_fundamental(spectrum: PairSpectrum, line_hz: float, known_hz: list[float]) -> tuple[float, tuple[int, ...]]:
+def lowest_fundamental(
+    spectrum: PairSpectrum, line_hz: float, known_hz: list[float], supply_hz: float
+) -> tuple[float, tuple[int, ...]]:
     """The fundamental whose harmonic `line_hz` is: line_hz / m with the largest gain of lines for its price.
 
-    Each further line below threshold costs; lines that belong to a comb already known do not count.
+    Each further line below threshold costs; lines of a comb already known, and products of such a comb with `line_hz`,
+    do not count.
     """
     best, best_gain, best_seen = line_hz, -np.inf, (1,)
     for m in range(1, 7):
@@ -279,6 +282,8 @@ def lowest_fundamental(spectrum: PairSpectrum, line_hz: float, known_hz: list[fl
         values = spectrum.at(orders * fundamental, 0.4)
         foreign = np.array([any(_is_multiple(h * fundamental, f, spectrum.cell_hz) for f in known_hz) for h in orders])
         seen = (values > VISIBLE) & ~foreign
+        for k in np.flatnonzero(seen & (orders % m != 0)):
+            seen[k] = not is_product(orders[k] * fundamental, [*known_hz, line_hz], supply_hz, spectrum.cell_hz)
         gain = np.sum(np.where(seen, np.minimum(values, CAP), 0.0)) - 6.0 * m
         if gain > best_gain + 1e-9:
             best, best_gain, best_seen = fundamental, gain, tuple(int(h) for h in orders[seen])

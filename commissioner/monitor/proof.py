@@ -69,7 +69,9 @@ def prove(
 def _periodic(basis: Vector, error: Vector, measured: Vector) -> float:
     """rms of the error's load lines over the measured ripple's."""
     count = basis.shape[0]
-    fit, *_ = np.linalg.lstsq(basis, np.stack([error, measured], axis=1), rcond=1e-6)
+    gram = np.conj(basis.T) @ basis
+    ridge = 1e-6 * count * np.eye(basis.shape[1])
+    fit = np.linalg.solve(gram + ridge, np.conj(basis.T) @ np.stack([error, measured], axis=1))
     power = np.sum(np.abs(fit) ** 2, axis=0) - np.abs(fit[0]) ** 2
     return float(np.sqrt(power[0] / power[1])) if count > basis.shape[1] and power[1] > 0 else float("nan")
 
