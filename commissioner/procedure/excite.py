@@ -382,7 +382,8 @@ class _UnderTest:
         return EstimateUpdated(
             axis_deg=self._axis_deg, time_s=self.time_s, planned_s=self._seconds,
             parameters=self._estimate.parameters.as_tuple(), std=self._estimate.std, scale=self._present_scale,
-            flux_fraction=reading.fraction, observer_flux_wb=reading.observer_wb,
+            flux_fraction=reading.fraction,
+            agreed_flux_fraction=min(reading.observer_wb, reading.model_free_wb) / self._limit_wb, observer_flux_wb=reading.observer_wb,
             model_free_flux_wb=reading.model_free_wb, residual_rms_a=self._estimate.residual_rms_a,
         )  # fmt: skip
 

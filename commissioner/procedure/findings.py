@@ -64,7 +64,11 @@ class ExcitationChosen:
 
 @dataclass(frozen=True)
 class EstimateUpdated:
-    """The observer's estimate at a time of the test; written about ten times a second of motor time."""
+    """The observer's estimate at a time of the test; written about ten times a second of motor time.
+
+    `flux_fraction` is the largest estimate or prediction, of the guard's limit; `agreed_flux_fraction` is what both flux
+    estimates have reached, which the runner's watch judges: an estimate that has not settled alone is no emergency.
+    """
 
     axis_deg: float
     time_s: float
@@ -73,6 +77,7 @@ class EstimateUpdated:
     std: tuple[float, float, float, float]
     scale: float
     flux_fraction: float
+    agreed_flux_fraction: float
     observer_flux_wb: float
     model_free_flux_wb: float
     residual_rms_a: float

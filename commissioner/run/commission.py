@@ -12,6 +12,7 @@ from typing import Any
 
 from commissioner.errors import CommissionerError
 from commissioner.link.drive_file import load_profile
+from commissioner.link.facts import Action, Intent
 from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import ModbusPort, open_port
 from commissioner.link.url import parse_url
@@ -132,7 +133,7 @@ def _carry_out(
 ) -> RunEnded:
     try:
         with _port(url, profile, plan) as port:
-            inverter = Inverter(port, profile, lambda intent: folder.journal("about_to", intent, durable=True))
+            inverter = Inverter(port, profile, lambda intent: _announce(folder, intent))
             job = _job(profile, nameplate, plan, port, write_back=write_back)
             folder.journal("job", job, durable=True)
             runner = Runner(inverter, folder, _bounds(job, profile), _watch(job, profile), present)
@@ -144,6 +145,13 @@ def _carry_out(
         ended = RunEnded(error.outcome, error.what, 0.0, error.as_dict())
         folder.journal("run_ended", ended, durable=True)
         return ended
+
+
+def _announce(folder: RunFolder, intent: Intent) -> None:
+    """Every intent is with the operating system before it is carried out, so that a kill loses none. What starts or
+    changes something lasting is on the disk, too; steering a running test is not: a slow disk must not starve the
+    watchdog."""
+    folder.journal("about_to", intent, durable=intent.action is not Action.STEER)
 
 
 def _close(

@@ -241,7 +241,7 @@ class Runner:
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):
-            self._progress.flux_fraction = record.flux_fraction
+            self._progress.flux_fraction = record.agreed_flux_fraction
         if isinstance(record, ChecksJudged):
             passed = all(result.has_passed for result in record.results)
             self._progress.facts = replace(self._progress.facts, checks_passed=passed)
