@@ -160,7 +160,7 @@ def diagnose_points(points: Points, resistance_ohm: float | None = None) -> Poin
 
 def _candidates(points: Points) -> list[_Extension]:
     if not points.is_locked:
-        return [_Extension("magnetizing_saturation", 2), _Extension("iron_loss", 1)]
+        return [_Extension("magnetizing_saturation", 2), _Extension("iron_loss", 2)]
     several = np.unique(points.frequency_hz).size > 1
     spread = float(points.current_line_a.max() / points.current_line_a.min())
     out = [_Extension("leakage_saturation", 1)] if spread > 1.3 else []
@@ -182,9 +182,9 @@ def _start(points: Points, extensions: Sequence[_Extension]) -> tuple[Array, Arr
             low += [0.0, 1.0]
             high += [50.0, 14.0]
         elif extension.name == "iron_loss":
-            start += [0.3]
-            low += [0.0]
-            high += [1e3]
+            start += [0.6, 2.0]
+            low += [0.0, 1.0]
+            high += [1.0, 6.0]
         else:
             start += [0.1]
             low += [-0.5]
@@ -222,10 +222,10 @@ def _locked(x: Array, points: Points, numbers: Mapping[str, Array], scale: Mappi
 
 
 def _no_load(x: Array, points: Points, numbers: Mapping[str, Array], scale: Mapping[str, float]) -> tuple[Array, Array]:
-    """i_m = psi/L (1 + b ((psi/psi_0)^S - 0)) and P = P_m (1 + g (e/e_0)^2) + 3 R_s I^2, e the induced voltage."""
+    """i_m = psi/L (1 + b (psi/psi_0)^S) and P = P_0 (1 - g + g (V/V_0)^n) + 3 R_s I^2."""
     stator = np.zeros(points.count) if points.resistance_ohm is None else points.resistance_ohm
     b, power = numbers.get("magnetizing_saturation", np.array([0.0, 2.0]))
-    loss = numbers.get("iron_loss", np.zeros(1))[0]
+    loss = numbers.get("iron_loss", np.array([0.0, 2.0]))
     current = points.current_line_a.copy()
     for _ in range(30):
         active = np.minimum(_loss(x, points, loss, scale) / (3.0 * points.phase_voltage_v), 0.9 * current)
@@ -238,8 +238,9 @@ def _no_load(x: Array, points: Points, numbers: Mapping[str, Array], scale: Mapp
     return current, _loss(x, points, loss, scale) + 3.0 * stator * current**2
 
 
-def _loss(x: Array, points: Points, loss: float, scale: Mapping[str, float]) -> Array:
-    return np.asarray(np.exp(x[0]) * (1.0 + loss * (points.phase_voltage_v / scale["voltage_v"]) ** 2))
+def _loss(x: Array, points: Points, loss: Array, scale: Mapping[str, float]) -> Array:
+    grown = (points.phase_voltage_v / scale["voltage_v"]) ** loss[1]
+    return np.asarray(np.exp(x[0]) * (1.0 - loss[0] + loss[0] * grown))
 
 
 def _scale(points: Points) -> dict[str, float]:
@@ -358,7 +359,10 @@ def _sizes(
         return {"resistance_rise_over_range": (float(x[0] * rise), float(spread[0] * rise), "1")}
     if name == "magnetizing_saturation":
         return {"extra_current_at_highest_flux": (float(x[0]), float(spread[0]), "1"), "exponent": (float(x[1]), float(spread[1]), "1")}
-    return {"loss_at_highest_voltage_over_constant_loss": (float(x[0]), float(spread[0]), "1")}
+    return {
+        "share_of_loss_growing_with_flux": (float(x[0]), float(spread[0]), "1"),
+        "exponent": (float(x[1]), float(spread[1]), "1"),
+    }
 
 
 def _parameters(points: Points, x: Array, covariance: Array) -> dict[str, Quantity]:
@@ -366,7 +370,7 @@ def _parameters(points: Points, x: Array, covariance: Array) -> dict[str, Quanti
     first, second = float(np.exp(x[0])), float(np.exp(x[1]))
     if not points.is_locked:
         return {
-            "constant_loss_w": Quantity(first, first * float(spread[0])),
+            "loss_at_highest_voltage_w": Quantity(first, first * float(spread[0])),
             "stator_inductance_h": Quantity(second, second * float(spread[1])),
         }
     name = "rotor_resistance_ohm" if points.resistance_ohm is not None else "total_resistance_ohm"
