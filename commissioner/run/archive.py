@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from commissioner.errors import UsageError
+from commissioner.errors import DataRefused, UsageError
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import write_table
 from commissioner.records import SampleBlock
@@ -41,9 +41,9 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._records = _drop_torn_line(path / "journal.jsonl")
         self._journal = (path / "journal.jsonl").open("a", encoding="utf-8")
         self._blocks: BinaryIO = (path / "blocks.bin").open("ab", buffering=0)
-        self._records = 0
 
     @classmethod
     def create(cls, root: Path, label: str) -> RunFolder:
@@ -109,29 +109,52 @@ def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path |
 
 
 def read_blocks(path: Path) -> Iterator[tuple[int, SampleBlock]]:
-    """(segment, block) in order, up to the first torn record."""
+    """(segment, block) in order, up to the first torn record. DataRefused: a whole record that holds no block."""
     if not path.is_file():
         return
+    length = path.stat().st_size
     with path.open("rb") as file:
         while len(head := file.read(_RECORD.size)) == _RECORD.size:
             mark, size, check = _RECORD.unpack(head)
+            if mark != _MARK or size > length - file.tell():
+                return
             payload = file.read(size)
-            if mark != _MARK or len(payload) != size or zlib.crc32(payload) != check:
+            if zlib.crc32(payload) != check:
                 return
             yield _decode(payload)
 
 
 def read_journal(path: Path) -> list[dict[str, Any]]:
-    """The journal's records, up to the first line that is not whole."""
+    """The journal's records, up to the first line that is not a whole one."""
     records: list[dict[str, Any]] = []
     if not path.is_file():
         return records
-    for line in path.read_text("utf-8", errors="replace").splitlines():
-        try:
-            records.append(json.loads(line))
-        except json.JSONDecodeError:
+    for line in path.read_text("utf-8", errors="replace").split("\n"):
+        record = read_document(line)
+        if not isinstance(record.get("kind"), str) or "record" not in record:
             break
+        records.append(record)
     return records
+
+
+def read_document(text: str) -> dict[str, Any]:
+    """The JSON object in `text`; empty where it holds none, or one nested deeper than any of ours."""
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _drop_torn_line(path: Path) -> int:
+    """Cut off what a power loss left of a last line, so that what is added can be read; the number of whole lines."""
+    if not path.is_file():
+        return 0
+    data = path.read_bytes()
+    whole = data.rfind(b"\n") + 1
+    if whole < len(data):
+        os.truncate(path, whole)
+    return data.count(b"\n")
 
 
 def plain(value: Any) -> Any:
@@ -175,8 +198,13 @@ def _encode(block: SampleBlock, segment: int) -> bytes:
 
 
 def _decode(payload: bytes) -> tuple[int, SampleBlock]:
+    if len(payload) < _HEADER.size:
+        raise _no_block(len(payload), f"at least {_HEADER.size} bytes")
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
-    signals = np.frombuffer(payload, "<f8", offset=_HEADER.size).reshape(-1, count).astype(np.float64)
+    channels = 4 if flags & _HAS_W else 3
+    if len(payload) != _HEADER.size + 8 * channels * count:
+        raise _no_block(len(payload), f"{channels} signals of {count} samples")
+    signals = np.frombuffer(payload, "<f8", offset=_HEADER.size).reshape(channels, count).astype(np.float64)
     return segment, SampleBlock(
         session=session,
         first_index=first,
@@ -190,3 +218,10 @@ def _decode(payload: bytes) -> tuple[int, SampleBlock]:
         lost_before=lost,
         clipped=bool(flags & _CLIPPED),
     )
+
+
+def _no_block(size: int, expected: str) -> DataRefused:
+    return DataRefused(
+        "the archived samples are not this program's", step="read the archive", value=f"{size} bytes", limit=expected,
+        remedy="use the run folder as the run left it",
+    )  # fmt: skip

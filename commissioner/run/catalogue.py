@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from commissioner.errors import UsageError
-from commissioner.run.archive import read_journal
+from commissioner.run.archive import read_document, read_journal
 
 
 @dataclass(frozen=True)
@@ -51,50 +50,56 @@ def find_run(root: Path, name: str) -> RunSummary:
 def summarise(folder: Path) -> RunSummary:
     """The run in `folder`, from its result if it has one, else from its journal."""
     records = read_journal(folder / "journal.jsonl")
-    result = _result(folder)
-    end = next((r["record"] for r in reversed(records) if r["kind"] == "run_ended"), None)
-    outcome, reason = (end["outcome"], end["reason"]) if end else ("cut off", _last_state(records))
+    end: dict[str, Any] = next(reversed(_of(records, "run_ended")), {})
     return RunSummary(
         run=folder.name,
         folder=str(folder),
-        outcome=outcome,
-        reason=reason,
+        outcome=str(end.get("outcome", "cut off")),
+        reason=str(end.get("reason", _last_state(records))),
         drive=_drive(records),
-        energised_s=float(end["energised_s"]) if end else 0.0,
+        energised_s=_seconds(end.get("energised_s")),
         written=_written(records),
-        result=result,
+        result=_result(folder),
     )
+
+
+def _of(records: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    """What was journalled as `kind`, in order."""
+    return [line["record"] for line in records if line["kind"] == kind and isinstance(line["record"], dict)]
+
+
+def _seconds(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else 0.0
 
 
 def _result(folder: Path) -> dict[str, Any] | None:
     path = folder / "result.json"
-    if not path.is_file():
-        return None
-    document: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return document
+    return (read_document(path.read_text("utf-8", errors="replace")) or None) if path.is_file() else None
 
 
 def _drive(records: list[dict[str, Any]]) -> str:
-    for record in records:
-        if record["kind"] == "drive_identified":
-            found = record["record"]
-            return f"{found['drive_type']} #{found['serial_number']}"
+    for found in _of(records, "drive_identified"):
+        return f"{found.get('drive_type')} #{found.get('serial_number')}"
     return "not identified"
 
 
 def _last_state(records: list[dict[str, Any]]) -> str:
-    states = [r["record"]["state"] for r in records if r["kind"] == "state_entered"]
+    states = [record.get("state") for record in _of(records, "state_entered")]
     return f"the service ended while {states[-1]}" if states else "the service ended before it connected"
 
 
 def _written(records: list[dict[str, Any]]) -> str:
-    """Old, new, or unknown: judged by what was announced and what was confirmed."""
-    kinds = [r["kind"] for r in records]
-    if "parameters_written" in kinds:
-        return "new, read back and stored"
-    announced = {r["record"]["action"] for r in records if r["kind"] == "about_to"}
-    if not announced & {"stage", "commit", "store"}:
-        return "as before"
-    if "snapshot_restored" in kinds:
-        return "as before (restored)"
-    return "old or new: read the drive, or `commissioner restore` this run"
+    """Old, new, or unknown: the last announcement or confirmation in the journal decides."""
+    said = "as before"
+    for line in records:
+        if line["kind"] == "parameters_written":
+            said = "new, read back and stored"
+        elif line["kind"] == "snapshot_restored":
+            said = "as before (restored)"
+        elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
+            said = "old or new: read the drive, or `commissioner restore` this run"
+    return said
+
+
+def _touches_parameters(intent: Any) -> bool:
+    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store")

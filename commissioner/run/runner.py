@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any
 
-from commissioner.errors import Aborted, CommissionerError, DriveFault
+from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
 from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
@@ -192,7 +192,12 @@ class Runner:
 
     def _write(self, values: Mapping[str, float]) -> tuple[WrittenParameter, ...]:
         assert self._snapshot is not None
-        report = self._inverter.write_parameters(values, self._snapshot)
+        try:
+            report = self._inverter.write_parameters(values, self._snapshot)
+        except WriteBackFailed as failed:
+            if failed.was_restored:
+                self._folder.journal("snapshot_restored", failed.as_dict(), durable=True)
+            raise
         self._folder.journal("parameters_written", report, durable=True)
         self._present(ParametersWritten(report.written, report.store_count_after, report.wear_fraction))
         return report.written

@@ -53,6 +53,8 @@ from tests.support.sim_process import SimProcess
 
 LONGEST_RUN_S = 60.0
 PROFILE = "simulated"
+WHOLE_RUN_ATTEMPTS = 5
+"""A busy machine can miss the short reply time-out of these runs."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,18 @@ class Scene:
 
     def __init__(self, sim: SimProcess, nvm: Path, root: Path) -> None:
         self.sim, self.nvm, self.root, self.number = sim, nvm, root, 0
+        self._entries: list[truth.Entry] = []
+        self._read_up_to = 0
+
+    def log(self) -> list[truth.Entry]:
+        """The simulator's log so far; read on from where the last reading ended."""
+        with self.sim.log_file.open("rb") as file:
+            file.seek(self._read_up_to)
+            fresh = file.read()
+        whole = fresh[: fresh.rfind(b"\n") + 1]
+        self._read_up_to += len(whole)
+        self._entries += [json.loads(line) for line in whole.splitlines()]
+        return self._entries
 
     def run(self, moment: Moment | None) -> tuple[Path, Path, float]:
         """One victim to its end: (archive, ledger, wall time of its end)."""
@@ -175,20 +189,20 @@ class Scene:
 
     def kill(self, moment: Moment) -> Killed:
         """One victim killed, judged and cleared away."""
-        before = len(self.sim.log())
+        before = len(self.log())
         runs, ledger, ended = self.run(moment)
         killed = Killed(moment)
         self._await_death(killed, before, ended)
         killed.broken += self._broken_archive(killed, runs, ledger)
         killed.broken += self._broken_parameters(killed, runs, before)
-        self._clear()
+        self.clear()
         return killed
 
     def _await_death(self, killed: Killed, before: int, ended: float) -> None:
         deadline = time.monotonic() + WATCHDOG_S + 1.0
-        while truth.is_energised(self.sim.log()[before:]) and time.monotonic() < deadline:
+        while truth.is_energised(self.log()[before:]) and time.monotonic() < deadline:
             time.sleep(0.01)
-        for _, end in truth.sessions(self.sim.log()[before:]):
+        for _, end in truth.sessions(self.log()[before:]):
             if end is None:
                 killed.broken.append("still energised a second after the watchdog's time")
             elif end["wall"] > ended - 0.005:
@@ -219,7 +233,7 @@ class Scene:
         with self._inverter() as inverter:
             inverter.snapshot()  # waits for a commit or store that the victim had started
         yield from self._mixture()
-        killed.held = self._held()
+        killed.held = self.held()
         if summary is None:
             if killed.held != ("old", "old"):
                 yield f"a run without a folder left {killed.held}"
@@ -227,19 +241,19 @@ class Scene:
         killed.written = summary.written
         yield from _broken_words(summary, killed.held)
         if not (Path(summary.folder) / "snapshot.json").is_file():
-            if any(w["item"].startswith(truth.PARAMETER_ITEMS) for w in truth.of(self.sim.log()[before:], "write")):
+            if any(w["item"].startswith(truth.PARAMETER_ITEMS) for w in truth.of(self.log()[before:], "write")):
                 yield "parameters were written without a snapshot"
             return
         restore(summary, self.sim.url)
         killed.was_restored = True
-        if self._held() != ("old", "old"):
-            yield f"after restore the drive holds {self._held()}"
+        if self.held() != ("old", "old"):
+            yield f"after restore the drive holds {self.held()}"
         again = self._summary(runs)
         if again is not None and not again.written.startswith("as before"):
             yield f"after restore the archive says {again.written!r}"
 
-    def _held(self) -> tuple[str, str]:
-        in_use, stored = truth.parameters(self.sim.log())
+    def held(self) -> tuple[str, str]:
+        in_use, stored = truth.parameters(self.log())
         content = json.loads(self.nvm.read_text("utf-8"))["content"]
         if list(content["parameters"]) != list(stored):
             return truth.which_set(in_use, OLD_ON_THE_WIRE, NEW_ON_THE_WIRE), "not what was logged"
@@ -247,8 +261,8 @@ class Scene:
         return both[0], both[1]
 
     def _mixture(self) -> Iterator[str]:
-        if not set(self._held()) <= {"old", "new"}:
-            yield f"the drive holds {self._held()}: {truth.parameters(self.sim.log())}"
+        if not set(self.held()) <= {"old", "new"}:
+            yield f"the drive holds {self.held()}: {truth.parameters(self.log())}"
 
     def _summary(self, runs: Path) -> RunSummary | None:
         return find_run(runs, "last") if runs.is_dir() and any(runs.glob("*/journal.jsonl")) else None
@@ -259,12 +273,12 @@ class Scene:
         with contextlib.closing(open_port(parse_url(self.sim.url), profile)) as port:
             yield Inverter(port, profile)
 
-    def _clear(self) -> None:
+    def clear(self) -> None:
         """The next victim finds the drive without a fault and with its old parameters."""
         with self._inverter() as inverter:
             inverter.reset_fault()
-        if self._held() != ("old", "old"):
-            raise AssertionError(f"the scene cannot be cleared: {self._held()}")
+        if self.held() != ("old", "old"):
+            raise AssertionError(f"the scene cannot be cleared: {self.held()}")
 
 
 def _broken_words(summary: RunSummary, held: tuple[str, str]) -> Iterator[str]:
@@ -296,13 +310,17 @@ def scene(wire: str, seed: int) -> Iterator[Scene]:
 
 def counts_of_a_whole_run(stage: Scene) -> dict[str, float]:
     """How many records, requests and seconds a run has that nobody kills; the drive is as before afterwards."""
-    began = time.time()
-    runs, ledger, ended = stage.run(None)
-    line = next(line for line in ledger.read_text("utf-8").splitlines() if line.startswith("counts "))
-    summary = find_run(runs, "last")
-    if summary.outcome != "commissioned" or stage._held() != ("new", "new"):
-        raise AssertionError(f"the run without a kill ended as {summary.outcome}: {summary.reason}, {stage._held()}")
+    for _ in range(WHOLE_RUN_ATTEMPTS):
+        began = time.time()
+        runs, ledger, ended = stage.run(None)
+        summary = find_run(runs, "last")
+        if summary.outcome == "commissioned":
+            break
+        stage.clear()
+    if summary.outcome != "commissioned" or stage.held() != ("new", "new"):
+        raise AssertionError(f"the run without a kill ended as {summary.outcome}: {summary.reason}, {stage.held()}")
     restore(summary, stage.sim.url)
+    line = next(line for line in ledger.read_text("utf-8").splitlines() if line.startswith("counts "))
     return json.loads(line.removeprefix("counts ")) | {"time": ended - began}
 
 

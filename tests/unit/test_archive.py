@@ -9,6 +9,7 @@ import pytest
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive import RunFolder, plain, read_blocks, read_journal, write_recording
+from commissioner.run.catalogue import summarise
 
 
 def _block(first: int, count: int = 29, *, lost: int = 0, with_w: bool = True) -> SampleBlock:
@@ -99,3 +100,36 @@ def test_json_never_holds_nan_or_arrays():
         json.dumps(plain({"a": np.array([1.0, np.inf]), "b": np.float64(2)}), allow_nan=False)
         == '{"a": [1.0, null], "b": 2.0}'
     )
+
+
+def test_what_is_added_after_a_torn_line_can_be_read(folder):
+    folder.journal("a", 1)
+    folder.close()
+    path = folder.path / "journal.jsonl"
+    path.write_text(path.read_text() + '{"n": 1, "ki')
+    again = RunFolder(folder.path)
+    again.journal("b", 2)
+    again.close()
+    assert [(r["n"], r["kind"]) for r in read_journal(path)] == [(0, "a"), (1, "b")]
+
+
+def intent(action):
+    return {"action": action, "values": {}}
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ([], "as before"),
+        ([("about_to", intent("energise"))], "as before"),
+        ([("about_to", intent("stage"))], "old or new"),
+        ([("about_to", intent("commit")), ("parameters_written", {})], "new"),
+        ([("about_to", intent("store")), ("snapshot_restored", {})], "as before (restored)"),
+        ([("about_to", intent("store")), ("parameters_written", {}), ("about_to", intent("stage"))], "old or new"),
+        ([("parameters_written", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
+    ],
+)
+def test_the_last_word_of_the_journal_says_which_parameters_the_drive_holds(folder, lines, says):
+    for kind, record in lines:
+        folder.journal(kind, record)
+    assert summarise(folder.path).written.startswith(says)
