@@ -117,6 +117,33 @@ def identify(
     verb(files, motor=motor, estimator=estimator, as_json=json)
 
 
+@app.command()
+def monitor(
+    file: Annotated[
+        Path, typer.Argument(help="Recording of a running motor: three currents, three voltages, fixed rate.")
+    ],
+    motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for waveforms and the report.")] = None,
+    baseline: Annotated[
+        Path | None, typer.Option("--baseline", help="Baseline of this machine to compare with.")
+    ] = None,
+    learn: Annotated[bool, typer.Option("--learn", help="Add this recording to the baseline.")] = False,
+    start: Annotated[Path | None, typer.Option("--start", help="Result of a commissioning run, to start from.")] = None,
+    load_hz: Annotated[
+        list[float] | None, typer.Option("--load-hz", help="A known load frequency; repeatable.")
+    ] = None,
+    inertia: Annotated[float | None, typer.Option("--inertia", help="Total inertia in kg m2, for load torque.")] = None,
+    json: Json = False,
+) -> None:
+    """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
+    from commissioner.cli.monitor import monitor as verb
+
+    verb(
+        file, motor=motor, out=out, baseline=baseline, learn=learn, start=start, load_hz=tuple(load_hz or ()),
+        inertia=inertia, as_json=json,
+    )  # fmt: skip
+
+
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
