@@ -77,27 +77,56 @@ def play(
 
     `steady_load`: constant (N m), per speed (N m s), per speed squared (N m s2).
     """
-    count = int(round(duration_s / sample_period_s))
-    settle = int(round(settle_s / sample_period_s))
+    count = round(duration_s / sample_period_s)
+    settle = round(settle_s / sample_period_s)
     substeps = max(2, int(np.ceil(sample_period_s / 70e-6)))
     tables = np.array([load.torque_nm for load in loads]) if loads else np.zeros((0, 2))
     turning = np.array([[load.turns_per_shaft_turn, load.turns_per_s, load.start] for load in loads]).reshape(-1, 3)
-    circuit = np.array([
-        machine.pole_pairs, machine.stator_resistance_ohm, machine.rotor_resistance_ohm,
-        machine.stator_leakage_h + machine.magnetizing_inductance_h,
-        machine.rotor_leakage_h + machine.magnetizing_inductance_h, machine.magnetizing_inductance_h,
-        machine.inertia_kg_m2, machine.rotor_slots, machine.slot_modulation, machine.eccentricity,
-    ], dtype=np.float64)
-    mains = np.array([
-        supply.amplitude_v, 2 * np.pi * supply.frequency_hz, supply.unbalance, supply.unbalance_angle_rad,
-        supply.fifth, supply.seventh, 2 * np.pi * supply.drift_ramp_hz_per_s, 2 * np.pi * supply.drift_wave_hz,
-        supply.drift_wave_rad_per_s, supply.drift_wave_angle_rad, supply.sag, supply.sag_rad_per_s,
-    ])
+    circuit = np.array(
+        [
+            machine.pole_pairs,
+            machine.stator_resistance_ohm,
+            machine.rotor_resistance_ohm,
+            machine.stator_leakage_h + machine.magnetizing_inductance_h,
+            machine.rotor_leakage_h + machine.magnetizing_inductance_h,
+            machine.magnetizing_inductance_h,
+            machine.inertia_kg_m2,
+            machine.rotor_slots,
+            machine.slot_modulation,
+            machine.eccentricity,
+        ],
+        dtype=np.float64,
+    )
+    mains = np.array(
+        [
+            supply.amplitude_v,
+            2 * np.pi * supply.frequency_hz,
+            supply.unbalance,
+            supply.unbalance_angle_rad,
+            supply.fifth,
+            supply.seventh,
+            2 * np.pi * supply.drift_ramp_hz_per_s,
+            2 * np.pi * supply.drift_wave_hz,
+            supply.drift_wave_rad_per_s,
+            supply.drift_wave_angle_rad,
+            supply.sag,
+            supply.sag_rad_per_s,
+        ]
+    )
     synchronous = 2 * np.pi * supply.frequency_hz / machine.pole_pairs
-    start = np.array([0.0, -supply.amplitude_v / (2 * np.pi * supply.frequency_hz), 0.0,
-                      -supply.amplitude_v / (2 * np.pi * supply.frequency_hz), synchronous * (1 - start_slip), 0.0])
-    raw = _march(circuit, mains, tables, turning, np.array(steady_load), start, -settle, count, sample_period_s,
-                 substeps)
+    start = np.array(
+        [
+            0.0,
+            -supply.amplitude_v / (2 * np.pi * supply.frequency_hz),
+            0.0,
+            -supply.amplitude_v / (2 * np.pi * supply.frequency_hz),
+            synchronous * (1 - start_slip),
+            0.0,
+        ]
+    )
+    raw = _march(
+        circuit, mains, tables, turning, np.array(steady_load), start, -settle, count, sample_period_s, substeps
+    )
     alpha_beta = raw[:, :4]
     return Played(
         time_s=np.arange(count) * sample_period_s,
@@ -146,7 +175,7 @@ def _slope(circuit, mains, tables, turning, steady, t, x, out):
     pairs, r_s, r_r, l_s, l_r, l_m, inertia, slots, slot_part, bend = circuit
     speed, angle = x[4], x[5]
     c, s = np.cos(pairs * angle), np.sin(pairs * angle)
-    rotor_a = c * x[2] - s * x[3]                       # rotor fluxes seen from the stator
+    rotor_a = c * x[2] - s * x[3]  # rotor fluxes seen from the stator
     rotor_b = s * x[2] + c * x[3]
     det = l_s * l_r - l_m * l_m
     leak_s, leak_r = l_s - l_m, l_r - l_m

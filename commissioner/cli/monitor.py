@@ -57,7 +57,9 @@ def monitor(
         from commissioner.recordings.monitored import write_results
         from commissioner.report.monitor_page import page_of
 
-        document["files"] = write_results(out, seen, page_of(seen, made, indicators, verdict, history, document, file.name))
+        document["files"] = write_results(
+            out, seen, page_of(seen, made, indicators, verdict, history, document, file.name)
+        )
     if as_json:
         emit(document)
     else:
@@ -72,7 +74,11 @@ def refuse(seen: Refused, file: Path, document: dict[str, Any], as_json: bool) -
 
     reason = seen.reason
     error = DataRefused(
-        f"{file}: {reason.what}", step=f"audit ({reason.code})", value=reason.value, limit=reason.limit, remedy=reason.remedy
+        f"{file}: {reason.what}",
+        step=f"audit ({reason.code})",
+        value=reason.value,
+        limit=reason.limit,
+        remedy=reason.remedy,
     )
     if as_json:
         emit(document | {"error": error.as_dict()})
@@ -92,26 +98,64 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
     rows = [
         ("mean speed", quantity(seen.mean_speed_rad_per_s * rpm, seen.mean_speed_std * rpm, "1/min")),
         ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
-        ("speed within the period", f"± {0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * rpm:.3g} 1/min "
-                                   f"(std {document['waveforms']['speed_rms_std_rad_per_s'] * rpm:.2g})"),
+        (
+            "speed within the period",
+            f"± {0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * rpm:.3g} 1/min "
+            f"(std {document['waveforms']['speed_rms_std_rad_per_s'] * rpm:.2g})",
+        ),
     ]
     if period.load_torque_nm is not None:
-        rows.append(("load torque", f"{period.load_torque_nm.min():.3g} ... {period.load_torque_nm.max():.3g} N m "
-                                   f"(std {document['waveforms']['load_torque']['rms_std_nm']:.2g})"))
+        rows.append(
+            (
+                "load torque",
+                f"{period.load_torque_nm.min():.3g} ... {period.load_torque_nm.max():.3g} N m "
+                f"(std {document['waveforms']['load_torque']['rms_std_nm']:.2g})",
+            )
+        )
     else:
         rows.append(("load torque", "not given: the inertia is unknown (inertia_kg_m2 or --inertia)"))
     rows.append(("currents re-simulated to", f"{seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)"))
     out.print(table("", ("", ""), rows))
-    out.print(table("Periods", ("what", "Hz", "of the shaft", "speed ripple", "follows"), [
-        (p.name, quantity(p.frequency_hz, p.frequency_std_hz, ""), f"{p.ratio_to_shaft:.4f}",
-         f"{p.speed_ripple_rad_per_s * rpm:.3g} 1/min rms", p.follows) for p in seen.load_periods
-    ], right=(1, 2, 3)))
-    names = {"stator_resistance_ohm": "R_s", "rotor_resistance_ohm": "R_R", "leakage_inductance_h": "L_sigma",
-             "magnetizing_inductance_h": "L_M"}
-    out.print(table(f"Motor (inverse-Gamma; start: {seen.start.origin})", ("", ""), [
-        (short, quantity(document["parameters"][key]["value"] * scale, document["parameters"][key]["std"] * scale, unit))
-        for (key, short), (scale, unit) in zip(names.items(), ((1, "ohm"), (1, "ohm"), (1e3, "mH"), (1e3, "mH")), strict=True)
-    ]))
+    out.print(
+        table(
+            "Periods",
+            ("what", "Hz", "of the shaft", "speed ripple", "follows"),
+            [
+                (
+                    p.name,
+                    quantity(p.frequency_hz, p.frequency_std_hz, ""),
+                    f"{p.ratio_to_shaft:.4f}",
+                    f"{p.speed_ripple_rad_per_s * rpm:.3g} 1/min rms",
+                    p.follows,
+                )
+                for p in seen.load_periods
+            ],
+            right=(1, 2, 3),
+        )
+    )
+    names = {
+        "stator_resistance_ohm": "R_s",
+        "rotor_resistance_ohm": "R_R",
+        "leakage_inductance_h": "L_sigma",
+        "magnetizing_inductance_h": "L_M",
+    }
+    out.print(
+        table(
+            f"Motor (inverse-Gamma; start: {seen.start.origin})",
+            ("", ""),
+            [
+                (
+                    short,
+                    quantity(
+                        document["parameters"][key]["value"] * scale, document["parameters"][key]["std"] * scale, unit
+                    ),
+                )
+                for (key, short), (scale, unit) in zip(
+                    names.items(), ((1, "ohm"), (1, "ohm"), (1e3, "mH"), (1e3, "mH")), strict=True
+                )
+            ],
+        )
+    )
     out.print(document["cannot_be_fixed"]["sentence"])
     for finding in seen.findings:
         if finding.kind == "corrected" or (finding.kind == "note" and finding.code != "frequency_wander"):

@@ -6,6 +6,7 @@ new stretch with a free state), nothing is filled in silently.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -196,7 +197,7 @@ def _pieces(
     turns = np.flatnonzero(np.diff(axis) != 0) + 1
     bounds = np.unique(np.r_[0, cuts, turns, time.shape[0]])
     out = []
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in itertools.pairwise(bounds):
         inner = slice(part.start + int(begin), part.start + int(end))
         out.append(_bridge(
             Segment(

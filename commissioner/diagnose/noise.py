@@ -129,7 +129,7 @@ def _from_repeated_periods(record: Record) -> list[Array]:
         lag = command_period(segment)
         if lag is None or segment.count < 3 * lag:
             continue
-        settled = segment.currents_a[:, lag:] if segment.count >= 4 * lag else segment.currents_a[:, lag:]
+        settled = segment.currents_a[:, lag:]
         n = 2 * lag * ((settled.shape[1]) // (2 * lag))
         blocks = settled[:, :n].reshape(settled.shape[0], -1, 2, lag)
         difference = (blocks[:, :, 0] - blocks[:, :, 1]) / np.sqrt(2.0)

@@ -53,7 +53,8 @@ class Segment:
         """The segment cut after so many samples."""
         return Segment(
             self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
-            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid, self.flux_before_wb,
+            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
+            self.flux_before_wb,
         )
 
 

@@ -30,7 +30,7 @@ from commissioner.identify.batch import (
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.compensation import NOTHING, Compensation
 from commissioner.identify.observer import PRIOR_LOG_STD, BlockEstimate, ParallelObserver, StoredBlock
-from commissioner.identify.resistance import DcLevel, InverterError, Staircase, fit_staircase
+from commissioner.identify.resistance import DcLevel, InverterError, Staircase, fit_staircase, knee_shape
 from commissioner.identify.whiteness import Whiteness, whiteness
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, ParameterBox, RatedFlux, prior, rated_flux
@@ -46,6 +46,7 @@ UNKNOWN_STATE_LOG_STD = 0.03
 """How well parameters must be known before an unknown initial state is estimated beside them."""
 BLOCK = 500
 EXCITED, EXCITED_WINDOW_S = 0.3, 0.2
+KNEES_TRIED, TAILS_TRIED = (0.4, 1.0, 2.5), (1.2, 3.0)
 COARSE = 0.03  # of a standard error, while models are compared
 KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Knots of the leg error, in fractions of the largest current; beyond the last it has a hyperbolic tail."""
@@ -343,7 +344,10 @@ def _select(segments: Sequence[Segment], period_s: float, start: InverseGamma, l
     largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
     knots = tuple(f * largest for f in KNOT_FRACTIONS)
     model = ModelChoice(knots_a=knots if leg else ())
-    best = fit_segments(segments, period_s, start, model, start_theta(start, model, leg), tolerance=COARSE)
+    theta = start_theta(start, model, leg)
+    if leg:
+        theta = _behind_a_knee(segments, period_s, start, leg, model)
+    best = fit_segments(segments, period_s, start, model, theta, tolerance=COARSE)
     model = replace(model, flux_scale_wb=best.peak_flux_wb)
     best, tried = replace(best, model=model), {model}
     while True:
@@ -363,6 +367,23 @@ def _select(segments: Sequence[Segment], period_s: float, start: InverseGamma, l
         if not better:
             return fit_segments(segments, period_s, start, best.model, best.theta)
         best = min(better, key=lambda t: t.criterion())
+
+
+def _behind_a_knee(
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError, model: ModelChoice
+) -> Matrix:
+    """A start for the free leg error: the motor behind a few knee shapes around the staircase's, one factor free each.
+
+    Motor and free knots together, from afar, end in each other's place; the staircase says little about the knee itself.
+    """
+    knee_a = max(leg.knee_a, 1e-3 * model.knots_a[-1])
+    shapes = [leg, *(knee_shape(leg.plateau_v, k * knee_a, n) for k in KNEES_TRIED for n in TAILS_TRIED)]
+    fits = []
+    for shape in shapes:
+        unit = ModelChoice(leg_shape=shape)
+        theta = start_theta(start, unit, shape)
+        fits.append(fit_segments(segments, period_s, start, unit, theta, max_iterations=12, tolerance=0.3))
+    return extended(min(fits, key=lambda f: f.sum_of_squares), model)
 
 
 def _loses_voltage(fit: BatchFit) -> bool:

@@ -28,6 +28,7 @@ from commissioner.records import Signal
 Matrix = NDArray[np.float64]
 TABLE_ROWS = 2049
 SCORE_BLOCK_S = 0.25
+FALL_OF_LEG = 0.05
 WIDEST = 50.0
 """A circuit value may move by this factor from its start: data that want more do not determine it."""
 CIRCUIT, DELAY, SHARED, OWN = output_error.CIRCUIT, output_error.DELAY, output_error.SHARED, output_error.OWN
@@ -57,6 +58,8 @@ class ModelChoice:
     knots_a: tuple[float, ...] = ()
     with_delay: bool = False
     with_offset: bool = True
+    leg_shape: InverterError | None = None
+    """Where given, the leg error is this curve times one factor instead of free values at knots."""
 
     @property
     def size(self) -> int:
@@ -64,14 +67,20 @@ class ModelChoice:
 
     @property
     def leg_size(self) -> int:
+        if self.leg_shape is not None:
+            return 1
         return len(self.knots_a) + 1 if self.knots_a else 0
 
     def leg_points(self) -> Signal:
         """Currents at which a leg error is tabulated: the knots, then the tail to 30 times the last."""
+        if self.leg_shape is not None:
+            return np.array(self.leg_shape.current_a)
         return np.concatenate([[0.0], self.knots_a, self.knots_a[-1] * np.geomspace(1.15, 30.0, 14)])
 
     def leg_basis(self) -> Matrix:
         """(points, coefficients): leg voltage at `leg_points` per unit of each coefficient."""
+        if self.leg_shape is not None:
+            return np.array(self.leg_shape.voltage_v)[:, None]
         points, count = self.leg_points(), len(self.knots_a)
         basis = np.zeros((points.size, count + 1))
         basis[1 : count + 1, :count] = np.eye(count)
@@ -81,6 +90,8 @@ class ModelChoice:
 
     def leg_coefficients(self, leg: InverterError) -> Matrix:
         """The coefficients that come nearest to a leg error known otherwise."""
+        if self.leg_shape is not None:
+            return np.array([leg.plateau_v / self.leg_shape.plateau_v])
         knots = np.array(self.knots_a)
         at_knots = leg.leg_voltage_v(knots)
         far = leg.leg_voltage_v(knots[-1:] * 4.0)[0]
@@ -158,7 +169,7 @@ class BatchFit:
 
     def inverter(self) -> InverterError | None:
         """The leg error at its knots, None where it was not fitted."""
-        if not self.model.knots_a:
+        if not self.model.leg_size:
             return None
         start = SHARED + self.model.extra_powers
         basis = self.model.leg_basis()
@@ -254,7 +265,7 @@ class _Problem:
 
     def _basis(self, axis_deg: float) -> Matrix:
         """(rows, coefficients): the axis voltage that a unit of each leg coefficient makes, over the axis current."""
-        if not self.model.knots_a:
+        if not self.model.leg_size:
             return np.zeros((TABLE_ROWS, 0))
         points = tuple(self.model.leg_points().tolist())
         grid = np.linspace(0.0, self.current_span_a, TABLE_ROWS)
@@ -361,13 +372,20 @@ class _Problem:
         normal[np.diag_indices_from(normal)] += damping + 1e-12
         step = np.zeros(self.total)
         step[free] = np.linalg.solve(normal, at.score[free] / scale) / scale
-        relative = np.max(np.abs(step[:CIRCUIT]) / theta[:CIRCUIT])
-        return np.asarray(step * min(1.0, 0.5 / max(float(relative), 1e-300)))
+        relative = float(np.max(np.abs(step[:CIRCUIT]) / theta[:CIRCUIT]))
+        leg = slice(SHARED + self.model.extra_powers, self.model.size)
+        if self.model.leg_size:
+            relative = max(relative, float(np.max(np.abs(step[leg]))) / max(float(np.max(np.abs(theta[leg]))), 1e-2))
+        return np.asarray(step * min(1.0, 0.5 / max(relative, 1e-300)))
 
     def apply(self, theta: Matrix, own: Matrix, step: Matrix) -> tuple[Matrix, Matrix]:
         new_theta = theta + step[: self.model.size]
         new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *self.bounds)
         new_theta[DELAY] = float(np.clip(new_theta[DELAY], -self.period_s, 2.0 * self.period_s))
+        if self.model.leg_size > 1:
+            leg = new_theta[SHARED + self.model.extra_powers : -1]
+            # A leg's loss rises with its current; only as much fall is left as noise in the values needs.
+            leg[:] = np.maximum(leg, np.maximum.accumulate(leg) - FALL_OF_LEG * np.max(np.abs(leg)))
         return new_theta, own + step[self.model.size :].reshape(own.shape)
 
     def is_small(self, step: Matrix, at: _Evaluation, theta: Matrix, tolerance: float) -> bool:
@@ -424,7 +442,7 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
     powers = np.array([ratio ** (2 * m + 3) for m in range(common)])
     theta[SHARED : SHARED + common] = fit.theta[SHARED : SHARED + common] * powers
     leg = fit.inverter()
-    if leg is not None and model.knots_a:
+    if leg is not None and model.leg_size:
         theta[SHARED + new :] = model.leg_coefficients(leg)
     return theta
 
@@ -457,7 +475,7 @@ def start_theta(start: InverseGamma, model: ModelChoice, leg: InverterError | No
         gamma.leakage_inductance_h,
         gamma.stator_inductance_h,
     )
-    if leg is not None and model.knots_a:
+    if leg is not None and model.leg_size:
         theta[SHARED + model.extra_powers :] = model.leg_coefficients(leg)
     return theta
 

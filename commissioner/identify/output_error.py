@@ -135,7 +135,7 @@ def simulate(
         size = abs(known)
         i_abs, slope_f, f_abs, fraction = size, 0.0, 0.0, 0.0
         if k_f > 0:
-            for _ in range(6):
+            for _ in range(64):  # concave F: from the left monotone, at most one knot a step
                 lower = lost[cell]
                 s_cell = (lost[cell + 1] - lower) * per_a
                 i_abs = (size - b_live * (lower - s_cell * cell / per_a)) / (1.0 + b_live * s_cell)

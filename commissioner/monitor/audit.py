@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from commissioner.monitor import channels
 from commissioner.monitor.supply import (
-    SupplyAngle, Vector, dominant_frequency_hz, follow_supply, harmonic_phasor, phase_voltages, space_vector,
+    SupplyAngle,
+    Vector,
+    dominant_frequency_hz,
+    follow_supply,
+    harmonic_phasor,
+    phase_voltages,
+    space_vector,
 )
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit
@@ -114,8 +120,13 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> A
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})
     raw_frequency = abs(dominant_frequency_hz(_any_vector(voltages), period))
     _in_range(raw_frequency, plate, findings)
-    pairing = channels.pair(*_phasors(currents, voltages, period, raw_frequency), plate, start, raw_frequency,
-                            recording.voltages_are_line_to_line)
+    pairing = channels.pair(
+        *_phasors(currents, voltages, period, raw_frequency),
+        plate,
+        start,
+        raw_frequency,
+        recording.voltages_are_line_to_line,
+    )
     findings += [Finding(*entry) for entry in pairing.findings]
     if pairing.is_refused:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
@@ -143,8 +154,14 @@ def measure_fundamental(i: Vector, v: Vector, supply: SupplyAngle, period: float
     apparent = 1.5 * positive_v * np.conj(positive_i)
     frequency = float(np.average(supply.frequency_rad_per_s(time), weights=window)) / (2 * np.pi)
     return Fundamental(
-        frequency, positive_v, positive_i, np.conj(negative_v), np.conj(negative_i), float(apparent.real),
-        float(apparent.imag), backwards,
+        frequency,
+        positive_v,
+        positive_i,
+        np.conj(negative_v),
+        np.conj(negative_i),
+        float(apparent.real),
+        float(apparent.imag),
+        backwards,
     )
 
 
@@ -158,11 +175,21 @@ def _whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tupl
     with np.errstate(invalid="ignore"):
         steps = np.diff(time) / period
         holes = np.flatnonzero(~(steps < 1.5)) + 1 if period > 0 else np.array([], dtype=np.int64)
+    if holes.size and good.all() and _is_printed_line(time):
+        holes = holes[:0]
     if holes.size and good.all() and abs((time[-1] - time[0]) / period + 1 - time.size) < 0.25 * holes.size:
         holes = holes[:0]  # as many rows as the time asks for: the stamps jitter, nothing is lost
     if np.any(np.diff(time) <= 0):
-        findings.append(Finding("time_order", "refused", "time does not run forward", float(np.nanmin(np.diff(time))),
-                                "steps above 0 s", "sort the rows by time"))
+        findings.append(
+            Finding(
+                "time_order",
+                "refused",
+                "time does not run forward",
+                float(np.nanmin(np.diff(time))),
+                "steps above 0 s",
+                "sort the rows by time",
+            )
+        )
     edges = np.unique(np.concatenate([[0], holes, np.flatnonzero(broken), np.flatnonzero(broken) + 1, [time.size]]))
     lengths = np.diff(edges)
     usable = np.where(broken[np.minimum(edges[:-1], time.size - 1)], 0, lengths)
@@ -171,18 +198,29 @@ def _whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tupl
     lost = _lost(steps, holes) + int(broken.sum())
     if lost or broken.any():
         kept = (high - low) / time.size
-        findings.append(Finding(
-            "missing_samples", "note", f"{lost} samples are missing in {max(holes.size, 1)} places; only the longest whole "
-            f"stretch is used ({(high - low) * period:.2f} s, {kept:.0%} of the recording)", lost, 0,
-            "record without gaps",
-        ))
+        findings.append(
+            Finding(
+                "missing_samples",
+                "note",
+                f"{lost} samples are missing in {max(holes.size, 1)} places; only the longest whole "
+                f"stretch is used ({(high - low) * period:.2f} s, {kept:.0%} of the recording)",
+                lost,
+                0,
+                "record without gaps",
+            )
+        )
     if (high - low) * period < SHORTEST_S:
         reason = "missing samples leave" if lost else "the recording holds"
-        findings.append(Finding(
-            "too_short" if not lost else "missing_samples", "refused",
-            f"{reason} {(high - low) * period:.3g} s without a break: too few load periods", (high - low) * period,
-            f"at least {SHORTEST_S:g} s, better 30-60 s", "record 30-60 s at steady load without gaps",
-        ))
+        findings.append(
+            Finding(
+                "too_short" if not lost else "missing_samples",
+                "refused",
+                f"{reason} {(high - low) * period:.3g} s without a break: too few load periods",
+                (high - low) * period,
+                f"at least {SHORTEST_S:g} s, better 30-60 s",
+                "record 30-60 s at steady load without gaps",
+            )
+        )
     return low, high
 
 
@@ -195,31 +233,62 @@ def _clock(recording: RunningRecording, part: slice, findings: list[Finding]) ->
     time = recording.time_s[part]
     if time.size < 16:
         return recording.sample_period_s
-    index = np.arange(time.size, dtype=np.float64)
-    slope, offset = np.polyfit(index, time - time[0], 1)
-    deviation = (time - time[0] - offset - slope * index) / slope
-    quantum = _printed_step(time) / slope
-    rms = float(deviation.std())
-    if quantum < 1.0 and np.abs(deviation).max() <= 0.55 * quantum + 1e-6:
-        rms = 0.0
+    slope, deviation = _straight(time)
+    rms = 0.0 if _is_printed_line(time) else float(deviation.std())
     if rms > LARGEST_JITTER:
-        findings.append(Finding(
-            "clock_jitter", "refused", f"the time stamps wander by {rms:.1%} of a sample period rms", rms, LARGEST_JITTER,
-            "record with a hardware clock at a fixed rate",
-        ))
+        findings.append(
+            Finding(
+                "clock_jitter",
+                "refused",
+                f"the time stamps wander by {rms:.1%} of a sample period rms",
+                rms,
+                LARGEST_JITTER,
+                "record with a hardware clock at a fixed rate",
+            )
+        )
     elif rms > NOTED_JITTER:
-        findings.append(Finding("clock_jitter", "note", f"the time stamps wander by {rms:.1%} of a sample period rms", rms,
-                                NOTED_JITTER, "record with a hardware clock"))
+        findings.append(
+            Finding(
+                "clock_jitter",
+                "note",
+                f"the time stamps wander by {rms:.1%} of a sample period rms",
+                rms,
+                NOTED_JITTER,
+                "record with a hardware clock",
+            )
+        )
     named = recording.metadata.get("sample_period_s")
     if isinstance(named, float) and abs(named / slope - 1) > 1e-3:
-        findings.append(Finding("clock_rate", "note", "sample_period_s and the time stamps disagree; the stamps are used",
-                                named, float(slope), "correct sample_period_s"))
+        findings.append(
+            Finding(
+                "clock_rate",
+                "note",
+                "sample_period_s and the time stamps disagree; the stamps are used",
+                named,
+                float(slope),
+                "correct sample_period_s",
+            )
+        )
     return float(slope)
+
+
+def _straight(time: Signal) -> tuple[float, Signal]:
+    """(sample period, deviation of each stamp from the straight line in sample periods)."""
+    index = np.arange(time.size, dtype=np.float64)
+    slope, offset = np.polyfit(index, time - time[0], 1)
+    return float(slope), (time - time[0] - offset - slope * index) / slope
+
+
+def _is_printed_line(time: Signal) -> bool:
+    """True where the stamps leave a straight line by no more than the digits in which they were printed."""
+    slope, deviation = _straight(time)
+    quantum = _printed_step(time) / slope
+    return bool(quantum < 2.0 and np.ptp(deviation) <= 1.02 * quantum + 1e-6)
 
 
 def _printed_step(time: Signal) -> float:
     """The decimal step in which the stamps were printed, 0 where there is none of 0.1 us or coarser."""
-    sample = time[:: max(1, time.size // 500)]
+    sample = time[:500]
     for digits in range(1, 8):
         if np.all(np.abs(sample - np.round(sample, digits)) < 1e-9):
             return float(10.0**-digits)
@@ -232,17 +301,29 @@ def _levels(currents: list[Signal], voltages: list[Signal], findings: list[Findi
         rms = np.array([signal.std() for signal in group])
         for name, value in zip("uvw", rms, strict=True):
             if value < 0.2 * rms.max() or rms.max() == 0.0:
-                findings.append(Finding(
-                    "dead_channel", "refused", f"{kind} channel {name} carries {value:.3g} rms where the largest has {rms.max():.3g}",
-                    float(value), float(0.2 * rms.max()), "check the sensor and its wiring",
-                ))
+                findings.append(
+                    Finding(
+                        "dead_channel",
+                        "refused",
+                        f"{kind} channel {name} carries {value:.3g} rms where the largest has {rms.max():.3g}",
+                        float(value),
+                        float(0.2 * rms.max()),
+                        "check the sensor and its wiring",
+                    )
+                )
         for name, signal in zip("uvw", group, strict=True):
             share = clipped_share(signal)
             if share > LARGEST_CLIPPED:
-                findings.append(Finding(
-                    "clipping", "refused", f"{kind} channel {name} is clipped: {share:.1%} of its samples sit on a limit", share,
-                    LARGEST_CLIPPED, "use a larger range",
-                ))
+                findings.append(
+                    Finding(
+                        "clipping",
+                        "refused",
+                        f"{kind} channel {name} is clipped: {share:.1%} of its samples sit on a limit",
+                        share,
+                        LARGEST_CLIPPED,
+                        "use a larger range",
+                    )
+                )
 
 
 def clipped_share(signal: Signal) -> float:
@@ -266,10 +347,16 @@ def _any_vector(voltages: list[Signal]) -> Vector:
 
 def _in_range(frequency_hz: float, plate: Nameplate, findings: list[Finding]) -> None:
     if not 0.1 * plate.rated_frequency_hz < frequency_hz < 2.0 * plate.rated_frequency_hz:
-        findings.append(Finding(
-            "supply_frequency", "refused", f"the strongest voltage line is at {frequency_hz:.4g} Hz", frequency_hz,
-            f"{0.1 * plate.rated_frequency_hz:.3g} ... {2 * plate.rated_frequency_hz:.3g} Hz", "check the voltage channels",
-        ))
+        findings.append(
+            Finding(
+                "supply_frequency",
+                "refused",
+                f"the strongest voltage line is at {frequency_hz:.4g} Hz",
+                frequency_hz,
+                f"{0.1 * plate.rated_frequency_hz:.3g} ... {2 * plate.rated_frequency_hz:.3g} Hz",
+                "check the voltage channels",
+            )
+        )
 
 
 def _phasors(
@@ -298,18 +385,28 @@ def _ripple(v: Vector, fundamental: Fundamental, findings: list[Finding]) -> Non
     known = abs(fundamental.voltage_v) ** 2 + abs(fundamental.voltage_negative_v) ** 2
     share = float(np.sqrt(max(np.mean(np.abs(v) ** 2) - known, 0.0) / known))
     if share > LARGEST_RIPPLE:
-        findings.append(Finding(
-            "switched_voltage", "refused", f"{share:.0%} of the voltage is not its fundamental", share, LARGEST_RIPPLE,
-            "filter the voltage before sampling, or give the mean over each switching period",
-        ))
+        findings.append(
+            Finding(
+                "switched_voltage",
+                "refused",
+                f"{share:.0%} of the voltage is not its fundamental",
+                share,
+                LARGEST_RIPPLE,
+                "filter the voltage before sampling, or give the mean over each switching period",
+            )
+        )
 
 
-def _sampling_jitter(v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: list[Finding]) -> None:
+def _sampling_jitter(
+    v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: list[Finding]
+) -> None:
     """Jitter that the stamps do not show: it moves the voltage along the circle only, noise moves it in and out as well.
 
     From second differences (they drop harmonics): omega V sigma_t = sqrt((var_along - var_across) / 6).
     """
-    turned = v * np.exp(-1j * supply.angle_rad(np.arange(v.size) * period)) * np.exp(-1j * np.angle(fundamental.voltage_v))
+    turned = (
+        v * np.exp(-1j * supply.angle_rad(np.arange(v.size) * period)) * np.exp(-1j * np.angle(fundamental.voltage_v))
+    )
     rough = turned[2:] - 2 * turned[1:-1] + turned[:-2]
     excess = max(float(rough.imag.var() - rough.real.var()), 0.0) / 6
     if rough.imag.var() < 1.3 * rough.real.var():
@@ -317,10 +414,16 @@ def _sampling_jitter(v: Vector, supply: SupplyAngle, fundamental: Fundamental, p
     jitter = np.sqrt(excess) / (2 * np.pi * fundamental.frequency_hz * abs(fundamental.voltage_v)) / period
     if jitter > NOTED_JITTER * 5:
         kind = "refused" if jitter > LARGEST_HIDDEN_JITTER else "note"
-        findings.append(Finding(
-            "clock_jitter", kind, f"the samples were taken off their time by {jitter:.0%} of a sample period rms", float(jitter),
-            LARGEST_HIDDEN_JITTER, "record with a hardware clock",
-        ))
+        findings.append(
+            Finding(
+                "clock_jitter",
+                kind,
+                f"the samples were taken off their time by {jitter:.0%} of a sample period rms",
+                float(jitter),
+                LARGEST_HIDDEN_JITTER,
+                "record with a hardware clock",
+            )
+        )
 
 
 def _disguise(fundamental: Fundamental, plate: Nameplate, findings: list[Finding]) -> None:
@@ -328,7 +431,13 @@ def _disguise(fundamental: Fundamental, plate: Nameplate, findings: list[Finding
     per_hertz = abs(fundamental.voltage_v) / fundamental.frequency_hz
     rated = plate.rated_voltage_v * np.sqrt(2 / 3) / plate.rated_frequency_hz
     if per_hertz > 1.45 * rated:
-        findings.append(Finding(
-            "voltage_level", "refused", "the voltages are too large for this motor: line-to-line under the names of phase voltages?",
-            float(per_hertz / rated), 1.45, "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
-        ))
+        findings.append(
+            Finding(
+                "voltage_level",
+                "refused",
+                "the voltages are too large for this motor: line-to-line under the names of phase voltages?",
+                float(per_hertz / rated),
+                1.45,
+                "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
+            )
+        )

@@ -8,6 +8,7 @@ phases may follow a shaft whose speed wanders.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,9 +44,9 @@ class Comb:
 class Lines:
     """Complex amplitudes of every line in the turning frame; line 0 is the mean.
 
-    `comb[k]` indexes the combs (-1 for the mean, one past the last comb for the mains harmonics), `order[k]` is the signed harmonic, `rate_rad_per_s[k]` its mean
-    angular frequency. `*_influence[b, k]` is what block b's residual added: the covariance of the lines is their sum of
-    outer products times B / (B - 1) (cluster-robust, so coloured and unsteady noise counts for what it is).
+    `comb[k]` indexes the combs (-1 for the mean, one past the last comb for the mains harmonics), `order[k]` is the
+    signed harmonic, `rate_rad_per_s[k]` its mean angular frequency. `*_influence[b, k]` is what block b's
+    residual added: the covariance of the lines is their sum of outer products times B / (B - 1) (cluster-robust, so coloured and unsteady noise counts for what it is).
     """
 
     comb: NDArray[np.int64]
@@ -101,7 +102,7 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     data = np.stack([frame.current_a[part], frame.voltage_v[part]], axis=1).view(np.float64)
     edges = np.linspace(0, time.size, BLOCKS + 1).astype(np.int64)
     grams, sides = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         columns = _columns([phase[low:high] for phase in phases], orders, drift[:, low:high])
         weighted = columns * window[low:high]
         grams.append(weighted @ columns.T)
@@ -114,10 +115,17 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     supply = float(np.average(frame.supply_rad_per_s[part], weights=window))
     rates = [*(2 * np.pi * comb.frequency_hz for comb in combs), supply]
     comb_index, order, rate = _labels(orders, rates)
-    amplitude = _pairs(np.ascontiguousarray(real[: -DRIFT_ORDERS]).view(np.complex128), len(comb_index))
-    influence = _pairs(np.ascontiguousarray(moved[: -DRIFT_ORDERS]).view(np.complex128), len(comb_index))
+    amplitude = _pairs(np.ascontiguousarray(real[:-DRIFT_ORDERS]).view(np.complex128), len(comb_index))
+    influence = _pairs(np.ascontiguousarray(moved[:-DRIFT_ORDERS]).view(np.complex128), len(comb_index))
     return Lines(
-        comb_index, order, rate, amplitude[:, 0], amplitude[:, 1], influence[..., 0].T.copy(), influence[..., 1].T.copy(), supply
+        comb_index,
+        order,
+        rate,
+        amplitude[:, 0],
+        amplitude[:, 1],
+        influence[..., 0].T.copy(),
+        influence[..., 1].T.copy(),
+        supply,
     )
 
 
@@ -197,7 +205,12 @@ def free_orders(
 def keep(lines: Lines, wanted: NDArray[np.bool_]) -> Lines:
     """Only the lines marked `wanted` `(k,)`."""
     return Lines(
-        lines.comb[wanted], lines.order[wanted], lines.rate_rad_per_s[wanted], lines.current_a[wanted],
-        lines.voltage_v[wanted], lines.current_influence[:, wanted], lines.voltage_influence[:, wanted],
+        lines.comb[wanted],
+        lines.order[wanted],
+        lines.rate_rad_per_s[wanted],
+        lines.current_a[wanted],
+        lines.voltage_v[wanted],
+        lines.current_influence[:, wanted],
+        lines.voltage_influence[:, wanted],
         lines.supply_rad_per_s,
     )

@@ -129,8 +129,12 @@ def _wander(frame: TurningFrame, part: slice) -> Finding:
     share = float(np.ptp(frequency) / frequency.mean())
     kind = "refused" if share > LARGEST_FREQUENCY_WANDER else "note"
     return Finding(
-        "frequency_wander", kind, f"the supply frequency moves by {share:.2%} within the quietest stretch: "
-        + ("the motor is not in a steady state" if kind == "refused" else "steady"), share, LARGEST_FREQUENCY_WANDER,
+        "frequency_wander",
+        kind,
+        f"the supply frequency moves by {share:.2%} within the quietest stretch: "
+        + ("the motor is not in a steady state" if kind == "refused" else "steady"),
+        share,
+        LARGEST_FREQUENCY_WANDER,
         "record at a steady set point",
     )
 
@@ -147,33 +151,52 @@ def _too_little(frame: TurningFrame, part: slice, found: Found) -> Finding | Non
     length = float(np.ptp(frame.time_s[part]))
     if found.shaft is None and not found.loads:
         return Finding(
-            "no_period", "refused", "the currents show neither the shaft nor any periodic load", float(found.spectrum.power.max()),
-            periods.SIGNIFICANT, "record longer, with better sensors, or at a load that turns",
+            "no_period",
+            "refused",
+            "the currents show neither the shaft nor any periodic load",
+            float(found.spectrum.power.max()),
+            periods.SIGNIFICANT,
+            "record longer, with better sensors, or at a load that turns",
         )
     slowest = min([f.frequency_hz for f in (found.shaft, *found.loads) if f is not None])
     turns = length * slowest
     least = LEAST_TURNS if found.loads == () else LEAST_LOAD_PERIODS
     if turns < least:
         return Finding(
-            "too_few_periods", "refused", f"only {turns:.1f} load periods in {length:.2f} s", turns, float(least),
+            "too_few_periods",
+            "refused",
+            f"only {turns:.1f} load periods in {length:.2f} s",
+            turns,
+            float(least),
             "record 30-60 s at steady load",
         )
     if found.shaft is None:
         return Finding(
-            "no_shaft_line", "refused", "periodic loads are seen but no shaft line: the mean speed is not fixed", None, None,
+            "no_shaft_line",
+            "refused",
+            "periodic loads are seen but no shaft line: the mean speed is not fixed",
+            None,
+            None,
             "record longer or with better current sensors; give the rotor slots",
         )
     return None
 
 
 def _invert(
-    audited: Audited, frame: TurningFrame, part: slice, search: ShaftSearch, found: Found, start: Start, plate: Nameplate,
+    audited: Audited,
+    frame: TurningFrame,
+    part: slice,
+    search: ShaftSearch,
+    found: Found,
+    start: Start,
+    plate: Nameplate,
     inertia: float | None,
 ) -> Observation:
     pairs = plate.pole_pairs
     members = _members(found)
     combs = tuple(
-        comb_search.comb_of(frame, part, member, [m.frequency_hz for m in members[:k]]) for k, member in enumerate(members)
+        comb_search.comb_of(frame, part, member, [m.frequency_hz for m in members[:k]])
+        for k, member in enumerate(members)
     )
     first = members[0]
     assert found.shaft is not None
@@ -188,14 +211,36 @@ def _invert(
             lines = separate(frame, part, list(combs), SUPPLY_ORDERS)
             lines, problem, fitted = _estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
     solved = waveform.solve(problem, fitted)
-    period = _characteristic(audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia)
+    period = _characteristic(
+        audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
+    )
     torque, torque_std = waveform.mean_torque_nm(problem, solved)
     whole, whole_std = _whole_record_speed(frame, part, found, lines)
     proof = prove(audited, frame, part, combs, problem, solved)
     return Observation(
-        audited, frame, part, found, search, lines, combs, problem, fitted, start, solved, period,
-        tuple(_load_periods(members, combs, found.shaft.frequency_hz, problem, solved, float(np.ptp(frame.time_s[part])))),
-        whole, whole_std, shaft_speed, torque, torque_std, proof, (*audited.findings, _wander(frame, part)), inertia,
+        audited,
+        frame,
+        part,
+        found,
+        search,
+        lines,
+        combs,
+        problem,
+        fitted,
+        start,
+        solved,
+        period,
+        tuple(
+            _load_periods(members, combs, found.shaft.frequency_hz, problem, solved, float(np.ptp(frame.time_s[part])))
+        ),
+        whole,
+        whole_std,
+        shaft_speed,
+        torque,
+        torque_std,
+        proof,
+        (*audited.findings, _wander(frame, part)),
+        inertia,
     )
 
 
@@ -216,8 +261,11 @@ def _members(found: Found) -> list[Periodicity]:
         drift = shaft.drift
         slow = PhaseDrift(drift.polynomial / divisor, drift.centre_s, drift.half_s) if drift else None
         shaft = replace(
-            shaft, name=f"{divisor} shaft turns", frequency_hz=shaft.frequency_hz / divisor,
-            frequency_std_hz=shaft.frequency_std_hz / divisor, drift=slow,
+            shaft,
+            name=f"{divisor} shaft turns",
+            frequency_hz=shaft.frequency_hz / divisor,
+            frequency_std_hz=shaft.frequency_std_hz / divisor,
+            drift=slow,
         )
     return [shaft, *independent]
 
@@ -289,13 +337,22 @@ def _with_wobble(
                 wobble = wobble + np.real(amplitude * np.exp(1j * orders[k] * comb.phase_rad))
     if np.abs(wobble).max() * 8 < FM_MATTERS_RAD:
         return None
-    bent = [replace(combs[0], phase_rad=combs[0].phase_rad + wobble * (2 * np.pi * combs[0].frequency_hz / shaft_speed))]
+    bent = [
+        replace(combs[0], phase_rad=combs[0].phase_rad + wobble * (2 * np.pi * combs[0].frequency_hz / shaft_speed))
+    ]
     return (*bent, *combs[1:])
 
 
 def _characteristic(
-    audited: Audited, frame: TurningFrame, part: slice, combs: tuple[Comb, ...], base_hz: float, shaft_hz: float,
-    problem: Problem, solved: Solved, inertia: float | None,
+    audited: Audited,
+    frame: TurningFrame,
+    part: slice,
+    combs: tuple[Comb, ...],
+    base_hz: float,
+    shaft_hz: float,
+    problem: Problem,
+    solved: Solved,
+    inertia: float | None,
 ) -> Waveform:
     """One longest period from the segment's middle on, at `POINTS_PER_TURN` points a shaft turn."""
     longest = 1 / min(comb.frequency_hz for comb in combs)
@@ -342,15 +399,29 @@ def _smooth(current: Vector) -> complex:
 
 
 def _load_periods(
-    members: list[Periodicity], combs: tuple[Comb, ...], shaft_hz: float, problem: Problem, solved: Solved, length_s: float
+    members: list[Periodicity],
+    combs: tuple[Comb, ...],
+    shaft_hz: float,
+    problem: Problem,
+    solved: Solved,
+    length_s: float,
 ) -> list[LoadPeriod]:
     made = []
     owner: NDArray[np.int64] = problem.lines.comb[problem.on.positive]
     for p, (member, comb) in enumerate(zip(members, combs, strict=True)):
         own = solved.speed.amplitude_rad_per_s[owner == p]
         ripple: Signal = np.abs(own)
-        made.append(LoadPeriod(
-            member.name, member.frequency_hz, member.frequency_std_hz, member.frequency_hz / shaft_hz, comb.follows,
-            int(own.size), length_s * member.frequency_hz, float(np.sqrt(2 * np.sum(ripple**2))), member.evidence,
-        ))
+        made.append(
+            LoadPeriod(
+                member.name,
+                member.frequency_hz,
+                member.frequency_std_hz,
+                member.frequency_hz / shaft_hz,
+                comb.follows,
+                int(own.size),
+                length_s * member.frequency_hz,
+                float(np.sqrt(2 * np.sum(ripple**2))),
+                member.evidence,
+            )
+        )
     return made

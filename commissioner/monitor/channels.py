@@ -76,13 +76,23 @@ def sort_by_kind(
     for i, v in zip(wrong_i, wrong_v, strict=True):
         new_i[i], new_v[v] = voltages[v], currents[i]
     names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
-    entry: Entry = ("crossed_channels", "corrected", f"columns of currents and voltages are exchanged: {names}", names,
-                    "currents and voltages in their own columns", "correct the column names")
+    entry: Entry = (
+        "crossed_channels",
+        "corrected",
+        f"columns of currents and voltages are exchanged: {names}",
+        names,
+        "currents and voltages in their own columns",
+        "correct the column names",
+    )
     return new_i, new_v, [entry]
 
 
 def pair(
-    currents: list[complex], voltages: list[complex], plate: Nameplate, start: TCircuit, frequency_hz: float,
+    currents: list[complex],
+    voltages: list[complex],
+    plate: Nameplate,
+    start: TCircuit,
+    frequency_hz: float,
     line_to_line: bool,
 ) -> Pairing:
     """The order and polarity of all channels, or findings that refuse."""
@@ -100,18 +110,33 @@ def pair(
     chosen, lag = _choose(options, expected, v.sequence == i.sequence, v.sequence < 0, findings)
     current_order, current_sign = chosen
     if v.sequence < 0:
-        findings.append((
-            "phase_order", "corrected", "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
-            "u-w-v", "u-v-w", "exchange two phases of all channels if the motor turns forwards",
-        ))
+        findings.append(
+            (
+                "phase_order",
+                "corrected",
+                "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
+                "u-w-v",
+                "u-v-w",
+                "exchange two phases of all channels if the motor turns forwards",
+            )
+        )
     _report_currents(current_order, current_sign, (0, 1, 2) if v.sequence > 0 else (0, 2, 1), findings)
     if v.sign != (1, 1, 1):
         flipped = [name for name, sign in zip("uvw", v.sign, strict=True) if sign < 0]
-        findings.append(("polarity", "corrected", "voltage channel " + ", ".join(flipped) + " is inverted", "inverted",
-                         "same polarity", "turn the probe round"))
+        findings.append(
+            (
+                "polarity",
+                "corrected",
+                "voltage channel " + ", ".join(flipped) + " is inverted",
+                "inverted",
+                "same polarity",
+                "turn the probe round",
+            )
+        )
     mapping = {
         f"phase {name}": f"current {'-' if current_sign[k] < 0 else ''}{'uvw'[current_order[k]]}, "
-        f"voltage {'-' if voltage_sign[k] < 0 else ''}{'uvw'[voltage_order[k]]}" for k, name in enumerate("uvw")
+        f"voltage {'-' if voltage_sign[k] < 0 else ''}{'uvw'[voltage_order[k]]}"
+        for k, name in enumerate("uvw")
     }
     return Pairing(
         current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, tuple(findings), mapping
@@ -136,7 +161,9 @@ def read_triple(phasors: list[complex]) -> Triple:
             ]
             unit = [t / max(abs(t), 1e-12) for t in turned]
             middle = np.sum(unit)
-            deviation = max(abs(np.degrees(np.angle(u * np.conj(middle)))) for u in unit) if abs(middle) > 0.5 else 180.0
+            deviation = (
+                max(abs(np.degrees(np.angle(u * np.conj(middle)))) for u in unit) if abs(middle) > 0.5 else 180.0
+            )
             if deviation < best.deviation_deg - 1e-6:
                 best = Triple(flips, sequence, float(deviation))
     return best
@@ -160,10 +187,16 @@ def _star(voltages: list[complex], line_to_line: bool) -> list[complex]:
 
 def _spacing(name: str, triple: Triple, findings: list[Entry]) -> None:
     if triple.deviation_deg > SPACING_TOLERANCE_DEG:
-        findings.append((
-            "phase_spacing", "refused", f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
-            triple.deviation_deg, SPACING_TOLERANCE_DEG, "check that three different phases are measured",
-        ))
+        findings.append(
+            (
+                "phase_spacing",
+                "refused",
+                f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
+                triple.deviation_deg,
+                SPACING_TOLERANCE_DEG,
+                "check that three different phases are measured",
+            )
+        )
 
 
 def _options(currents: list[complex], read: Triple, reference: complex) -> list[Option]:
@@ -192,18 +225,29 @@ def _expected_lag_deg(
 
 
 def _choose(
-    options: list[Option], expected_deg: float, same_sequence: bool, backwards: bool,
+    options: list[Option],
+    expected_deg: float,
+    same_sequence: bool,
+    backwards: bool,
     findings: list[Entry],
 ) -> tuple[tuple[Order, Sign], float]:
     """The simplest plausible assignment; refused where none is, or where another fits clearly better."""
-    plausible = [option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < LAG_TOLERANCE_DEG]
+    plausible = [
+        option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < LAG_TOLERANCE_DEG
+    ]
     if not plausible:
         order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))
-        findings.append((
-            "pairing", "refused", "no order of the current channels makes a motor: the current's lag is "
-            f"{lag:.0f} degrees where {expected_deg:.0f} are expected", lag, "0 ... 90 degrees",
-            "check which current belongs to which voltage, and the polarities",
-        ))
+        findings.append(
+            (
+                "pairing",
+                "refused",
+                "no order of the current channels makes a motor: the current's lag is "
+                f"{lag:.0f} degrees where {expected_deg:.0f} are expected",
+                lag,
+                "0 ... 90 degrees",
+                "check which current belongs to which voltage, and the polarities",
+            )
+        )
         return (order, sign), lag
     preferred: Order = (0, 2, 1) if backwards and same_sequence else (0, 1, 2)
 
@@ -214,11 +258,17 @@ def _choose(
     order, sign, lag = plausible[0]
     rivals = [o for o in plausible[1:] if abs(o[2] - expected_deg) + CLEARLY_BETTER_DEG < abs(lag - expected_deg)]
     if rivals and mistakes(plausible[0]) > 0:
-        findings.append((
-            "pairing", "refused", "the current channels are crossed and two orders are possible "
-            f"(lags of {lag:.0f} and {rivals[0][2]:.0f} degrees)", lag, f"{expected_deg:.0f} degrees expected",
-            "check which current belongs to which voltage",
-        ))
+        findings.append(
+            (
+                "pairing",
+                "refused",
+                "the current channels are crossed and two orders are possible "
+                f"(lags of {lag:.0f} and {rivals[0][2]:.0f} degrees)",
+                lag,
+                f"{expected_deg:.0f} degrees expected",
+                "check which current belongs to which voltage",
+            )
+        )
     return (order, sign), lag
 
 
@@ -229,9 +279,18 @@ def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: l
             f"{'uvw'[k]} from {'inverted ' if sign[k] < 0 else ''}current_{'uvw'[order[k]]}_a" for k in range(3)
         )
         crossed = order != voltage_order
-        findings.append((
-            "crossed_channels" if crossed else "polarity", "corrected",
-            ("the current channels are crossed against the voltages; " if crossed else "a current channel is inverted; ")
-            + f"taken: phase {names} (exchanging the voltages instead would explain it as well)",
-            names, "u, v, w in order", "correct the wiring or the column names",
-        ))
+        findings.append(
+            (
+                "crossed_channels" if crossed else "polarity",
+                "corrected",
+                (
+                    "the current channels are crossed against the voltages; "
+                    if crossed
+                    else "a current channel is inverted; "
+                )
+                + f"taken: phase {names} (exchanging the voltages instead would explain it as well)",
+                names,
+                "u, v, w in order",
+                "correct the wiring or the column names",
+            )
+        )

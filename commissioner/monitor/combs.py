@@ -114,7 +114,9 @@ def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: lis
     limit = MOST_SHAFT_ORDERS if found.name == "shaft" else MOST_ORDERS
     highest = min(limit, int(0.9 * frame.band_hz / found.frequency_hz))
     taken = [h * f for f in others_hz for h in range(1, int(frame.band_hz / f) + 1) if h <= limit]
-    orders = free_orders(found.frequency_hz, highest, taken, mean_supply(frame, part) / (2 * np.pi), float(np.ptp(time)))
+    orders = free_orders(
+        found.frequency_hz, highest, taken, mean_supply(frame, part) / (2 * np.pi), float(np.ptp(time))
+    )
     phase = comb_phase(frame, part, found.frequency_hz, found.follows)
     if found.drift is not None:
         phase = phase + found.drift(time)
@@ -122,14 +124,21 @@ def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: lis
 
 
 def _next_load(
-    frame: TurningFrame, part: slice, residual: Signal, left: PairSpectrum, known: list[Periodicity], supply_hz: float,
+    frame: TurningFrame,
+    part: slice,
+    residual: Signal,
+    left: PairSpectrum,
+    known: list[Periodicity],
+    supply_hz: float,
     first: PairSpectrum,
 ) -> Periodicity | None:
     """The strongest remaining pair that is no product of known combs, as a comb of its own."""
     strongest = max((first.power * first.floor_a2).max(), 1e-300)
     combs_hz = [c.frequency_hz for c in known]
-    for frequency, power in periods.find_peaks_above(left, periods.SIGNIFICANT, periods.LOWEST_LOAD_HZ, periods.HIGHEST_LOAD_HZ):
-        k = int(round(frequency / left.frequency_hz[1]))
+    for frequency, power in periods.find_peaks_above(
+        left, periods.SIGNIFICANT, periods.LOWEST_LOAD_HZ, periods.HIGHEST_LOAD_HZ
+    ):
+        k = round(frequency / left.frequency_hz[1])
         if power * left.floor_a2[k] < LEAST_SHARE * strongest or not _is_torque_like(left, k):
             continue
         if periods.is_product(frequency, combs_hz, supply_hz, left.cell_hz):

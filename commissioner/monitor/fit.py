@@ -84,7 +84,9 @@ def pose(lines: Lines, start: TCircuit, pole_pairs: int, mean_speed_rad_per_s: f
     error = error + np.where(twice, SENSOR_ASYMMETRY * drop[0], 0.0)
     flux = np.abs(lines.voltage_v[0]) / lines.supply_rad_per_s
     turns = lines.rate_rad_per_s[on.positive] / mean_speed_rad_per_s
-    gap = np.where((np.abs(turns - 1) < 1e-3) | (np.abs(turns - 2) < 1e-3), AIR_GAP_FLUX * mean_speed_rad_per_s / turns, 0.0)
+    gap = np.where(
+        (np.abs(turns - 1) < 1e-3) | (np.abs(turns - 2) < 1e-3), AIR_GAP_FLUX * mean_speed_rad_per_s / turns, 0.0
+    )
     own = (0.5 * error / flux + gap) / pole_pairs
     return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, own)
 
@@ -119,7 +121,12 @@ def fit(problem: Problem, start: Start) -> Fitted:
     _, upper, lower = complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
     imaginary, total = np.sum(np.abs(upper - lower) ** 2), np.sum(np.abs(upper + lower) ** 2)
     return Fitted(
-        circuit, covariance, direction, share, float(np.mean(np.abs(data) ** 2)), float(np.sqrt(imaginary / total)) if total else 0.0
+        circuit,
+        covariance,
+        direction,
+        share,
+        float(np.mean(np.abs(data) ** 2)),
+        float(np.sqrt(imaginary / total)) if total else 0.0,
     )
 
 
@@ -158,10 +165,14 @@ def steps(fitted: Fitted) -> NDArray[np.float64]:
 
 def logs_of(circuit: TCircuit) -> NDArray[np.float64]:
     """log(R_s, R_r, L_m, L_ls)."""
-    return np.log([
-        circuit.stator_resistance_ohm, circuit.rotor_resistance_ohm, circuit.magnetizing_inductance_h,
-        circuit.stator_leakage_h,
-    ])
+    return np.log(
+        [
+            circuit.stator_resistance_ohm,
+            circuit.rotor_resistance_ohm,
+            circuit.magnetizing_inductance_h,
+            circuit.stator_leakage_h,
+        ]
+    )
 
 
 def circuit_of(logs: NDArray[np.float64], split: float) -> TCircuit:

@@ -67,8 +67,12 @@ def pulses(observation: Observation) -> Pulses | None:
     area = np.array([area for _, area, _ in made])
     shape = np.array([shape for _, _, shape in made])
     return Pulses(
-        count, made[0][0], Quantity(float(shape[0]), _spread(shape)), _spread(shape[: noise + 1]),
-        Quantity(float(area[0]), _spread(area)), _spread(area[: noise + 1]),
+        count,
+        made[0][0],
+        Quantity(float(shape[0]), _spread(shape)),
+        _spread(shape[: noise + 1]),
+        Quantity(float(area[0]), _spread(area)),
+        _spread(area[: noise + 1]),
     )
 
 
@@ -105,7 +109,7 @@ def _turns(observation: Observation) -> list[Signal]:
 def _trough(torque: Signal, count: int) -> int:
     """Where the pulse train of order `count` has its first trough: pulses are cut there."""
     angle = float(np.angle(np.fft.rfft(torque)[count]))
-    return int(round(((np.pi - angle) % (2 * np.pi)) / (2 * np.pi) * POINTS / count)) % POINTS
+    return round(((np.pi - angle) % (2 * np.pi)) / (2 * np.pi) * POINTS / count) % POINTS
 
 
 def _compare(torque: Signal, count: int, start: int) -> tuple[tuple[Signal, ...], float, float]:

@@ -48,7 +48,9 @@ class Torus:
     partner: NDArray[np.int64]
 
 
-def flux_lines(circuit: TCircuit, current_a: Vector, voltage_v: Vector, rate_rad_per_s: Signal, supply: float) -> FluxLines:
+def flux_lines(
+    circuit: TCircuit, current_a: Vector, voltage_v: Vector, rate_rad_per_s: Signal, supply: float
+) -> FluxLines:
     """(10), (12), (13), (16) line by line, all `(..., k)`.
 
     Lambda_s = (V - R_s I) / j(rate + omega_e); Lambda_r = (L_ar Lambda_s + D I) / L_m; I_r = (L_m Lambda_s - L_as
@@ -68,15 +70,16 @@ def torus(lines: Lines, points_per_comb: int = 8) -> Torus:
     count = max(64, points_per_comb * lines.comb.size)
     place = np.arange(count)
     if len(combs) <= 1:
-        phases = {p: 2 * np.pi * place / count for p in combs}
+        phases = dict.fromkeys(combs, 2 * np.pi * place / count)
     else:
         root = brentq(lambda x: x ** (len(combs) + 1) - x - 1, 1.0, 2.0)
         phases = {p: 2 * np.pi * place * root ** -(k + 1) for k, p in enumerate(combs)}
     basis = basis_of(lines, phases, count)
     positive = np.flatnonzero(lines.order > 0)
-    partner = np.array([
-        int(np.flatnonzero((lines.comb == lines.comb[k]) & (lines.order == -lines.order[k]))[0]) for k in positive
-    ], dtype=np.int64)
+    partner = np.array(
+        [int(np.flatnonzero((lines.comb == lines.comb[k]) & (lines.order == -lines.order[k]))[0]) for k in positive],
+        dtype=np.int64,
+    )
     project = np.linalg.solve(np.conj(basis.T) @ basis, np.conj(basis.T))
     return Torus(basis, project, positive, partner)
 

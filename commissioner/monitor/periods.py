@@ -43,7 +43,7 @@ class PairSpectrum:
     def at(self, frequency_hz: NDArray[np.float64] | float, cells: float = 0.6) -> Signal:
         """The largest whitened power within `cells` resolution cells of each frequency; 0 outside the spectrum."""
         step = self.frequency_hz[1]
-        reach = max(1, int(round(cells * self.cell_hz / step)))
+        reach = max(1, round(cells * self.cell_hz / step))
         place = np.round(np.atleast_1d(frequency_hz) / step).astype(np.int64)
         offsets = np.arange(-reach, reach + 1)
         index = np.clip(place[:, None] + offsets, 0, self.power.size - 1)
@@ -156,9 +156,11 @@ def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> fl
     turn = np.exp(-2j * np.pi * demodulated.harmonic[:, None] * shift * centre[None, :])
     mean = np.abs((demodulated.sums * turn).mean(axis=1)) ** 2
     known = np.maximum(mean - demodulated.noise_variance / centre.size, 0.0)
-    information = 2 * np.sum(
-        (2 * np.pi * demodulated.harmonic) ** 2 * known / (demodulated.noise_variance + 1e-300)
-    ) * np.sum(centre**2)
+    information = (
+        2
+        * np.sum((2 * np.pi * demodulated.harmonic) ** 2 * known / (demodulated.noise_variance + 1e-300))
+        * np.sum(centre**2)
+    )
     return float(1 / np.sqrt(information)) if information > 0 else float("inf")
 
 
@@ -197,7 +199,9 @@ def track(demodulated: Demodulated, degree: int) -> PhaseDrift:
     return PhaseDrift(coefficients, float(centre), float(half))
 
 
-def find_peaks_above(spectrum: PairSpectrum, threshold: float, low_hz: float, high_hz: float) -> list[tuple[float, float]]:
+def find_peaks_above(
+    spectrum: PairSpectrum, threshold: float, low_hz: float, high_hz: float
+) -> list[tuple[float, float]]:
     """(frequency, whitened power) of local peaks, strongest first, at least 1.5 cells apart."""
     inside = (spectrum.frequency_hz >= low_hz) & (spectrum.frequency_hz <= high_hz) & (spectrum.power > threshold)
     found: list[tuple[float, float]] = []
@@ -229,7 +233,9 @@ class ShaftSearch:
         return -0.5 * ((slip - self.slip) / self.slip_std) ** 2
 
 
-def shaft_candidates(spectrum: PairSpectrum, search: ShaftSearch, harmonics: int) -> list[tuple[float, float, tuple[int, ...]]]:
+def shaft_candidates(
+    spectrum: PairSpectrum, search: ShaftSearch, harmonics: int
+) -> list[tuple[float, float, tuple[int, ...]]]:
     """(frequency, score, harmonics seen) of combs in the slip range, best first.
 
     Score: capped whitened power over the lines seen, minus the operating point's misfit; a comb without its first or

@@ -58,12 +58,24 @@ def prove(
     current = complex(basis[0] @ problem.lines.current_a)
     stator = (circuit.magnetizing_inductance_h * rotor - circuit.determinant_h2 * current) / circuit.rotor_inductance_h
     simulated = resimulate(
-        _numbers(circuit), voltage, audited.supply.frequency_rad_per_s(time), problem.pole_pairs * speed, period, stator, rotor
+        _numbers(circuit),
+        voltage,
+        audited.supply.frequency_rad_per_s(time),
+        problem.pole_pairs * speed,
+        period,
+        stator,
+        rotor,
     )
     keep = slice(int(SETTLING_S / length * count), count)
     error = simulated[keep] - measured[keep]
     whole = float(np.sqrt(np.mean(np.abs(error) ** 2) / np.mean(np.abs(measured[keep]) ** 2)))
-    return Proof(whole, _periodic(basis[keep], error, measured[keep]), time[keep] + audited.start_s, measured[keep], simulated[keep])
+    return Proof(
+        whole,
+        _periodic(basis[keep], error, measured[keep]),
+        time[keep] + audited.start_s,
+        measured[keep],
+        simulated[keep],
+    )
 
 
 def _periodic(basis: Vector, error: Vector, measured: Vector) -> float:
@@ -78,6 +90,9 @@ def _periodic(basis: Vector, error: Vector, measured: Vector) -> float:
 
 def _numbers(circuit: TCircuit) -> tuple[float, float, float, float, float]:
     return (
-        circuit.stator_resistance_ohm, circuit.rotor_resistance_ohm, circuit.stator_inductance_h, circuit.rotor_inductance_h,
+        circuit.stator_resistance_ohm,
+        circuit.rotor_resistance_ohm,
+        circuit.stator_inductance_h,
+        circuit.rotor_inductance_h,
         circuit.magnetizing_inductance_h,
     )

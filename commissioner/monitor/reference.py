@@ -43,5 +43,7 @@ def _lines(observation: Observation, sampled: Signal, segment: Signal) -> tuple[
     window = np.hanning(segment.size)[:, None]
     both = np.concatenate([basis, mains], axis=1) * window
     gram = np.conj(both.T) @ both
-    amplitude = np.linalg.solve(gram + 1e-12 * np.trace(gram).real * np.eye(gram.shape[0]), np.conj(both.T) @ (sampled * window[:, 0]))
+    amplitude = np.linalg.solve(
+        gram + 1e-12 * np.trace(gram).real * np.eye(gram.shape[0]), np.conj(both.T) @ (sampled * window[:, 0])
+    )
     return observation.solved.speed.amplitude_rad_per_s, amplitude[: basis.shape[1]][problem.on.positive]

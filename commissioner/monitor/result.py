@@ -16,7 +16,9 @@ from commissioner.motor.circuit import EQUAL_LEAKAGE
 OPEN = 0.25
 """A combination that keeps more than this share of its prior variance was not fixed by the data."""
 WORDS = {
-    "stator_resistance_ohm": "R_s", "rotor_resistance_ohm": "R_r", "magnetizing_inductance_h": "L_m",
+    "stator_resistance_ohm": "R_s",
+    "rotor_resistance_ohm": "R_r",
+    "magnetizing_inductance_h": "L_m",
     "leakage_inductance_h": "L_l",
 }
 
@@ -46,10 +48,14 @@ def as_document(
         "cannot_be_fixed": cannot_be_fixed(observation.fitted),
         "periods": [
             {
-                "name": p.name, "frequency_hz": quantity(p.frequency_hz, p.frequency_std_hz),
+                "name": p.name,
+                "frequency_hz": quantity(p.frequency_hz, p.frequency_std_hz),
                 "period_s": quantity(1 / p.frequency_hz, p.frequency_std_hz / p.frequency_hz**2),
-                "ratio_to_shaft": p.ratio_to_shaft, "follows": p.follows, "harmonics": p.harmonics,
-                "periods_averaged": p.periods_averaged, "speed_ripple_rms_rad_per_s": p.speed_ripple_rad_per_s,
+                "ratio_to_shaft": p.ratio_to_shaft,
+                "follows": p.follows,
+                "harmonics": p.harmonics,
+                "periods_averaged": p.periods_averaged,
+                "speed_ripple_rms_rad_per_s": p.speed_ripple_rad_per_s,
             }
             for p in observation.load_periods
         ],
@@ -80,7 +86,11 @@ def refused_document(refused: Refused) -> dict[str, object]:
     return {
         "outcome": "rejected",
         "refused_because": {
-            "code": reason.code, "what": reason.what, "value": reason.value, "limit": reason.limit, "remedy": reason.remedy,
+            "code": reason.code,
+            "what": reason.what,
+            "value": reason.value,
+            "limit": reason.limit,
+            "remedy": reason.remedy,
         },
         "mean_speed_rad_per_s": None,
         "mean_torque_nm": None,
@@ -95,7 +105,9 @@ def refused_document(refused: Refused) -> dict[str, object]:
 def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
     """The combination of parameters that is least known, in words, and how much of it is prior."""
     parts = [
-        f"{WORDS[name]}^{weight:+.2f}" for name, weight in zip(NAMES, fitted.open_direction, strict=True) if abs(weight) > 0.05
+        f"{WORDS[name]}^{weight:+.2f}"
+        for name, weight in zip(NAMES, fitted.open_direction, strict=True)
+        if abs(weight) > 0.05
     ]
     std = float(np.sqrt(fitted.open_direction @ fitted.log_covariance @ fitted.open_direction))
     return {
@@ -104,45 +116,67 @@ def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
         "share_from_prior": fitted.open_share,
         "sentence": (
             f"The data hardly fix {' * '.join(parts)}: {fitted.open_share:.0%} of its prior uncertainty is left."
-            if fitted.open_share > OPEN else
-            f"Least known is {' * '.join(parts)}, to {std:.1%}; the data fix all four parameters."
+            if fitted.open_share > OPEN
+            else f"Least known is {' * '.join(parts)}, to {std:.1%}; the data fix all four parameters."
         ),
     }
 
 
-def indicator_document(observation: Observation, pulses: Pulses | None, indicators: list[Indicator]) -> dict[str, object]:
+def indicator_document(
+    observation: Observation, pulses: Pulses | None, indicators: list[Indicator]
+) -> dict[str, object]:
     document: dict[str, object] = {
         indicator.name: quantity(indicator.quantity.value, indicator.quantity.std) for indicator in indicators
     }
     document["pulses_per_turn"] = None if pulses is None else pulses.per_turn
     document |= _terminal(observation.audited)
     bands = rotor_side_bands(
-        observation.found.left_over, observation.search.supply_hz, observation.slip, float(abs(observation.lines.current_a[0]))
+        observation.found.left_over,
+        observation.search.supply_hz,
+        observation.slip,
+        float(abs(observation.lines.current_a[0])),
     )
-    document["rotor_side_bands"] = None if bands is None else {
-        "offset_hz": bands.offset_hz, "level_db": bands.level_db, "above_floor_db": bands.above_floor_db,
-    }
+    document["rotor_side_bands"] = (
+        None
+        if bands is None
+        else {
+            "offset_hz": bands.offset_hz,
+            "level_db": bands.level_db,
+            "above_floor_db": bands.above_floor_db,
+        }
+    )
     return document
 
 
 def entry_of(observation: Observation, indicators: list[Indicator], source: str) -> Entry:
     """What a baseline stores of this recording."""
     return Entry(
-        source, observation.mean_speed_rad_per_s, observation.mean_torque_nm, observation.search.supply_hz,
+        source,
+        observation.mean_speed_rad_per_s,
+        observation.mean_torque_nm,
+        observation.search.supply_hz,
         {i.name: (i.quantity.value, i.noise_std) for i in indicators},
     )
 
 
 def verdict_document(verdict: Verdict) -> dict[str, object]:
     return {
-        "state": verdict.state.name.lower(), "sentence": verdict.state.value, "compared_with": verdict.compared_with,
-        "alarms": list(verdict.names), "false_alarm_per_indicator": verdict.false_alarm,
+        "state": verdict.state.name.lower(),
+        "sentence": verdict.state.value,
+        "compared_with": verdict.compared_with,
+        "alarms": list(verdict.names),
+        "false_alarm_per_indicator": verdict.false_alarm,
         "healthy_recordings_that_alarm_against_the_others": verdict.left_out_alarms,
         "healthy_recordings_at_other_operating_points": verdict.other_operating_points,
         "watched": [
             {
-                "name": w.name, "value": w.value, "healthy_mean": w.healthy_mean, "healthy_std": w.healthy_std,
-                "distance": w.distance, "threshold": w.threshold, "alarms": w.alarms,
+                "name": w.name,
+                "value": w.value,
+                "healthy_mean": w.healthy_mean,
+                "healthy_std": w.healthy_std,
+                "distance": w.distance,
+                "threshold": w.threshold,
+                "alarms": w.alarms,
             }
             for w in verdict.watched
         ],
@@ -167,16 +201,24 @@ def _terminal(audited: Audited) -> dict[str, object]:
         return {}
     root = np.sqrt(2.0)
     return {
-        "supply_frequency_hz": f.frequency_hz, "voltage_rms_v": abs(f.voltage_v) / root, "current_rms_a": abs(f.current_a) / root,
-        "voltage_unbalance": f.voltage_unbalance, "current_unbalance": f.current_unbalance, "power_w": f.power_w,
-        "reactive_power_var": f.reactive_var, "power_factor": f.power_factor, "runs_backwards": f.runs_backwards,
+        "supply_frequency_hz": f.frequency_hz,
+        "voltage_rms_v": abs(f.voltage_v) / root,
+        "current_rms_a": abs(f.current_a) / root,
+        "voltage_unbalance": f.voltage_unbalance,
+        "current_unbalance": f.current_unbalance,
+        "power_w": f.power_w,
+        "reactive_power_var": f.reactive_var,
+        "power_factor": f.power_factor,
+        "runs_backwards": f.runs_backwards,
     }
 
 
 def _segment(observation: Observation) -> dict[str, float]:
     time = observation.frame.time_s[observation.part] + observation.audited.start_s
     return {
-        "start_s": float(time[0]), "end_s": float(time[-1]), "mean_speed_rad_per_s": observation.segment_speed_rad_per_s,
+        "start_s": float(time[0]),
+        "end_s": float(time[-1]),
+        "mean_speed_rad_per_s": observation.segment_speed_rad_per_s,
         "supply_frequency_hz": observation.lines.supply_rad_per_s / (2 * np.pi),
     }
 

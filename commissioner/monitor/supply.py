@@ -152,8 +152,14 @@ def turning_frame(current: Vector, voltage: Vector, supply: SupplyAngle, sample_
     keep = slice(cut, slow_i.size - cut)
     slow_time = np.arange(slow_i.size)[keep] * period
     return TurningFrame(
-        slow_time, slow_i[keep], slow_v[keep], supply.angle_rad(slow_time), supply.frequency_rad_per_s(slow_time),
-        period, band, start,
+        slow_time,
+        slow_i[keep],
+        slow_v[keep],
+        supply.angle_rad(slow_time),
+        supply.frequency_rad_per_s(slow_time),
+        period,
+        band,
+        start,
     )
 
 

@@ -13,7 +13,15 @@ import numpy as np
 from commissioner.monitor.averaging import Lines
 from commissioner.monitor.fit import Fitted, Problem, band_weights, circuit_at, shrinkage, speed_lines, steps
 from commissioner.monitor.inversion import (
-    RotorState, SpeedLines, Torus, basis_of, complex_speed, rotor_state, speed_noise, speed_on, torque_of,
+    RotorState,
+    SpeedLines,
+    Torus,
+    basis_of,
+    complex_speed,
+    rotor_state,
+    speed_noise,
+    speed_on,
+    torque_of,
 )
 from commissioner.monitor.supply import Vector
 from commissioner.motor.running import TCircuit
@@ -79,7 +87,9 @@ def _noise_changes(
         wobble = 2 * np.real(on.basis[:, on.positive] @ noise[b])
         push = drive * lines.current_influence[b] + 1j * pairs * (on.project @ (wobble * flux_on))
         moved = SpeedLines(speed.mean_rad_per_s, speed.amplitude_rad_per_s + noise[b])
-        changes.append((circuit, moved, state.flux_wb + state.inverse @ push, lines.current_a + lines.current_influence[b]))
+        changes.append(
+            (circuit, moved, state.flux_wb + state.inverse @ push, lines.current_a + lines.current_influence[b])
+        )
     return changes
 
 
@@ -107,7 +117,9 @@ def _parameter_changes(
         circuit = circuit_at(fitted, step)
         mean, upper, lower = complex_speed(circuit, pairs, lines, on)
         value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
-        moved = SpeedLines(value, speed.amplitude_rad_per_s + weight * (upper - start_up) + (1 - weight) * (lower - start_low))
+        moved = SpeedLines(
+            value, speed.amplitude_rad_per_s + weight * (upper - start_up) + (1 - weight) * (lower - start_low)
+        )
         changes.append((circuit, moved, rotor_state(circuit, pairs, lines, on, moved).flux_wb, lines.current_a))
     return changes
 
@@ -119,7 +131,9 @@ def evaluate(
     lines, pairs = problem.lines, problem.pole_pairs
     basis = basis_of(lines, comb_phases_rad, time_s.size)
     value = _at(solved.circuit, pairs, problem, basis, solved.speed, solved.state.flux_wb, lines.current_a)
-    moved = [_at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes]
+    moved = [
+        _at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes
+    ]
     spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved)) for k in range(3)]
     inertia = inertia_kg_m2
     load_std = None
@@ -127,7 +141,13 @@ def evaluate(
         load_std = np.sqrt(sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved))
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (value[0][1:] + value[0][:-1]) * np.diff(time_s))])
     return Waveform(
-        time_s, angle, value[0], value[1], None if inertia is None else value[1] - inertia * value[2], spread[0], spread[1],
+        time_s,
+        angle,
+        value[0],
+        value[1],
+        None if inertia is None else value[1] - inertia * value[2],
+        spread[0],
+        spread[1],
         load_std,
     )
 

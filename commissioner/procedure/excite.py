@@ -253,11 +253,14 @@ def _known(job: Job, findings: Findings) -> InverseGamma:
 def _believable(look: Identification, otherwise: InverseGamma, box: ParameterBox) -> InverseGamma:
     """Each value of the look, or the plate's where the look is too uncertain or outside what the plate allows."""
     corners = zip(
-        look.parameters.as_tuple(), look.std, otherwise.as_tuple(), box.lower.as_tuple(), box.upper.as_tuple(), strict=True
+        look.parameters.as_tuple(),
+        look.std,
+        otherwise.as_tuple(),
+        box.lower.as_tuple(),
+        box.upper.as_tuple(),
+        strict=True,
     )
-    return InverseGamma(
-        *(v if s < LOOK_STD * v and low <= v <= high else plate for v, s, plate, low, high in corners)
-    )
+    return InverseGamma(*(v if s < LOOK_STD * v and low <= v <= high else plate for v, s, plate, low, high in corners))
 
 
 def _excitation_limits(job: Job, findings: Findings) -> ExcitationLimits:

@@ -35,8 +35,13 @@ def update(path: Path, entry: Entry, learn: bool) -> tuple[Verdict, History]:
 def read(path: Path) -> History:
     """ConfigurationError where the file is not a baseline."""
     if not path.is_file() or path.stat().st_size > MAX_BYTES:
-        raise UsageError(f"{path} is no baseline file", step="read baseline", value=str(path), limit="a file written by --baseline",
-                         remedy="name the file, not its folder")
+        raise UsageError(
+            f"{path} is no baseline file",
+            step="read baseline",
+            value=str(path),
+            limit="a file written by --baseline",
+            remedy="name the file, not its folder",
+        )
     try:
         document = json.loads(path.read_text("utf-8"))
         if document["version"] != VERSION:
@@ -51,7 +56,8 @@ def read(path: Path) -> History:
 def write(path: Path, history: History) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     document = {
-        "version": VERSION, "healthy": [asdict(entry) for entry in history.healthy],
+        "version": VERSION,
+        "healthy": [asdict(entry) for entry in history.healthy],
         "judged": [asdict(entry) for entry in history.judged],
     }
     temporary = path.with_name(path.name + ".part")
@@ -61,6 +67,9 @@ def write(path: Path, history: History) -> None:
 
 def _entry(raw: dict[str, Any]) -> Entry:
     return Entry(
-        str(raw["source"]), float(raw["speed_rad_per_s"]), float(raw["torque_nm"]), float(raw["supply_hz"]),
+        str(raw["source"]),
+        float(raw["speed_rad_per_s"]),
+        float(raw["torque_nm"]),
+        float(raw["supply_hz"]),
         {str(name): (float(value), float(std)) for name, (value, std) in raw["indicators"].items()},
     )

@@ -19,8 +19,16 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.table import MAX_BYTES, Table, read_table, to_running
 from commissioner.records import RunningRecording, Signal
 
-FOREIGN = {".tdms": "TDMS", ".mf4": "MDF4", ".mdf": "MDF", ".cfg": "COMTRADE", ".dat": "COMTRADE", ".cff": "COMTRADE",
-           ".xlsx": "Excel", ".xls": "Excel"}
+FOREIGN = {
+    ".tdms": "TDMS",
+    ".mf4": "MDF4",
+    ".mdf": "MDF",
+    ".cfg": "COMTRADE",
+    ".dat": "COMTRADE",
+    ".cff": "COMTRADE",
+    ".xlsx": "Excel",
+    ".xls": "Excel",
+}
 MAX_PREFACE_LINES = 200
 SCALE = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 UNIT = re.compile(r"^[\[(]?\s*(n|u|µ|μ|m|k|M)?(s|sec|a|v|rad/s|1/min|rpm|hz)\s*[\])]?$", re.IGNORECASE)
@@ -36,12 +44,22 @@ def read_running(path: Path) -> RunningRecording:
 def import_table(path: Path) -> Table:
     """The table of a contract file as it stands, of any other file after its columns were recognised."""
     if not path.is_file():
-        raise UsageError(f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
-                         remedy="check the path")
+        raise UsageError(
+            f"there is no file {path}",
+            step="read recording",
+            value=str(path),
+            limit="an existing file",
+            remedy="check the path",
+        )
     suffix = path.suffix.lower()
     if suffix in FOREIGN:
-        raise DataRefused(f"{path}: {FOREIGN[suffix]} files are not read", step="read recording", value=suffix,
-                          limit="CSV, CSV.gz, Parquet, MATLAB v5", remedy="export the recording as CSV or Parquet")
+        raise DataRefused(
+            f"{path}: {FOREIGN[suffix]} files are not read",
+            step="read recording",
+            value=suffix,
+            limit="CSV, CSV.gz, Parquet, MATLAB v5",
+            remedy="export the recording as CSV or Parquet",
+        )
     if suffix == ".mat":
         return recognise(matlab_vectors(path), {}, str(path))
     try:
@@ -109,8 +127,13 @@ def _layout(lines: list[str], source: str) -> tuple[str, int]:
             counts = [_count_numbers(line, separator) for line in lines[start : start + 3]]
             if len(counts) == 3 and min(counts) == max(counts) >= 2:
                 return separator, start
-    raise DataRefused(f"{source}: no rows of numbers were found", step="read recording", value=lines[0][:60] if lines else "",
-                      limit="two or more columns of numbers", remedy="export time, three currents and three voltages as CSV")
+    raise DataRefused(
+        f"{source}: no rows of numbers were found",
+        step="read recording",
+        value=lines[0][:60] if lines else "",
+        limit="two or more columns of numbers",
+        remedy="export time, three currents and three voltages as CSV",
+    )
 
 
 def _count_numbers(line: str, separator: str) -> int:
@@ -170,8 +193,13 @@ def _numbers(lines: list[str], separator: str, comma: bool, width: int, source: 
         cells = line.replace(",", ".").split(separator) if comma else line.split(separator)
         cells = [cell.strip() for cell in cells] if separator != " " else line.split()
         if len(cells) < width:
-            raise DataRefused(f"{source}: row {number} holds {len(cells)} columns", step="read recording", value=len(cells),
-                              limit=width, remedy="export again, without footer lines")
+            raise DataRefused(
+                f"{source}: row {number} holds {len(cells)} columns",
+                step="read recording",
+                value=len(cells),
+                limit=width,
+                remedy="export again, without footer lines",
+            )
         rows.append([float(cell) if _is_number(cell, False) else np.nan for cell in cells[:width]])
     return np.array(rows, dtype=np.float64)
 
@@ -237,7 +265,9 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
     if missing:
         raise DataRefused(
             f"{source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
-            step="recognise columns", value=_some(columns), limit="time_s, three line currents and three voltages, in SI units",
+            step="recognise columns",
+            value=_some(columns),
+            limit="time_s, three line currents and three voltages, in SI units",
             remedy="record all six channels against time, or rename the columns to the contract's",
         )
     return Table(kept, data, source)
@@ -261,21 +291,25 @@ def _some(columns: Mapping[str, Signal]) -> str:
 
 
 def _key(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.split(".")[-1].lower())
+    return re.sub(r"[^a-z0-9]", "", name.rsplit(".", maxsplit=1)[-1].lower())
 
 
 def meaning_of(name: str) -> str | None:
     """The contract's column that a name means, or None: `Ia`, `i_L1 (A)`, `Strom U`, `van`, `U12`, `vab`, `t`, `speed`."""
-    bare = IN_NAME.sub("", name.split(".")[-1] if not name.split(".")[-1].isdigit() else name)
+    bare = IN_NAME.sub("", name.rsplit(".", maxsplit=1)[-1] if not name.rsplit(".", maxsplit=1)[-1].isdigit() else name)
     key = re.sub(r"[^a-z0-9]", "", bare.lower())
     if key in {"t", "time", "times", "zeit", "timestamp", "x", "xaxis", "second"}:
         return "time_s"
     if key in {"speed", "speedradpers", "wm", "omegam", "drehzahl", "n", "rpm"}:
         return "speed_rad_per_s"
-    found = re.match(r"^(?:i|is|cur|current|strom|courant|currentphase|iphase|phasecurrent|il|strom)(?:l)?([abcuvwrt123])a?$", key)
+    found = re.match(
+        r"^(?:i|is|cur|current|strom|courant|currentphase|iphase|phasecurrent|il|strom)(?:l)?([abcuvwrt123])a?$", key
+    )
     if found and key not in {"it"}:
         return f"current_{PHASES[found.group(1)]}_a"
-    found = re.match(r"^(?:u|v|vs|vol|volt|voltage|spannung|tension|voltagephase|vl|ul)(?:l)?([abcuvwrt123])(?:n|0|v)?$", key)
+    found = re.match(
+        r"^(?:u|v|vs|vol|volt|voltage|spannung|tension|voltagephase|vl|ul)(?:l)?([abcuvwrt123])(?:n|0|v)?$", key
+    )
     if found:
         return f"voltage_{PHASES[found.group(1)]}_v"
     found = re.match(r"^(?:u|v|vs|vol|volt|voltage|spannung|ul|vl)(?:l)?([abcuvwrt123])(?:l)?([abcuvwrt123])v?$", key)
@@ -286,5 +320,10 @@ def meaning_of(name: str) -> str | None:
 
 
 def _unreadable(path: Path, reason: str) -> DataRefused:
-    return DataRefused(f"{path}: the file cannot be read", step="read recording", value=reason,
-                       limit="CSV, CSV.gz, Parquet, MATLAB v5", remedy="export the recording again, as CSV or Parquet")
+    return DataRefused(
+        f"{path}: the file cannot be read",
+        step="read recording",
+        value=reason,
+        limit="CSV, CSV.gz, Parquet, MATLAB v5",
+        remedy="export the recording again, as CSV or Parquet",
+    )

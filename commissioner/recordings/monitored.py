@@ -19,7 +19,13 @@ REPORT_NAME = "report.html"
 def write_results(folder: Path, observation: Observation, page: Page) -> dict[str, str]:
     """The two files; names and columns are the contract's, standard deviations are added columns."""
     if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder} is not a folder", step="write results", value=str(folder), limit="a folder", remedy="choose another --out")
+        raise UsageError(
+            f"{folder} is not a folder",
+            step="write results",
+            value=str(folder),
+            limit="a folder",
+            remedy="choose another --out",
+        )
     folder.mkdir(parents=True, exist_ok=True)
     csv, report = folder / CSV_NAME, folder / REPORT_NAME
     write_table(csv, columns_of(observation), {})

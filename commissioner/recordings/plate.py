@@ -14,7 +14,14 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.motor.running import equal_leakages
 
-NEEDED = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
+NEEDED = (
+    "rated_power_w",
+    "rated_voltage_v",
+    "rated_frequency_hz",
+    "rated_current_a",
+    "rated_speed_rpm",
+    "power_factor",
+)
 MAX_RESULT_BYTES = 10_000_000
 
 
@@ -27,7 +34,10 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
     for key in NEEDED:
         if not isinstance(metadata.get(key), float):
             raise ConfigurationError(
-                file=source, key=key, value=metadata.get(key), expected="a number in the recording's metadata, or --motor NAME_OR_FILE"
+                file=source,
+                key=key,
+                value=metadata.get(key),
+                expected="a number in the recording's metadata, or --motor NAME_OR_FILE",
             )
     values = {key: float(metadata[key]) for key in NEEDED}
     pairs = metadata.get("pole_pairs")
@@ -47,17 +57,30 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
 def start_from(path: Path) -> Start:
     """What commissioning found: the `parameters` of a run's result, as the start and the prior of the fit."""
     if not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
-        raise UsageError(f"there is no result {path}", step="read start", value=str(path), limit="the result.json of a run",
-                         remedy="give the result.json of a commissioning run")
+        raise UsageError(
+            f"there is no result {path}",
+            step="read start",
+            value=str(path),
+            limit="the result.json of a run",
+            remedy="give the result.json of a commissioning run",
+        )
     try:
         parameters = json.loads(path.read_text("utf-8"))["parameters"]
         values = [
             float(parameters[name]["value"])
-            for name in ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+            for name in (
+                "stator_resistance_ohm",
+                "rotor_resistance_ohm",
+                "leakage_inductance_h",
+                "magnetizing_inductance_h",
+            )
         ]
     except (ValueError, KeyError, TypeError) as error:
         raise ConfigurationError(
-            file=str(path), key="parameters", value=str(error), expected="the four inverse-Gamma parameters of a run's result"
+            file=str(path),
+            key="parameters",
+            value=str(error),
+            expected="the four inverse-Gamma parameters of a run's result",
         ) from error
     if not all(np.isfinite(v) and v > 0 for v in values):
         raise ConfigurationError(file=str(path), key="parameters", value=str(values), expected="four numbers above 0")

@@ -220,11 +220,11 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
 
 
 _KNOWN = frozenset(
-    (
-        "time_s segment axis_deg voltage_axis_v current_u_a current_v_a current_w_a dc_link_v voltage_u_v voltage_v_v "
-        "voltage_w_v voltage_uv_v voltage_vw_v voltage_wu_v speed_rad_per_s"
-    ).split()
-)
+    {
+        "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
+        "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",
+    }
+)  # fmt: skip
 
 
 def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:

@@ -49,7 +49,8 @@ def over_angle(seen: Observation) -> Figure:
     speed.fill_between(x, y - 2 * s, y + 2 * s, color=BLUE, alpha=0.2, linewidth=0)
     speed.set_ylabel("speed / (1/min)")
     for name, value, std, colour in (
-        ("electromagnetic", period.torque_nm, period.torque_std, ORANGE), ("load", period.load_torque_nm, period.load_torque_std, GREEN),
+        ("electromagnetic", period.torque_nm, period.torque_std, ORANGE),
+        ("load", period.load_torque_nm, period.load_torque_std, GREEN),
     ):
         if value is not None and std is not None:
             x, y, s = _thin(turns, value, std)
@@ -68,7 +69,8 @@ def polar(seen: Observation) -> Figure:
     torque = period.torque_nm if period.load_torque_nm is None else period.load_torque_nm
     label = "electromagnetic torque / N m" if period.load_torque_nm is None else "load torque / N m"
     for panel, value, title, colour in (
-        (panels[0, 0], torque, label, GREEN), (panels[0, 1], period.speed_rad_per_s * RPM, "speed / (1/min)", BLUE),
+        (panels[0, 0], torque, label, GREEN),
+        (panels[0, 1], period.speed_rad_per_s * RPM, "speed / (1/min)", BLUE),
     ):
         angle, radius = _thin(period.shaft_angle_rad, value)
         panel.plot(angle, radius, color=colour)
@@ -83,7 +85,9 @@ def resimulation(seen: Observation) -> Figure:
     """i_d and i_q measured and simulated over a few shaft turns."""
     proof = seen.proof
     figure, panels = _panels(1, 2, 3.2)
-    length = min(proof.time_s.size, int(3 / seen.load_periods[0].frequency_hz / max(seen.audited.sample_period_s, 1e-9)))
+    length = min(
+        proof.time_s.size, int(3 / seen.load_periods[0].frequency_hz / max(seen.audited.sample_period_s, 1e-9))
+    )
     time = (proof.time_s[:length] - proof.time_s[0]) * 1e3
     for panel, part, name in ((panels[0, 0], np.real, "i_d / A"), (panels[0, 1], np.imag, "i_q / A")):
         x, measured, simulated = _thin(time, part(proof.measured_a[:length]), part(proof.simulated_a[:length]))
@@ -108,7 +112,9 @@ def spectrum(seen: Observation) -> Figure:
     for k, load in enumerate(seen.load_periods):
         colour = COLOURS[(k + 1) % len(COLOURS)]
         for h in range(1, min(load.harmonics, 12) + 1):
-            top.axvline(h * load.frequency_hz, color=colour, alpha=0.45, linewidth=1.0, label=f"{load.name}" if h == 1 else None)
+            top.axvline(
+                h * load.frequency_hz, color=colour, alpha=0.45, linewidth=1.0, label=f"{load.name}" if h == 1 else None
+            )
     slip_line = 2 * seen.slip * seen.search.supply_hz
     top.axvline(slip_line, color=RED, alpha=0.5, linewidth=1.0, linestyle=":", label="2 s f (rotor side band)")
     top.legend(frameon=False, ncols=3, loc="upper right")
@@ -147,10 +153,18 @@ def trend(history: History, indicators: Sequence[Indicator]) -> Figure:
             x = np.arange(count, count + len(values))
             count += len(values)
             if values:
-                panel.errorbar(x, [v for v, _ in values], yerr=[2 * s for _, s in values], fmt="o", markersize=3, color=colour, label=label)
+                panel.errorbar(
+                    x,
+                    [v for v, _ in values],
+                    yerr=[2 * s for _, s in values],
+                    fmt="o",
+                    markersize=3,
+                    color=colour,
+                    label=label,
+                )
         panel.set_title(name, fontsize=8, loc="left")
         panel.tick_params(labelsize=7)
-    for panel in panels.flat[len(names):]:
+    for panel in panels.flat[len(names) :]:
         panel.set_visible(False)
     panels.flat[0].legend(frameon=False, fontsize=7)
     return figure

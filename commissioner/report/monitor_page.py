@@ -15,17 +15,29 @@ RPM = 30 / 3.141592653589793
 
 
 def page_of(
-    seen: Observation, pulses: Pulses | None, indicators: Sequence[Indicator], verdict: Verdict | None,
-    history: History | None, document: dict[str, Any], name: str,
+    seen: Observation,
+    pulses: Pulses | None,
+    indicators: Sequence[Indicator],
+    verdict: Verdict | None,
+    history: History | None,
+    document: dict[str, Any],
+    name: str,
 ) -> Page:
     """One self-contained page; all figures inline."""
     tone: Tone = "bad" if verdict is not None and verdict.names else "good"
     return Page(
-        title=f"Running motor: {name}", headline=_headline(seen, verdict), tone=tone, facts=_facts(seen),
+        title=f"Running motor: {name}",
+        headline=_headline(seen, verdict),
+        tone=tone,
+        facts=_facts(seen),
         sections=[
-            _shaft(seen), _proof(seen, document), _spectrum(seen),
-            *([_pulses(pulses)] if pulses else []), *([_trend(verdict, history, seen, indicators)] if verdict and history else []),
-            _motor(seen, document), _audit(seen),
+            _shaft(seen),
+            _proof(seen, document),
+            _spectrum(seen),
+            *([_pulses(pulses)] if pulses else []),
+            *([_trend(verdict, history, seen, indicators)] if verdict and history else []),
+            _motor(seen, document),
+            _audit(seen),
         ],
         footer="Quantities are SI, per phase of the star equivalent; ± is one standard deviation. Method: C. J. Schantz, "
         "S. B. Leeb, Self-Sensing Induction Motors for Condition Monitoring.",
@@ -53,71 +65,141 @@ def _facts(seen: Observation) -> list[tuple[str, str]]:
 
 def _shaft(seen: Observation) -> Section:
     known = "" if seen.inertia_kg_m2 else " The inertia is unknown, so the load torque is not given."
-    return Section("What the shaft does within the period", [
-        picture(figures.over_angle(seen), "Speed, electromagnetic and load torque over shaft angle with two standard deviations." + known),
-        picture(figures.polar(seen), "The same around the shaft: distance from the centre is load torque (left) and speed (right)."),
-        Table(("what repeats", "frequency / Hz", "of the shaft", "speed ripple rms / (1/min)", "harmonics", "periods averaged", "follows"), [
-            (p.name, f"{p.frequency_hz:.5f} ± {p.frequency_std_hz:.5f}", f"{p.ratio_to_shaft:.4f}",
-             f"{p.speed_ripple_rad_per_s * RPM:.3g}", str(p.harmonics), f"{p.periods_averaged:.0f}", p.follows)
-            for p in seen.load_periods
-        ]),
-    ])
+    return Section(
+        "What the shaft does within the period",
+        [
+            picture(
+                figures.over_angle(seen),
+                "Speed, electromagnetic and load torque over shaft angle with two standard deviations." + known,
+            ),
+            picture(
+                figures.polar(seen),
+                "The same around the shaft: distance from the centre is load torque (left) and speed (right).",
+            ),
+            Table(
+                (
+                    "what repeats",
+                    "frequency / Hz",
+                    "of the shaft",
+                    "speed ripple rms / (1/min)",
+                    "harmonics",
+                    "periods averaged",
+                    "follows",
+                ),
+                [
+                    (
+                        p.name,
+                        f"{p.frequency_hz:.5f} ± {p.frequency_std_hz:.5f}",
+                        f"{p.ratio_to_shaft:.4f}",
+                        f"{p.speed_ripple_rad_per_s * RPM:.3g}",
+                        str(p.harmonics),
+                        f"{p.periods_averaged:.0f}",
+                        p.follows,
+                    )
+                    for p in seen.load_periods
+                ],
+            ),
+        ],
+    )
 
 
 def _proof(seen: Observation, document: dict[str, Any]) -> Section:
-    parts: list[Any] = [picture(
-        figures.resimulation(seen),
-        f"Measured current, and the model's current when the measured voltage drives it at the estimated speed: they differ by "
-        f"{seen.proof.relative_rms:.1%} rms, noise and mains harmonics included.",
-    )]
+    parts: list[Any] = [
+        picture(
+            figures.resimulation(seen),
+            f"Measured current, and the model's current when the measured voltage drives it at the estimated speed: they differ by "
+            f"{seen.proof.relative_rms:.1%} rms, noise and mains harmonics included.",
+        )
+    ]
     if document.get("reference_speed"):
         r = document["reference_speed"]
-        parts.append(f"Against the speed column of the recording (never an input): mean off by {r['mean_speed_relative_error']:+.4%}, "
-                     f"ripple off by {r['ripple_relative_error']:.1%} of its rms.")
+        parts.append(
+            f"Against the speed column of the recording (never an input): mean off by {r['mean_speed_relative_error']:+.4%}, "
+            f"ripple off by {r['ripple_relative_error']:.1%} of its rms."
+        )
     return Section("Proof without an encoder", parts)
 
 
 def _spectrum(seen: Observation) -> Section:
-    return Section("What the currents show", [
-        picture(figures.spectrum(seen), "Side bands of the current in the supply's frame, over their local floor, with the lines named. "
-                "Below: what is left after all named combs and mains harmonics are taken out."),
-    ])
+    return Section(
+        "What the currents show",
+        [
+            picture(
+                figures.spectrum(seen),
+                "Side bands of the current in the supply's frame, over their local floor, with the lines named. "
+                "Below: what is left after all named combs and mains harmonics are taken out.",
+            ),
+        ],
+    )
 
 
 def _pulses(pulses: Pulses) -> Section:
-    return Section("Torque pulses laid over each other", [
-        picture(figures.superimposed(pulses), f"{pulses.per_turn} pulses a turn, normalised. Area between them: "
+    return Section(
+        "Torque pulses laid over each other",
+        [
+            picture(
+                figures.superimposed(pulses),
+                f"{pulses.per_turn} pulses a turn, normalised. Area between them: "
                 f"{pulses.dissimilarity.value:.2f} ± {pulses.dissimilarity.std:.2f} % of a pulse; difference of their areas: "
-                f"{pulses.area_difference.value:.2f} ± {pulses.area_difference.std:.2f} %."),
-    ])
+                f"{pulses.area_difference.value:.2f} ± {pulses.area_difference.std:.2f} %.",
+            ),
+        ],
+    )
 
 
 def _trend(verdict: Verdict, history: History, seen: Observation, indicators: Sequence[Indicator]) -> Section:
-    rows = [(w.name, f"{w.value:.4g}", f"{w.healthy_mean:.4g} ± {w.healthy_std:.2g}", f"{w.distance:+.1f}", f"{w.threshold:.1f}")
-            for w in verdict.watched]
+    rows = [
+        (
+            w.name,
+            f"{w.value:.4g}",
+            f"{w.healthy_mean:.4g} ± {w.healthy_std:.2g}",
+            f"{w.distance:+.1f}",
+            f"{w.threshold:.1f}",
+        )
+        for w in verdict.watched
+    ]
     tones: list[Tone] = ["bad" if w.alarms else "good" for w in verdict.watched]
-    note = (f"{verdict.compared_with} healthy recordings at this operating point, {verdict.other_operating_points} at others. "
-            f"{verdict.left_out_alarms} of them would alarm against the rest; the threshold is set for one false alarm in "
-            f"{1 / verdict.false_alarm:,.0f} recordings and indicator.")
-    return Section("Against this machine's past", [
-        picture(figures.trend(history, indicators), "Healthy recordings, those judged since, and this one (last point)."),
-        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
-    ])
+    note = (
+        f"{verdict.compared_with} healthy recordings at this operating point, {verdict.other_operating_points} at others. "
+        f"{verdict.left_out_alarms} of them would alarm against the rest; the threshold is set for one false alarm in "
+        f"{1 / verdict.false_alarm:,.0f} recordings and indicator."
+    )
+    return Section(
+        "Against this machine's past",
+        [
+            picture(
+                figures.trend(history, indicators), "Healthy recordings, those judged since, and this one (last point)."
+            ),
+            Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
+        ],
+    )
 
 
 def _motor(seen: Observation, document: dict[str, Any]) -> Section:
     parameters = document["parameters"]
-    return Section("The motor as it runs now", [
-        Table(("parameter (inverse-Gamma)", "value", "standard deviation"), [
-            (key, f"{q['value']:.5g}", f"{q['std']:.2g} ({q['std'] / q['value']:.1%})") for key, q in parameters.items()
-        ], caption=f"Fitted to this recording, started from: {seen.start.origin}."),
-        document["cannot_be_fixed"]["sentence"],
-    ])
+    return Section(
+        "The motor as it runs now",
+        [
+            Table(
+                ("parameter (inverse-Gamma)", "value", "standard deviation"),
+                [
+                    (key, f"{q['value']:.5g}", f"{q['std']:.2g} ({q['std'] / q['value']:.1%})")
+                    for key, q in parameters.items()
+                ],
+                caption=f"Fitted to this recording, started from: {seen.start.origin}.",
+            ),
+            document["cannot_be_fixed"]["sentence"],
+        ],
+    )
 
 
 def _audit(seen: Observation) -> Section:
     tones: list[Tone] = ["warn" if f.kind == "corrected" else "plain" for f in seen.findings]
     channels = "; ".join(f"{phase}: {channel}" for phase, channel in seen.audited.channel_map.items())
-    return Section("What was found in the recording", [
-        Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones), f"Channels as used: {channels}.",
-    ])
+    return Section(
+        "What was found in the recording",
+        [
+            Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
+            f"Channels as used: {channels}.",
+        ],
+    )

@@ -57,9 +57,7 @@ def _facts(result: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Parameters in the drive", "new values, read back and stored" if written else "unchanged"
 
 
-def _sections(
-    result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings
-) -> Iterator[Section]:
+def _sections(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings) -> Iterator[Section]:
     tests = _tests(journal)
     yield Section("Result", list(_result_parts(result)))
     yield Section("What objects", list(_objections(result)))
@@ -151,7 +149,9 @@ def _curve_parts(result: Mapping[str, Any]) -> Iterator[Picture]:
     curve = result.get("magnetizing_curve") or ()
     if curve:
         yield picture(
-            figures.magnetizing_curve(curve, result["holds_for_stator_flux_wb"], result["rated_flux_wb"]["stator_peak"]),
+            figures.magnetizing_curve(
+                curve, result["holds_for_stator_flux_wb"], result["rated_flux_wb"]["stator_peak"]
+            ),
             "Secant magnetizing inductance over the flux the tests visited, with its 95 % interval.",
         )
 

@@ -40,8 +40,10 @@ def draw(seed: int, kind: str) -> dict[str, Any]:
     row = rows[int(rng.integers(len(rows)))]
     pairs, frequency = int(row["poles"]) // 2, float(row["f_Hz"])
     circuit = {
-        "stator_resistance_ohm": float(row["Rs_ohm"]), "rotor_resistance_ohm": float(row["Rr_ohm"]),
-        "stator_leakage_h": float(row["Lls_mH"]) / 1e3, "rotor_leakage_h": float(row["Llr_mH"]) / 1e3,
+        "stator_resistance_ohm": float(row["Rs_ohm"]),
+        "rotor_resistance_ohm": float(row["Rr_ohm"]),
+        "stator_leakage_h": float(row["Lls_mH"]) / 1e3,
+        "rotor_leakage_h": float(row["Llr_mH"]) / 1e3,
         "magnetizing_inductance_h": float(row["Lm_mH"]) / 1e3,
     }
     plate = _plate(circuit, float(row["P_kW"]) * 1e3, float(row["V_LL"]), frequency, pairs)
@@ -49,39 +51,82 @@ def draw(seed: int, kind: str) -> dict[str, Any]:
     torque = plate["rated_power_w"] / speed
     inertia = 2 * rng.uniform(0.12, 0.4) * plate["rated_power_w"] / speed**2
     return {
-        "kind": "running", "nameplate": plate,
-        "machine": circuit | {
-            "pole_pairs": pairs, "inertia_kg_m2": float(inertia), "rotor_slots": int(rng.integers(22, 56)),
-            "slot_modulation": 0.002, "eccentricity": 0.0003, "scatter": 0.2,
+        "kind": "running",
+        "nameplate": plate,
+        "machine": circuit
+        | {
+            "pole_pairs": pairs,
+            "inertia_kg_m2": float(inertia),
+            "rotor_slots": int(rng.integers(22, 56)),
+            "slot_modulation": 0.002,
+            "eccentricity": 0.0003,
+            "scatter": 0.2,
         },
         "supply": {
-            "voltage_v": plate["rated_voltage_v"], "frequency_hz": frequency, "frequency_spread_hz": 0.1, "unbalance": 0.03,
-            "fifth": 0.02, "seventh": 0.02, "drift_hz": 0.05, "sag": 0.002,
+            "voltage_v": plate["rated_voltage_v"],
+            "frequency_hz": frequency,
+            "frequency_spread_hz": 0.1,
+            "unbalance": 0.03,
+            "fifth": 0.02,
+            "seventh": 0.02,
+            "drift_hz": 0.05,
+            "sag": 0.002,
         },
         "steady_load": {"constant_nm": float(0.1 * torque)},
         "loads": _loads(kind, float(torque), frequency / pairs, rng),
-        "sensing": {"noise": 0.01, "bits": 16}, "recording": {"duration_s": 30.0, "rate_hz": 8000.0},
+        "sensing": {"noise": 0.01, "bits": 16},
+        "recording": {"duration_s": 30.0, "rate_hz": 8000.0},
     }
 
 
 def _loads(kind: str, torque: float, synchronous_hz: float, rng: np.random.Generator) -> list[dict[str, Any]]:
     share = rng.uniform(0.4, 0.75)
-    compressor = {"kind": "compressor", "mean_nm": share * torque, "leak_mm2": [0.0, 0.0],
-                  "pressure_ratio": float(rng.uniform(3, 6))}
-    imbalance = {"kind": "harmonics", "name": "imbalance", "mean_nm": share * torque,
-                 "amplitudes_nm": (torque * np.array([0.12, 0.05, 0.03])).tolist(), "phases_rad": rng.uniform(0, 6, 3).tolist()}
+    compressor = {
+        "kind": "compressor",
+        "mean_nm": share * torque,
+        "leak_mm2": [0.0, 0.0],
+        "pressure_ratio": float(rng.uniform(3, 6)),
+    }
+    imbalance = {
+        "kind": "harmonics",
+        "name": "imbalance",
+        "mean_nm": share * torque,
+        "amplitudes_nm": (torque * np.array([0.12, 0.05, 0.03])).tolist(),
+        "phases_rad": rng.uniform(0, 6, 3).tolist(),
+    }
     small = imbalance | {"amplitudes_nm": (torque * np.array([0.05, 0.02])).tolist(), "phases_rad": [0.3, 1.4]}
     frequencies = [1.9, 19.0, 70.8, float(rng.uniform(3, 60))]
-    brake = {"kind": "brake", "frequency_hz": frequencies[int(rng.integers(4))], "amplitude_nm": 0.15 * torque, "edge": 0.2}
+    brake = {
+        "kind": "brake",
+        "frequency_hz": frequencies[int(rng.integers(4))],
+        "amplitude_nm": 0.15 * torque,
+        "edge": 0.2,
+    }
     while abs(brake["frequency_hz"] / synchronous_hz - round(brake["frequency_hz"] / synchronous_hz)) < 0.07:
         brake["frequency_hz"] = float(rng.uniform(3, 60))
-    gear = {"kind": "gear", "ratio": float(rng.choice([2.37, 3.618, 1.734, 4.41])), "mean_nm": share * torque,
-            "amplitudes_nm": (torque * np.array([0.15, 0.08, 0.04])).tolist(), "phases_rad": rng.uniform(0, 6, 3).tolist()}
+    gear = {
+        "kind": "gear",
+        "ratio": float(rng.choice([2.37, 3.618, 1.734, 4.41])),
+        "mean_nm": share * torque,
+        "amplitudes_nm": (torque * np.array([0.15, 0.08, 0.04])).tolist(),
+        "phases_rad": rng.uniform(0, 6, 3).tolist(),
+    }
     return {
-        "compressor": [compressor], "leak": [compressor | {"leak_mm2": [float(rng.uniform(0.4, 2.5)), 0.0]}],
+        "compressor": [compressor],
+        "leak": [compressor | {"leak_mm2": [float(rng.uniform(0.4, 2.5)), 0.0]}],
         "imbalance": [imbalance],
-        "pump": [{"kind": "pump", "vanes": 3, "mean_nm": share * torque, "amplitude_nm": 0.3 * torque, "once_nm": 0.08 * torque}],
-        "brake": [small | {"mean_nm": share * torque}, brake], "gear": [small | {"mean_nm": 0.0}, gear], "both": [compressor, brake],
+        "pump": [
+            {
+                "kind": "pump",
+                "vanes": 3,
+                "mean_nm": share * torque,
+                "amplitude_nm": 0.3 * torque,
+                "once_nm": 0.08 * torque,
+            }
+        ],
+        "brake": [small | {"mean_nm": share * torque}, brake],
+        "gear": [small | {"mean_nm": 0.0}, gear],
+        "both": [compressor, brake],
     }[kind]
 
 
@@ -103,9 +148,14 @@ def _plate(circuit: dict[str, float], power: float, voltage: float, frequency: f
         low, high = (middle, high) if at(middle)[0] < power else (low, middle)
     current = at(low)[1]
     return {
-        "rated_power_w": power, "rated_voltage_v": voltage, "rated_frequency_hz": frequency,
-        "rated_current_a": round(float(abs(current)), 2), "rated_speed_rpm": round(60 * frequency / pairs * (1 - low)),
-        "power_factor": round(float(np.cos(np.angle(current))), 2), "pole_pairs": pairs, "connection": "star",
+        "rated_power_w": power,
+        "rated_voltage_v": voltage,
+        "rated_frequency_hz": frequency,
+        "rated_current_a": round(float(abs(current)), 2),
+        "rated_speed_rpm": round(60 * frequency / pairs * (1 - low)),
+        "power_factor": round(float(np.cos(np.angle(current))), 2),
+        "pole_pairs": pairs,
+        "connection": "star",
     }
 
 
@@ -114,8 +164,13 @@ def as_recording(columns: dict[str, Any], metadata: dict[str, Any]) -> RunningRe
     i = tuple(columns[name] for name in CURRENTS)
     v = tuple(columns[name] for name in (LINES if is_line else PHASES))
     return RunningRecording(
-        columns["time_s"], (i[0], i[1], i[2]), (v[0], v[1], v[2]), is_line, columns.get("speed_rad_per_s"),
-        metadata["sample_period_s"], metadata,
+        columns["time_s"],
+        (i[0], i[1], i[2]),
+        (v[0], v[1], v[2]),
+        is_line,
+        columns.get("speed_rad_per_s"),
+        metadata["sample_period_s"],
+        metadata,
     )
 
 
@@ -141,7 +196,10 @@ def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str,
     }
     load = seen.period.load_torque_nm
     assert load is not None
-    for name, true, own in (("ripple", played.speed_rad_per_s, seen.period.speed_rad_per_s), ("load", played.load_torque_nm, load)):
+    for name, true, own in (
+        ("ripple", played.speed_rad_per_s, seen.period.speed_rad_per_s),
+        ("load", played.load_torque_nm, load),
+    ):
         expected = _periodic(true[inside], played.time_s[inside], played.angle_rad[inside], truth, seen)
         error = own - own.mean() - expected + expected.mean()
         out[name] = float(100 * np.sqrt(np.mean(error**2)) / (0.5 * np.ptp(expected)))
@@ -166,12 +224,18 @@ def _periodic(
             phases.append(ratio * a)
             outputs.append(ratio * outputs[0])
     orders = 24 if len(phases) == 1 else 16
-    matrix = np.concatenate([np.ones((t.size, 1))] + [f(h * p)[:, None] for p in phases for h in range(1, orders + 1)
-                                                      for f in (np.cos, np.sin)], axis=1)
+    matrix = np.concatenate(
+        [np.ones((t.size, 1))]
+        + [f(h * p)[:, None] for p in phases for h in range(1, orders + 1) for f in (np.cos, np.sin)],
+        axis=1,
+    )
     window = np.hanning(t.size)[:, None]
     lines = np.linalg.lstsq(matrix * window, sampled * window[:, 0], rcond=1e-8)[0]
-    target = np.concatenate([np.ones((seen.period.time_s.size, 1))] + [
-        f(h * p)[:, None] for p in outputs for h in range(1, orders + 1) for f in (np.cos, np.sin)], axis=1)
+    target = np.concatenate(
+        [np.ones((seen.period.time_s.size, 1))]
+        + [f(h * p)[:, None] for p in outputs for h in range(1, orders + 1) for f in (np.cos, np.sin)],
+        axis=1,
+    )
     return np.asarray(target @ lines)
 
 
@@ -183,7 +247,7 @@ def _decimated(values: np.ndarray, step: int) -> np.ndarray:
 def periods_found(seen: Observation, truth: dict[str, Any]) -> bool:
     """The shaft within 0.1 %, every other load within 0.05 Hz, and nothing else."""
     shaft = truth["mean_speed_rad_per_s"] / (2 * np.pi)
-    wanted = sorted({round(l["frequency_hz"], 6) for l in truth["loads"] if abs(l["frequency_hz"] / shaft - 1) > 1e-3})
+    wanted = sorted({round(p["frequency_hz"], 6) for p in truth["loads"] if abs(p["frequency_hz"] / shaft - 1) > 1e-3})
     got = sorted(p.frequency_hz for p in seen.load_periods[1:])
     near = len(wanted) == len(got) and all(abs(a - b) < 0.05 for a, b in zip(wanted, got, strict=True))
     return near and abs(seen.load_periods[0].frequency_hz / shaft - 1) < 1e-3
@@ -206,7 +270,9 @@ def accuracy(count: int, first: int = 0) -> list[dict[str, Any]]:
 
 
 def summary(rows: list[dict[str, Any]]) -> str:
-    lines = [f"{'kind':<11} {'n':>4} {'found':>6} | {'speed % med/max':>18} {'ripple % med/p95':>18} {'load % med/p95':>18} {'torque %':>9}"]
+    lines = [
+        f"{'kind':<11} {'n':>4} {'found':>6} | {'speed % med/max':>18} {'ripple % med/p95':>18} {'load % med/p95':>18} {'torque %':>9}"
+    ]
     for kind in (*KINDS, "all"):
         own = [r for r in rows if (kind in (r["kind"], "all")) and not r["refused"]]
         if not own:
@@ -217,8 +283,13 @@ def summary(rows: list[dict[str, Any]]) -> str:
             f"{np.median(ripple):>9.2f}/{np.percentile(ripple, 95):<8.2f} {np.median(load):>9.2f}/{np.percentile(load, 95):<8.2f} "
             f"{np.median(torque):>8.2f}"
         )
-    return "\n".join([*lines, f"refused: {[r['seed'] for r in rows if r['refused']]}",
-                      f"periods missed: {[r['seed'] for r in rows if not r['refused'] and not r['found']]}"])
+    return "\n".join(
+        [
+            *lines,
+            f"refused: {[r['seed'] for r in rows if r['refused']]}",
+            f"periods missed: {[r['seed'] for r in rows if not r['refused'] and not r['found']]}",
+        ]
+    )
 
 
 def main() -> int:

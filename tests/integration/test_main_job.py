@@ -25,7 +25,14 @@ def job(tmp_path_factory):
         restored = call("restore", "last", "--drive", sim.url, "--runs", str(runs), "--yes", "--json")
         checked = call("check", "--drive", sim.url, "--motor", "motor_2kw2", "--json")
         log = sim.log()
-    return {"answer": answer, "log": log, "runs": runs, "restored": restored, "checked": checked, "key": truth("default")}
+    return {
+        "answer": answer,
+        "log": log,
+        "runs": runs,
+        "restored": restored,
+        "checked": checked,
+        "key": truth("default"),
+    }
 
 
 def test_a_good_run_exits_with_zero_and_says_commissioned(job):
@@ -91,7 +98,9 @@ def test_what_was_written_was_read_back_and_restore_brings_the_old_values_back(j
     back = {row["name"]: row["read_back"] for row in job["restored"].json["written"]}
     for name, row in written.items():
         assert back[name] == pytest.approx(row["before"], rel=1e-6)
-    assert job["checked"].json["parameters_in_drive"] == pytest.approx({n: r["before"] for n, r in written.items()}, rel=1e-6)
+    assert job["checked"].json["parameters_in_drive"] == pytest.approx(
+        {n: r["before"] for n, r in written.items()}, rel=1e-6
+    )
 
 
 def test_each_axis_was_energised_for_twelve_seconds_at_most(job):
@@ -103,9 +112,18 @@ def test_the_run_folder_holds_every_sample_every_decision_and_one_self_contained
     (folder,) = job["runs"].iterdir()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
     recording = to_standstill(read_table(folder / "recording.parquet"))
-    assert recording.time_s.size * recording.sample_period_s == pytest.approx(job["answer"].json["energised_s"], abs=0.05)
+    assert recording.time_s.size * recording.sample_period_s == pytest.approx(
+        job["answer"].json["energised_s"], abs=0.05
+    )
     kinds = {json.loads(line)["kind"] for line in (folder / "journal.jsonl").read_text().splitlines()}
-    assert {"about_to", "checks_judged", "staircase_fitted", "estimate_updated", "verdict_reached", "run_ended"} <= kinds
+    assert {
+        "about_to",
+        "checks_judged",
+        "staircase_fitted",
+        "estimate_updated",
+        "verdict_reached",
+        "run_ended",
+    } <= kinds
     page = (folder / "report.html").read_text()
     assert page.count("<svg") >= 4
     assert "http://" not in page.replace("http://www.w3.org", "")
@@ -139,8 +157,22 @@ def test_the_archive_lists_and_shows_the_run(job):
 
 def test_the_same_seed_gives_the_same_samples(job, tmp_path):
     with SimProcess("--scenario", "default", "--tcp", "0", "--seed", "1") as sim:
-        again = call("run", "--drive", sim.url, "--motor", "motor_2kw2", "--axes", "0", "--yes", "--json", "--runs", str(tmp_path))
-    assert again.json["axes"][0]["residual_rms_a"] == pytest.approx(job["answer"].json["axes"][0]["residual_rms_a"], rel=1e-9)
+        again = call(
+            "run",
+            "--drive",
+            sim.url,
+            "--motor",
+            "motor_2kw2",
+            "--axes",
+            "0",
+            "--yes",
+            "--json",
+            "--runs",
+            str(tmp_path),
+        )
+    assert again.json["axes"][0]["residual_rms_a"] == pytest.approx(
+        job["answer"].json["axes"][0]["residual_rms_a"], rel=1e-9
+    )
 
 
 # --- over a serial line ----------------------------------------------------------------------------------------------
@@ -187,7 +219,9 @@ def test_a_drive_that_is_not_fit_is_refused_with_its_reason_and_never_energised(
 
 
 def test_no_drive_at_the_url_is_a_fault_with_a_remedy(tmp_path):
-    answer = call("run", "--drive", "tcp://127.0.0.1:1", "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path))
+    answer = call(
+        "run", "--drive", "tcp://127.0.0.1:1", "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path)
+    )
     assert answer.code == 5
     assert answer.json["outcome"] == "faulted"
     assert "cable" in answer.json["error"]["remedy"]
@@ -232,7 +266,9 @@ def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
         time.sleep(0.7)
         os.kill(run.pid, signal.SIGKILL)
         run.wait()
-        _wait_for(lambda: [r for r in sim.log() if r["event"] in ("energised", "de_energised")][-1]["event"] == "de_energised")
+        _wait_for(
+            lambda: [r for r in sim.log() if r["event"] in ("energised", "de_energised")][-1]["event"] == "de_energised"
+        )
     listed = call("runs", "list", "--runs", str(tmp_path), "--json").json["runs"]
     assert listed[0]["outcome"] == "cut off"
     assert listed[0]["written"] == "as before"
@@ -243,7 +279,19 @@ def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
 
 def test_a_motor_that_would_pass_the_flux_limit_is_held_back_in_truth(tmp_path):
     with SimProcess("--scenario", "flux_hazard", "--tcp", "0", "--seed", "3") as sim:
-        answer = call("run", "--drive", sim.url, "--motor", "motor_2kw2", "--axes", "0", "--yes", "--json", "--runs", str(tmp_path))
+        answer = call(
+            "run",
+            "--drive",
+            sim.url,
+            "--motor",
+            "motor_2kw2",
+            "--axes",
+            "0",
+            "--yes",
+            "--json",
+            "--runs",
+            str(tmp_path),
+        )
         peak = max(row["stator_flux_wb"] for row in sim.log() if row["event"] == "peaks")
     limit = answer.json["flux_guard"]["limit_wb"]
     assert answer.code in (0, 3, 4)

@@ -26,7 +26,9 @@ class Answer:
 
 def call(*arguments: str, timeout_s: float = 150.0, cwd: Path | None = None) -> Answer:
     """Run to the end. A traceback on stderr is never right."""
-    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout_s, cwd=cwd, check=False)
+    done = subprocess.run(
+        [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout_s, cwd=cwd, check=False
+    )
     assert "Traceback" not in done.stderr, done.stderr
     return Answer(done.returncode, done.stdout, done.stderr)
 
@@ -34,7 +36,11 @@ def call(*arguments: str, timeout_s: float = 150.0, cwd: Path | None = None) -> 
 def truth(scenario: str) -> Any:
     """The simulator's answer key."""
     done = subprocess.run(
-        [sys.executable, "-m", "sim", "--scenario", scenario, "--truth"], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-m", "sim", "--scenario", scenario, "--truth"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
     )
     return json.loads(done.stdout)
 

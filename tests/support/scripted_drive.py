@@ -135,8 +135,12 @@ class ScriptedDrive:
         )  # fmt: skip
 
     def _step(self, load: ask.LoadExcitation) -> tuple[float, float]:
-        self._scale += np.clip(self._scale_target - self._scale, -load.scale_ramp_per_s * PERIOD_S, load.scale_ramp_per_s * PERIOD_S)
-        self._bias += np.clip(self._bias_target - self._bias, -load.bias_ramp_v_per_s * PERIOD_S, load.bias_ramp_v_per_s * PERIOD_S)
+        self._scale += np.clip(
+            self._scale_target - self._scale, -load.scale_ramp_per_s * PERIOD_S, load.scale_ramp_per_s * PERIOD_S
+        )
+        self._bias += np.clip(
+            self._bias_target - self._bias, -load.bias_ramp_v_per_s * PERIOD_S, load.bias_ramp_v_per_s * PERIOD_S
+        )
         t = self._index * PERIOD_S
         tones = sum(a * np.cos(2 * np.pi * f * t + p) for a, f, p in load.tones)
         voltage, current = self._bias + self._scale * tones, self._x[0]
