@@ -1,0 +1,174 @@
+"""The audit says what is wrong with a recording, puts right what has one explanation, and refuses the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.monitor.audit import clipped_share, inspect
+from commissioner.motor.running import from_nameplate
+from commissioner.records import RunningRecording
+from tests.support.running import refused_in, rewired, seen_in, taken, taken_with, without
+
+SHORT = 8.0
+
+
+def audited(recording: RunningRecording):
+    plate = taken("running_compressor", 1, SHORT)[1]
+    return inspect(recording, plate, from_nameplate(plate))
+
+
+def codes(found) -> set[tuple[str, str]]:
+    return {(finding.kind, finding.code) for finding in found.findings}
+
+
+@pytest.mark.parametrize(
+    ("order", "signs", "code"),
+    [
+        ((1, 0, 2, 3, 4, 5), (1,) * 6, "crossed_channels"),
+        ((1, 2, 0, 3, 4, 5), (1,) * 6, "crossed_channels"),
+        ((2, 1, 0, 3, 4, 5), (1,) * 6, "crossed_channels"),
+        ((0, 1, 2, 4, 3, 5), (1,) * 6, "crossed_channels"),
+        ((0, 1, 2, 5, 3, 4), (1,) * 6, "crossed_channels"),
+        ((3, 1, 2, 0, 4, 5), (1,) * 6, "crossed_channels"),
+        ((0, 1, 2, 3, 4, 5), (-1, -1, -1, 1, 1, 1), "polarity"),
+        ((0, 1, 2, 3, 4, 5), (1, -1, 1, 1, 1, 1), "polarity"),
+        ((0, 1, 2, 3, 4, 5), (1, 1, 1, 1, 1, -1), "polarity"),
+        ((0, 2, 1, 3, 5, 4), (1,) * 6, "phase_order"),
+    ],
+)
+def test_miswired_channels_are_put_right_and_reported(order, signs, code) -> None:
+    recording, *_ = taken("running_compressor", 1, SHORT)
+    right, found = audited(recording), audited(rewired(recording, order, signs))
+    assert found.refusal is None
+    assert ("corrected", code) in codes(found)
+    assert found.fundamental.power_w == pytest.approx(right.fundamental.power_w, rel=2e-3)
+    assert found.fundamental.reactive_var == pytest.approx(right.fundamental.reactive_var, rel=2e-3)
+
+
+def test_a_right_recording_is_left_alone() -> None:
+    found = audited(taken("running_compressor", 1, SHORT)[0])
+    assert found.findings == ()
+    assert found.fundamental.voltage_unbalance == pytest.approx(0.03, abs=0.002)
+    assert found.fundamental.frequency_hz == pytest.approx(50.0, abs=0.06)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (0, 2, 1, 3, 4, 5), (0, 1, 2, 4, 5, 3)])
+def test_line_to_line_voltages_are_paired_as_well(order) -> None:
+    recording, plate, _ = taken_with("running_compressor", 1, SHORT, {"sensing": {"line_to_line": True}})
+    found = inspect(rewired(recording, order), plate, from_nameplate(plate))
+    right = audited(taken("running_compressor", 1, SHORT)[0])
+    assert found.refusal is None
+    assert found.fundamental.power_w == pytest.approx(right.fundamental.power_w, rel=5e-3)
+
+
+def test_one_phase_measured_twice_is_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    assert refused_in(rewired(recording, (0, 0, 2, 3, 4, 5)), plate).reason.code == "phase_spacing"
+
+
+def test_a_dead_channel_is_refused_by_name() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    flat = replace(
+        recording, currents_a=(recording.currents_a[0], np.zeros(recording.time_s.size), recording.currents_a[2])
+    )
+    reason = refused_in(flat, plate).reason
+    assert reason.code == "dead_channel" and "current channel v" in reason.what
+
+
+@pytest.mark.parametrize("group", ["currents_a", "voltages_v"])
+def test_clipped_channels_are_refused(group) -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    signals = getattr(recording, group)
+    limit = 0.97 * max(float(np.abs(s).max()) for s in signals)
+    cut = tuple(np.clip(s, -0.9 * limit, 0.9 * limit) for s in signals)
+    assert refused_in(replace(recording, **{group: cut}), plate).reason.code == "clipping"
+
+
+def test_a_coarse_converter_is_not_taken_for_clipping() -> None:
+    sine = np.sin(2 * np.pi * 50 * np.arange(80000) / 8000)
+    assert clipped_share(np.round(sine * 100) / 100) < 0.002
+    assert clipped_share(np.clip(sine, -0.95, 0.95)) > 0.1
+
+
+def test_scattered_lost_samples_are_refused_and_counted() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    keep = np.random.default_rng(3).uniform(size=recording.time_s.size) > 0.01
+    reason = refused_in(without(recording, keep), plate).reason
+    assert reason.code == "missing_samples"
+
+
+def test_one_hole_leaves_the_longer_whole_part_and_is_reported() -> None:
+    recording, plate, truth = taken("running_compressor", 1, 30.0)
+    keep = np.abs(recording.time_s - 10.0) > 0.2
+    seen = seen_in(without(recording, keep), plate)
+    assert ("note", "missing_samples") in {(f.kind, f.code) for f in seen.findings}
+    assert seen.audited.start_s > 10.0
+    assert seen.mean_speed_rad_per_s == pytest.approx(truth["mean_speed_rad_per_s"], rel=1e-3)
+
+
+def test_samples_that_are_no_numbers_count_as_missing() -> None:
+    recording, *_ = taken("running_compressor", 1, SHORT)
+    current = recording.currents_a[1].copy()
+    current[5000:5010] = np.nan
+    found = audited(replace(recording, currents_a=(recording.currents_a[0], current, recording.currents_a[2])))
+    assert ("note", "missing_samples") in codes(found)
+    assert found.first_sample == 5010
+
+
+def test_wandering_time_stamps_are_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    stamps = recording.time_s + 2e-5 * np.random.default_rng(5).standard_normal(recording.time_s.size)
+    assert refused_in(replace(recording, time_s=np.sort(stamps)), plate).reason.code == "clock_jitter"
+
+
+def test_printed_digits_are_not_taken_for_jitter() -> None:
+    recording, *_ = taken("running_compressor", 1, SHORT)
+    found = audited(replace(recording, time_s=np.round(recording.time_s, 4)))
+    assert found.refusal is None
+    assert not any(code == "clock_jitter" for _, code in codes(found))
+    assert found.sample_period_s == pytest.approx(1.25e-4, rel=1e-6)
+
+
+def test_jitter_behind_regular_stamps_is_measured() -> None:
+    recording, plate, _ = taken_with("running_compressor", 1, SHORT, {"sensing": {"clock_jitter_s": 25e-6}})
+    found = inspect(recording, plate, from_nameplate(plate))
+    note = next(f for f in found.findings if f.code == "clock_jitter")
+    assert note.kind == "note"
+    assert note.value == pytest.approx(0.2, abs=0.05)  # 25 us of 125 us
+
+
+def test_too_short_a_recording_is_refused_but_its_fundamental_is_reported() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    refused = refused_in(without(recording, recording.time_s < 0.5), plate)
+    assert refused.reason.code == "too_short"
+    assert refused.audited.fundamental.frequency_hz == pytest.approx(50.0, abs=0.1)
+
+
+def test_an_inverter_with_a_moving_set_point_is_refused() -> None:
+    recording, plate, _ = taken("running_inverter_varying", 1, 30.0)
+    assert refused_in(recording, plate).reason.code == "frequency_wander"
+
+
+def test_a_switched_voltage_is_refused() -> None:
+    recording, plate, _ = taken_with("running_inverter", 1, SHORT, {"sensing": {"pwm_ripple": 0.5}})
+    assert refused_in(recording, plate).reason.code == "switched_voltage"
+
+
+def test_line_to_line_voltages_under_phase_names_are_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    u, v, w = recording.voltages_v
+    assert refused_in(replace(recording, voltages_v=(u - v, v - w, w - u)), plate).reason.code in {
+        "voltage_level",
+        "pairing",
+    }
+
+
+def test_noise_without_a_motor_is_refused_not_answered() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    rng = np.random.default_rng(1)
+    noise = [rng.standard_normal(recording.time_s.size) for _ in range(6)]
+    silent = replace(recording, currents_a=tuple(noise[:3]), voltages_v=tuple(noise[3:]))
+    assert refused_in(silent, plate).reason.kind == "refused"
