@@ -1,0 +1,125 @@
+"""An archived run decides again as it did: the golden one from the repository, and one made just now, bit for bit."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.run import replay as replaying
+from commissioner.run.archive import RunFolder, read_blocks, read_journal
+from commissioner.run.replay import replay
+from tests.replay.golden import GOLDEN, SEED, short_run, unpack
+from tests.support.sim_process import SimProcess
+
+ROUNDING = 1e-6
+"""Other processors add up in another order; a decision that depends on that would be a defect of its own."""
+
+
+@pytest.fixture
+def golden(tmp_path):
+    return unpack(GOLDEN, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    with SimProcess("--tcp", "0", "--seed", SEED) as sim:
+        return short_run(sim.url, tmp_path_factory.mktemp("runs"))
+
+
+def test_a_run_made_on_this_machine_is_decided_again_bit_for_bit(fresh):
+    replayed = replay(fresh)
+    assert replayed.difference is None
+    assert replayed.decisions > 30
+
+
+def test_the_golden_run_is_decided_again(golden):
+    journal = read_journal(golden / "journal.jsonl")
+    job = next(line["record"] for line in journal if line["kind"] == "job")
+    archived = [line for line in journal if line["kind"] in replaying._DECISIONS]
+    replayed = list(replaying._decide_again(replaying._job(job), journal, golden))
+    assert [line["kind"] for line in archived] == [line["kind"] for line in replayed]
+    for old, new in zip(archived, replayed, strict=True):
+        assert_alike(old["record"], new["record"], old["kind"])
+
+
+def assert_alike(old, new, where):
+    """The same words and structure, the same numbers but for rounding."""
+    if isinstance(old, dict):
+        assert old.keys() == new.keys(), where
+        for key in old:
+            assert_alike(old[key], new[key], f"{where}.{key}")
+    elif isinstance(old, list):
+        assert len(old) == len(new), where
+        for k, pair in enumerate(zip(old, new, strict=True)):
+            assert_alike(*pair, f"{where}[{k}]")
+    elif isinstance(old, float):
+        assert math.isclose(old, new, rel_tol=ROUNDING, abs_tol=1e-9), (where, old, new)
+    else:
+        assert old == new, where
+
+
+@pytest.mark.parametrize("at", [0.2, 0.6, 0.9])
+def test_a_changed_sample_is_reported(fresh, tmp_path, at):
+    folder = copy(fresh, tmp_path)
+    blocks = list(read_blocks(folder / "blocks.bin"))
+    place = int(at * len(blocks))
+    segment, block = blocks[place]
+    blocks[place] = (segment, dataclasses.replace(block, current_u_a=block.current_u_a + 0.5))
+    (folder / "blocks.bin").unlink()
+    archive = RunFolder(folder)
+    for segment, block in blocks:
+        archive.append(block, segment)
+    archive.close()
+    difference = replay(folder).difference
+    assert difference is not None
+    assert difference.archived != difference.replayed
+
+
+@pytest.mark.parametrize("kind", ["checks_judged", "excitation_chosen", "estimate_updated", "verdict_reached"])
+def test_a_changed_decision_is_reported_as_itself(fresh, tmp_path, kind):
+    folder = copy(fresh, tmp_path)
+    lines = (folder / "journal.jsonl").read_text().splitlines()
+    decisions = [k for k, line in enumerate(lines) if json.loads(line)["kind"] in replaying._DECISIONS]
+    number = next(n for n, k in enumerate(decisions) if json.loads(lines[k])["kind"] == kind)
+    changed = json.loads(lines[decisions[number]])
+    key = next(iter(changed["record"]))
+    changed["record"][key] = "changed"
+    lines[decisions[number]] = json.dumps(changed)
+    (folder / "journal.jsonl").write_text("\n".join(lines) + "\n")
+    difference = replay(folder).difference
+    assert difference is not None
+    assert (difference.number, difference.archived["kind"]) == (number, kind)
+
+
+def test_a_missing_block_is_reported(fresh, tmp_path):
+    folder = copy(fresh, tmp_path)
+    data = (folder / "blocks.bin").read_bytes()
+    (folder / "blocks.bin").write_bytes(data[: len(data) // 2])
+    difference = replay(folder).difference
+    assert difference is not None
+    assert difference.replayed is None or difference.archived != difference.replayed
+
+
+def test_a_folder_without_a_job_is_refused(tmp_path):
+    (tmp_path / "journal.jsonl").write_text("")
+    with pytest.raises(DataRefused, match="cannot be replayed"):
+        replay(tmp_path)
+
+
+def copy(run, target):
+    folder = target / "copy"
+    folder.mkdir()
+    for name in ("journal.jsonl", "blocks.bin"):
+        (folder / name).write_bytes((run / name).read_bytes())
+    return folder
+
+
+def test_the_golden_run_is_a_whole_one(golden):
+    kinds = [line["kind"] for line in read_journal(golden / "journal.jsonl")]
+    assert kinds[-1] in ("run_ended", "link")
+    samples = np.concatenate([block.current_u_a for _, block in read_blocks(golden / "blocks.bin")])
+    assert samples.size > 40_000
+    assert np.all(np.isfinite(samples))
