@@ -1,0 +1,103 @@
+"""The JSON document of `diagnose`: the contract's keys, more numbers beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Cause, Diagnosis
+from commissioner.diagnose.points import PointsDiagnosis
+from commissioner.motor.circuit import Quantity
+
+CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
+
+
+def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
+    """Plain dict of a recording's diagnosis."""
+    held, noise, left = seen.held_out, seen.noise, seen.left
+    return {
+        "verdict": seen.verdict.value,
+        "reason": seen.reason,
+        "kind": "recording",
+        "convention": CONVENTION,
+        "causes": [_cause(c) for c in seen.causes],
+        "gain": {
+            "held_out": held.share if held and held.is_measured else None,
+            "rmse_before_a": held.rmse_before_a if held else None,
+            "rmse_after_a": held.rmse_after_a if held else None,
+            "noise_floor_a": noise.floor_a if noise else None,
+            "explained_share": seen.explained_share if held else None,
+            "structured_error_over_noise": left.sigma if left else None,
+        },
+        "noise": None if noise is None else {
+            "source": noise.source, "is_known": noise.is_known, "is_white": noise.is_white,
+            "sigma_a": [float(x) for x in noise.sigma_a],
+        },
+        "parameters_before": _quantities(seen.parameters_before),
+        "parameters_after": _quantities(seen.parameters_after),
+        "below_materiality": list(seen.below_materiality),
+        "detection_limits": dict(seen.detection_limits),
+        "cannot_tell": list(NEVER_NAMEABLE) if seen.found else [],
+        "line_levels_db": dict(seen.split.level_db) if seen.split else {},
+        "audit": list(seen.audit.sentences),
+        "remarks": list(seen.remarks),
+        "next_experiment": dict(seen.next_experiment) if seen.next_experiment else None,
+        "model_file": model_file,
+    }
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    return {
+        "name": cause.name,
+        "title": cause.title,
+        "parameters": {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in cause.sizes.items()},
+        "gain_share": cause.gain_share,
+        "confidence": cause.confidence,
+        "equivalent": list(cause.equivalent),
+        "strength_over_noise": cause.strength_sigma,
+        "delta_chi2": cause.delta_chi2,
+        "alternatives": {name: loss for name, loss in cause.rivals.items()},
+        "found_by": "audit" if cause.from_audit else "fit",
+    }
+
+
+def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:
+    return {name: {"value": q.value, "std": q.std} for name, q in values.items()}
+
+
+def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
+    """Plain dict of a points table's diagnosis; errors are of the predicted line current, left-out points."""
+    return {
+        "verdict": seen.verdict,
+        "reason": seen.reason,
+        "kind": "points",
+        "test": seen.test,
+        "convention": CONVENTION,
+        "causes": [
+            {
+                "name": c.name,
+                "parameters": {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in c.sizes.items()},
+                "gain_share": c.gain_share, "confidence": 1.0 - min(c.p_value * 100.0, 0.5), "equivalent": [],
+                "p_value": c.p_value,
+            }
+            for c in seen.causes
+        ],
+        "gain": {
+            "held_out": seen.held_out_gain, "rmse_before_a": seen.rmse_before_a, "rmse_after_a": seen.rmse_after_a,
+            "noise_floor_a": None, "relative_error_before": seen.relative_before, "relative_error_after": seen.relative_after,
+        },
+        "parameters_before": _quantities(seen.parameters_before),
+        "parameters_after": _quantities(seen.parameters_after),
+        "tested_p_values": dict(seen.tested),
+        "next_experiment": None,
+        "model_file": None,
+    }
+
+
+def refused_document(reason: str, kind: str) -> dict[str, Any]:
+    """The document where nothing could be answered."""
+    return {
+        "verdict": "refused", "reason": reason, "kind": kind, "convention": CONVENTION, "causes": [],
+        "gain": {"held_out": None, "rmse_before_a": None, "rmse_after_a": None, "noise_floor_a": None},
+        "parameters_before": {}, "parameters_after": {}, "next_experiment": None, "model_file": None,
+    }
