@@ -144,6 +144,41 @@ def monitor(
     )  # fmt: skip
 
 
+@app.command()
+def diagnose(
+    files: Annotated[
+        list[Path], typer.Argument(help="Standstill recordings of one motor, or tables of steady points.")
+    ],
+    motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """What the simulation gets wrong about a recording, by name, with the measured gain."""
+    from commissioner.cli.diagnose import diagnose as verb
+
+    verb(files, motor=motor, out=out, as_json=json)
+
+
+@app.command()
+def simulate(
+    model: Annotated[str, typer.Argument(help="A model.json of diagnose, or a motor's name or TOML file.")],
+    out: Annotated[Path, typer.Option("--out", help="The recording to write: .csv, .csv.gz or .parquet.")],
+    like: Annotated[Path | None, typer.Option("--like", help="Take the command of this recording.")] = None,
+    seconds: Annotated[float, typer.Option(help="Length of each segment.")] = 6.0,
+    axes: Annotated[str, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = "0,60,120",
+    noise_a: Annotated[float, typer.Option(help="White noise on the currents, rms.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 1,
+    plain: Annotated[bool, typer.Option(help="Leave the named effects out.")] = False,
+    json: Json = False,
+) -> None:
+    """Play a drive or motor configuration, plain or extended by diagnose, into a recording."""
+    from commissioner.cli.simulate import simulate as verb
+
+    verb(model, out, like=like, seconds=seconds, axes=axes, noise_a=noise_a, seed=seed, plain=plain, as_json=json)
+
+
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 RUNNING_COLUMNS = ("voltage_u_v", "voltage_uv_v", "speed_rad_per_s")
 STANDSTILL_COLUMNS = frozenset(
-    "time_s segment axis_deg voltage_axis_v current_u_a current_v_a current_w_a dc_link_v".split()
+    ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v"]
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,22 +22,27 @@ SEARCH = 0.008
 
 
 def add_channels(record: Record, model: Model, layout: Layout) -> tuple[Record, dict[str, float]]:
-    """The record with every known function of time, from measured currents and the nominal model's residual."""
+    """The record with every known function of time, and the refined mains-bound frequencies (`ripple_300`: Hz)."""
     predictions = [predict(model, record, k, layout) for k in range(len(record.segments))]
-    rotor = [p.rotor_current_a for p in predictions]
     residuals = [s.currents_a - p.currents_a for s, p in zip(record.segments, predictions, strict=True)]
-    record = _with(record, _phase_patterns(record))
-    record = _with(record, _heat(record, rotor))
-    record = _with(record, _sag(record))
-    record = _with(record, _hats(record))
     lines: dict[str, float] = {}
     for name, bases, build in (("ripple", RIPPLE_HZ, _ripple_drive), ("mains", MAINS_HZ, _mains_drive)):
         signals = build(record, residuals, model)
         found = [_refine(record, signals, base) for base in bases]
         best = int(np.argmax([ratio for _, ratio in found]))
-        lines[f"{name}_{bases[best]:.0f}_hz"] = found[best][0]
-        record = _with(record, _line(record, f"{name}_{bases[best]:.0f}", found[best][0]))
-    return record, lines
+        lines[f"{name}_{bases[best]:.0f}"] = found[best][0]
+    return with_known(record, [p.rotor_current_a for p in predictions], lines), lines
+
+
+def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[str, float]) -> Record:
+    """The known functions of time in their fixed order, for given rotor currents and line frequencies."""
+    record = _with(record, _phase_patterns(record))
+    record = _with(record, _heat(record, rotor_current_a))
+    record = _with(record, _sag(record))
+    record = _with(record, _hats(record))
+    for name, frequency in lines.items():
+        record = _with(record, _line(record, name, frequency))
+    return record
 
 
 Named = tuple[tuple[str, ...], list[Array]]

@@ -123,7 +123,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
         part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples
     )
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise) for name in found.accepted]
-    causes += _audit_causes(audit, record, noise)
+    causes += _audit_causes(audit, found, noise)
     count = float(found.fit.normal.count.sum())
     structured = max(found.nominal.chi2 - count, 0.0)
     share = 1.0 - min(rest.sigma**2 * count / max(structured, rest.sigma**2 * count, 1.0), 1.0)
@@ -152,18 +152,20 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
     )
 
 
-def _audit_causes(audit: Audit, record: Record, noise: Noise) -> list[Cause]:
+def _audit_causes(audit: Audit, found: Found, noise: Noise) -> list[Cause]:
     """Causes that leave no waveform: coarse converter steps, clipped and missing samples."""
     out = []
     step = max(audit.step_a, default=0.0)
-    if step > COARSE_STEP_SHARE * record.facts.rated_current_peak_a and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
+    if step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
         out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
     if audit.clipped:
         out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
                                        "samples": (audit.clipped["samples"], 0.0, "1")}))
-    if audit.holes:
-        lost = float(sum(h[2] for h in audit.holes))
-        out.append(_plain("lost_samples", {"samples": (lost, 0.0, "1"), "holes": (float(len(audit.holes)), 0.0, "1")}))
+    if audit.holes or found.losses:
+        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in found.losses)
+        out.append(_plain("lost_samples", {
+            "samples": (float(marked + unmarked), 0.0, "1"), "without_gap_in_time": (float(unmarked), 0.0, "1"),
+        }))
     return out
 
 

@@ -56,7 +56,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "equivalent": list(cause.equivalent),
         "strength_over_noise": cause.strength_sigma,
         "delta_chi2": cause.delta_chi2,
-        "alternatives": {name: loss for name, loss in cause.rivals.items()},
+        "alternatives": dict(cause.rivals.items()),
         "found_by": "audit" if cause.from_audit else "fit",
     }
 

@@ -34,6 +34,8 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
         "effects": {c.name: {key: value for key, (value, _, _) in c.sizes.items()} for c in causes},
         "terms": [_term(t, v) for t, v in kept],
         "dictionary": _dictionary(found.layout) if kept else {},
+        "lines_hz": dict(found.setting.lines_hz),
+        "sim_effects": {c.name: sim_effect(c) for c in causes if sim_effect(c)},
     }
 
 
@@ -42,6 +44,20 @@ def gamma_machine(nominal: tuple[float, float, float, float]) -> dict[str, float
     r_s, r_r, l_sigma, l_m = nominal
     ratio = (l_m + l_sigma) / l_m
     return dict(zip(GAMMA_KEYS, (r_s, r_r * ratio**2, l_sigma * ratio, l_m + l_sigma), strict=True))
+
+
+def sim_effect(cause: Any) -> dict[str, float]:
+    """The cause as an entry of a simulated inverter's scenario: one size in that catalogue's unit, where it has one."""
+    sizes = {key: value for key, (value, _, _) in cause.sizes.items()}
+    scale = {
+        "voltage_v": 1.0, "sag_at_rated_power": 1.0, "delay_us": 1e-6, "time_constant_us": 1e-6, "coercive_current_a": 1.0,
+        "flux_wb": 1.0, "conductance_ms": 1e-3, "rise_per_minute_at_rated_current": 1.0, "drift_ppm": -1.0,
+        "speed_rad_per_s": 1.0, "capacitance_nf": 1e-9, "step_a": 1.0,
+    }
+    first = next(iter(sizes), "")
+    if first.startswith("amplitude_"):
+        return {"size": sizes[first]}
+    return {"size": sizes[first] * scale[first]} if first in scale else {}
 
 
 def _term(term: Term, value: float) -> dict[str, Any]:
@@ -56,8 +72,6 @@ def _dictionary(layout: Layout) -> dict[str, Any]:
     for key, value in ((f.name, getattr(layout, f.name)) for f in fields(layout)):
         if isinstance(value, np.ndarray):
             out[key] = value.tolist()
-        elif isinstance(value, tuple):
-            out[key] = [list(v) for v in value]
         else:
             out[key] = value
     return out
@@ -83,7 +97,6 @@ def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
 def _layout(entry: Mapping[str, Any]) -> Layout:
     arrays = {"legs_vectors", "iron_vectors", "leak_vectors", "stop_radius_wb", "branch_time_s"}
     values: dict[str, Any] = {k: (np.array(v, dtype=float) if k in arrays else v) for k, v in entry.items()}
-    values["shift_times_s"] = tuple((int(a), float(b)) for a, b in entry.get("shift_times_s", []))
     return Layout(**values)
 
 

@@ -12,12 +12,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from commissioner.diagnose.record import Record, Segment
 
 Array = NDArray[np.float64]
 BINS_PER_DECADE = 10
 SHORTEST_RECORD = 400
+RISING_LIKELIHOOD = 8.0
+"""Log-likelihood a 1/f^g part must gain over white to be believed (two numbers; p about 3e-4: cheap to believe)."""
+SLOW_BINS = 6.0
+"""Below so many bins of the shortest noise record the window smears the spectrum; the power law takes over."""
+SLOW_MARGIN = 1.6
+"""Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
 WHITE_WITHIN = 0.12
 """A spectrum flat within this fraction everywhere is taken as white (whitening then costs nothing)."""
 
@@ -201,17 +208,56 @@ def _noise(
     level = np.array(density).T
     white = np.array([_level(p[c], quantile) for c in range(phase_count)])
     relative = level / white[:, None]
+    at = np.array(centres)
+    low_f, low_level, is_rising = _power_law(f, p / white[:, None])
+    first = max(SLOW_BINS / min(v.shape[1] for v in values) / period, 1e-3)
+    keep = at > first
+    at, relative = at[keep], relative[:, keep]
     per_bin = np.array([(which == k).sum() for k in range(1, edges.shape[0])])
-    per_bin = per_bin[per_bin >= 12]
+    per_bin = per_bin[per_bin >= 12][keep]
     spread = 2.2 * 3.0 / np.sqrt(per_bin / 2.0)
-    is_white = bool(np.all(np.abs(np.log(relative)).max(axis=0) < np.maximum(WHITE_WITHIN, spread)))
+    is_white = not is_rising and bool(np.all(np.abs(np.log(relative)).max(axis=0) < np.maximum(WHITE_WITHIN, spread)))
     if is_white:
         relative = np.ones_like(relative)
+    elif is_rising:
+        model = np.interp(np.log(at), np.log(low_f), low_level)
+        ratio = np.exp(np.mean(np.log(relative / model), axis=0))
+        follows = bool(np.all(np.abs(np.log(ratio)) < np.maximum(WHITE_WITHIN, spread)))
+        ratio = np.ones_like(ratio) if follows else ratio
+        slow = low_f < first
+        low = low_level[slow] * ratio[0] * SLOW_MARGIN
+        relative = np.tile(np.concatenate([low, model * ratio]), (phase_count, 1))
+        at = np.concatenate([low_f[slow], at])
+    else:
+        relative = np.tile(np.exp(np.mean(np.log(relative), axis=0)), (phase_count, 1))
     total = f.shape[0]
     return Noise(
-        np.sqrt(white), np.array(centres), relative, source, is_known, float(1.5 * np.sqrt(1.0 / max(total, 1))),
+        np.sqrt(white), at, relative, source, is_known, float(1.5 * np.sqrt(1.0 / max(total, 1))),
         is_white, listed,
     )
+
+
+def _power_law(frequency: Array, power: Array) -> tuple[Array, Array, bool]:
+    """1 + (f_c / f)^g by Whittle's likelihood over the slow half of the spectrum, and whether it beats white there.
+
+    Lines of a distortion are kept from pulling it by capping each power at six times the model.
+    """
+    top = float(frequency.max())
+    inside = frequency < 0.1 * top
+    f, p = frequency[inside], np.mean(power[:, inside], axis=0)
+    weight = power.shape[0]
+
+    def cost(x: Array) -> float:
+        level = 1.0 + np.exp(np.clip(x[1] * (x[0] - np.log(f)), -60.0, 60.0))
+        return float(weight * np.sum(np.log(level) + np.minimum(p / level, 6.0)))
+
+    white = float(weight * np.sum(np.minimum(p, 6.0)))
+    starts = [(np.log(fc), g) for fc in (0.3, 3.0, 30.0) for g in (0.7, 1.2)]
+    best = min((minimize(cost, s, method="Nelder-Mead", options={"maxiter": 200}) for s in starts), key=lambda r: r.fun)
+    grid = np.geomspace(1e-3, top, 80)
+    slope = float(np.clip(best.x[1], 0.0, 2.0))
+    level = 1.0 + np.exp(np.clip(slope * (best.x[0] - np.log(grid)), -60.0, 60.0))
+    return grid, level, bool(white - best.fun > RISING_LIKELIHOOD and slope > 0.0)
 
 
 def _level(power: Array, quantile: float) -> float:

@@ -22,7 +22,7 @@ from commissioner.diagnose.resample import resample, resample_hermite
 Array = NDArray[np.float64]
 
 # Where a term acts behind the motor terminals (kinds below 100 act inside and are the kernel's).
-DELAY, LAG, CLOCK, SHIFT, OFFSET, DRIFT, GAIN, EVEN, ODD, TONE, CABLE, FIFTH = range(100, 112)
+DELAY, LAG, CLOCK, OFFSET, DRIFT, GAIN, EVEN, ODD, TONE, CABLE, FIFTH = range(100, 111)
 NOMINAL_KINDS = (kernel.R_S, kernel.R_R, kernel.GAMMA_SIGMA, kernel.GAMMA_M)
 
 
@@ -60,7 +60,6 @@ class Layout:
     substeps: int = 1
     crossing_substeps: int = 12
     legs_slack_v: float = 1.0
-    shift_times_s: tuple[tuple[int, float], ...] = ()
 
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
@@ -300,9 +299,6 @@ def _sense(
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
     elapsed = segment.time_s - segment.time_s[0]
     late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
-    for k, (number, at) in enumerate(layout.shift_times_s):
-        if number == segment.number:
-            late = late - period * model.total(SHIFT, k) * (elapsed >= at)
     late = np.broadcast_to(late, elapsed.shape)
     is_late = bool(np.any(late))
     filled = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
@@ -344,10 +340,6 @@ def _sense(
             row[:] = -lag_slope
         elif term.kind == CLOCK:
             row[:] = -slope * elapsed * 1e-6
-        elif term.kind == SHIFT:
-            number, at = layout.shift_times_s[term.index]
-            if number == segment.number:
-                row[:] = slope * period * (elapsed >= at)
         elif term.kind == OFFSET:
             row[term.index] = 1.0
         elif term.kind == DRIFT:

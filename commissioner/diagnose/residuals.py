@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -110,7 +111,7 @@ def _blocks(time: Array, before: Array, after: Array) -> list[tuple[float, float
     edges = np.linspace(0, time.shape[0], 9).astype(int)
     return [
         (float(time[a:b].mean()), float(np.sqrt(np.mean(before[:, a:b] ** 2))), float(np.sqrt(np.mean(after[:, a:b] ** 2))))
-        for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
+        for a, b in itertools.pairwise(edges) if b > a
     ]
 
 

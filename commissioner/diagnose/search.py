@@ -16,6 +16,7 @@ from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit, fit
+from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import Layout, Model, Term, even_vectors, odd_vectors, predict
 from commissioner.diagnose.record import Record
@@ -51,7 +52,7 @@ class Found:
     first_screening: Screening
     below_materiality: tuple[str, ...] = ()
     gains: dict[str, float] = field(default_factory=dict)
-    alternatives: dict[str, dict[str, float]] = field(default_factory=dict)
+    losses: tuple[Loss, ...] = ()
 
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
@@ -144,6 +145,10 @@ def search(
     part = explored(record)
     quick = nominal_fit(part, noise)
     nominal = fit(quick.model, record, _bare_layout(), noise, rounds=6, tolerance=1.0)
+    record, losses = mend(record, nominal.model, _bare_layout(), noise)
+    if losses:
+        report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
+        nominal = fit(nominal.model, record, _bare_layout(), noise, rounds=6, tolerance=1.0)
     if len(record.segments) > 1:
         record = with_flux_before(record, nominal.model, _bare_layout())
         nominal = fit(nominal.model.with_terms([CARRY]), record, _bare_layout(), noise, rounds=6, tolerance=1.0)
@@ -167,7 +172,7 @@ def search(
     first = whole.first if first is None else first
     return Found(
         nominal, fitted, accepted, record, whole.layout, whole.setting, last, first,
-        tuple(whole.below), whole.gains(fitted, accepted),
+        tuple(whole.below), whole.gains(fitted, accepted), losses,
     )
 
 

@@ -170,6 +170,7 @@ class Runner:
                 self._enable()
             case ask.Disarm(reason=reason):
                 self._disarm(reason)
+                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
                 raise TypeError(f"no such command: {command!r}")
 

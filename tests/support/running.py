@@ -19,7 +19,7 @@ Taken = tuple[RunningRecording, Nameplate, dict[str, Any]]
 
 
 @lru_cache(maxsize=8)
-def taken(name: str, seed: int = 1, duration_s: float = 30.0, **_: Any) -> Taken:
+def taken(name: str, seed: int = 1, duration_s: float = 30.0) -> Taken:
     scenario = load_scenario(name)
     scenario["recording"]["duration_s"] = duration_s
     columns, metadata, truth = record(scenario, seed)
@@ -47,6 +47,12 @@ def seen_in(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None
     seen = observe(recording, plate, wishes)
     assert isinstance(seen, Observation), seen.reason
     return seen
+
+
+@lru_cache(maxsize=4)
+def seen(name: str, seed: int = 1) -> Observation:
+    """The chain's answer to the whole recording of `taken`."""
+    return seen_in(*taken(name, seed)[:2])
 
 
 def refused_in(recording: RunningRecording, plate: Nameplate) -> Refused:

@@ -4,7 +4,16 @@ import itertools
 
 import pytest
 
-from commissioner.procedure.states import ENDED, TRANSITIONS, Event, IllegalTransition, State, diagram, follow
+from commissioner.procedure.states import (
+    ENDED,
+    ENERGISED,
+    TRANSITIONS,
+    Event,
+    IllegalTransition,
+    State,
+    diagram,
+    follow,
+)
 
 ORDINARY = [e for e in Event if e not in (Event.ABORT, Event.FAULT)]
 EXPECTED = {
@@ -42,6 +51,11 @@ def test_abort_and_fault_are_legal_in_every_state_that_has_not_ended(state):
 def test_nothing_follows_an_end(state, event):
     with pytest.raises(IllegalTransition):
         follow(state, event)
+
+
+def test_the_ends_and_the_energised_states_are_these():
+    assert {State.COMMISSIONED, State.REJECTED, State.ABORTED, State.FAULTED} == ENDED
+    assert {State.RESISTANCE, State.EXCITING} == ENERGISED
 
 
 def test_an_abort_is_never_success():

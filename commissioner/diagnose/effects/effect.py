@@ -23,7 +23,7 @@ class Setting:
     record: Record
     layout: Layout
     iron_flux_wb: float
-    sum_of_lines_hz: Mapping[str, float]
+    lines_hz: Mapping[str, float]
 
     @property
     def facts(self) -> Facts:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect
-from commissioner.diagnose.plant import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, SHIFT, TONE, Term
+from commissioner.diagnose.plant import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE, Term
 
 PHASES = ("u", "v", "w")
 
@@ -185,23 +185,15 @@ def clock_drift(setting: Setting) -> tuple[Term, ...]:
     return (Term("clock_drift", "drift", "ppm", CLOCK, 0, 0.01, -2e4, 2e4),)
 
 
-def _lost_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {f"samples_{k}": (v, "1") for k, (_, v) in enumerate(values.items())}
-
-
 @effect(
-    "lost_samples", "Samples lost without a gap in the time stamps", sign=0, family="drifting", sizes=_lost_sizes,
+    "lost_samples", "Samples lost without a gap in the time stamps", sign=1, family="drifting", sizes=_none,
     signature="the delay jumps by whole samples at one instant",
     confounders=("clock_drift",), source="i(t + n T) after t_0; found by a scan over t_0",
     split_by="number the samples in the logger",
 )
 def lost_samples(setting: Setting) -> tuple[Term, ...]:
-    """Number of samples missing from the current channels at each instant the scan found."""
-    shifts = setting.layout.shift_times_s
-    return tuple(
-        Term("lost_samples", f"at_{number}_{at:.4f}", "1", SHIFT, k, 0.1, -50.0, 50.0)
-        for k, (number, at) in enumerate(shifts)
-    )
+    """Found by a scan over all instants and put right in the data (number of samples), not by a fit."""
+    return ()
 
 
 ENTRIES: tuple[Effect, ...] = (

@@ -11,6 +11,7 @@ from commissioner.motor.circuit import from_t_model
 from sim.running_recording import load_scenario, run
 from tests.campaigns.monitor import draw, periods_found, play, score
 from tests.campaigns.monitor_trend import LEAKS_MM2, false_alarms, leak_table
+from tests.support.running import seen as answer
 from tests.support.running import seen_in, taken, taken_with
 
 SINGLE = ("running_compressor", "running_leak", "running_inverter")
@@ -18,8 +19,8 @@ MULTI = ("running_brake_1hz9", "running_brake_19hz", "running_brake_70hz8", "run
 
 
 def scored(name: str, seed: int = 1) -> dict[str, float]:
-    recording, plate, truth = taken(name, seed)
-    seen = seen_in(recording, plate)
+    truth = taken(name, seed)[2]
+    seen = answer(name, seed)
     assert periods_found(seen, truth), [(p.name, p.frequency_hz) for p in seen.load_periods]
     return score(seen, run(load_scenario(name), seed)[0], truth)
 
@@ -53,8 +54,8 @@ def test_other_machines_with_unknown_parameters(seed: int) -> None:
 
 
 def test_parameters_are_within_three_claimed_standard_deviations() -> None:
-    recording, plate, truth = taken("running_compressor", 2)
-    seen = seen_in(recording, plate)
+    truth = taken("running_compressor", 1)[2]
+    seen = answer("running_compressor")
     machine = truth["machine"]
     true = np.log([machine[k] for k in ("stator_resistance_ohm", "rotor_resistance_ohm", "magnetizing_inductance_h", "stator_leakage_h")])
     circuit = seen.fitted.circuit
@@ -71,15 +72,14 @@ def test_resimulated_currents_match_and_show_wrong_parameters() -> None:
 
     from commissioner.monitor.proof import prove
 
-    recording, plate, _ = taken("running_compressor", 1)
-    seen = seen_in(recording, plate)
+    seen = answer("running_compressor")
     assert seen.proof.relative_rms < 0.04
     wrong = replace(seen.solved, circuit=replace(seen.solved.circuit, rotor_resistance_ohm=1.15 * seen.solved.circuit.rotor_resistance_ohm))
     assert prove(seen.audited, seen.frame, seen.part, seen.combs, seen.problem, wrong).relative_rms > 2 * seen.proof.relative_rms
 
 
 def test_crossed_channels_change_no_number() -> None:
-    right = seen_in(*taken("running_compressor", 1)[:2])
+    right = answer("running_compressor")
     crossed = seen_in(*taken_with("running_crossed", 1, 30.0, {})[:2])
     assert crossed.mean_speed_rad_per_s == pytest.approx(right.mean_speed_rad_per_s, rel=1e-6)
     assert crossed.mean_torque_nm == pytest.approx(right.mean_torque_nm, rel=1e-3)
@@ -124,13 +124,13 @@ def test_healthy_recordings_raise_no_alarm() -> None:
 
 
 def test_two_cylinders_make_two_pulses_and_an_imbalance_none() -> None:
-    made = pulses(seen_in(*taken("running_compressor", 1)[:2]))
+    made = pulses(answer("running_compressor"))
     assert made is not None and made.per_turn == 2
-    assert pulses(seen_in(*taken("running_fan", 1)[:2])) is None
+    assert pulses(answer("running_fan")) is None
 
 
 def test_a_healthy_rotor_has_no_side_bands() -> None:
-    seen = seen_in(*taken("running_compressor", 1)[:2])
+    seen = answer("running_compressor")
     bands = rotor_side_bands(seen.found.left_over, seen.search.supply_hz, seen.slip, abs(seen.lines.current_a[0]))
     assert bands is not None
     assert bands.above_floor_db < 12.5

@@ -1,7 +1,7 @@
 """The last gate before the wire: each rule, at its edge, from both sides."""
 
 import math
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -21,7 +21,7 @@ from commissioner.safety.commands import (
     Wait,
     WriteParameters,
 )
-from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
+from commissioner.safety.limits import Bounds, Refusal, SafetyFacts, after, permit
 
 BOUNDS = Bounds(
     max_watchdog_s=1.0,
@@ -132,6 +132,9 @@ def test_what_belongs_to_standstill_is_refused_while_energised(command):
         (replace(EXCITATION, tones=((30.0, 1.0, 0.0), (-20.1, 5.0, 0.0))), False),
         (replace(EXCITATION, duration_s=20.0), True),
         (replace(EXCITATION, duration_s=20.1), False),
+        (replace(EXCITATION, duration_s=0.5), True),
+        (replace(EXCITATION, tones=()), True),
+        (replace(EXCITATION, bias_ramp_v_per_s=math.inf), False),
         (replace(EXCITATION, duration_s=-1.0), False),
         (replace(EXCITATION, axis_deg=360.0), True),
         (replace(EXCITATION, axis_deg=-360.0), True),
@@ -157,6 +160,7 @@ def test_bounds_hold_at_their_edges(command, is_permitted):
         (SetScale(-0.001), False),
         (SetScale(math.nan), False),
         (SetBias(50.0), True),
+        (SetBias(0.0), True),
         (SetBias(-50.0), True),
         (SetBias(50.01), False),
         (SetBias(-50.01), False),
@@ -224,3 +228,25 @@ def test_facts_follow_what_the_drive_answered():
 def test_each_enable_needs_its_own_excitation():
     facts = after(Disarm("done"), RUNNING)
     assert permit(Enable("again"), facts, BOUNDS) is not None
+
+
+def test_a_short_first_test_is_permitted():
+    assert permit(Enable("short"), replace(READY, loaded=replace(EXCITATION, duration_s=0.5)), BOUNDS) is None
+
+
+def test_a_run_begins_with_nothing_known_and_nothing_allowed():
+    assert SafetyFacts() == SafetyFacts(
+        watchdog_s=None, drive_limits=None, loaded=None, checks_passed=False, snapshot_taken=False,
+        writing_allowed=False, energised=False, energised_s=0.0, run_ended=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", [Identify(), Fetch(), SetScale(0.5), SetBias(1.0), Tell("x"), Wait(0.0)])
+def test_a_command_that_proves_nothing_changes_no_fact(command):
+    assert after(command, RUNNING) == RUNNING
+
+
+@pytest.mark.parametrize("record", [BOUNDS, READY, Refusal("what", 1, 0)])
+def test_nobody_can_change_bounds_facts_or_a_refusal(record):
+    with pytest.raises(FrozenInstanceError):
+        setattr(record, next(iter(record.__dataclass_fields__)), 99.0)

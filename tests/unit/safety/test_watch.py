@@ -1,13 +1,13 @@
 """Each reason to stop, at its edge."""
 
 import math
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 
 from commissioner.records import DriveStatus, SampleBlock
-from commissioner.safety.watch import WatchLimits, judge_block, judge_status
+from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
 
 LIMITS = WatchLimits(
     current_a=5.0,
@@ -125,3 +125,9 @@ def test_each_status_reason_is_named(changes, says, is_fault):
 def test_a_healthy_status_is_no_reason_to_stop():
     assert judge_status(STATUS, LIMITS) is None
     assert judge_status(replace(STATUS, heatsink_degc=85.0, winding_degc=120.0), LIMITS) is None
+
+
+@pytest.mark.parametrize("record", [LIMITS, StopReason("what", 1.0, 0.0, "remedy")])
+def test_nobody_can_change_a_limit_or_a_reason(record):
+    with pytest.raises(FrozenInstanceError):
+        setattr(record, next(iter(record.__dataclass_fields__)), 99.0)

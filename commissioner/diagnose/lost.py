@@ -1,0 +1,147 @@
+"""Samples lost without a gap in the time stamps: found by their jump in delay, then put right in the data.
+
+Three ways to lose one: the current channel skips (all later currents come early), whole rows vanish (command and current
+both skip), or a value is held. Each is tried where a scan points; the one that mends the segment's error is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.fit import whiten
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.record import Record, Segment
+
+Array = NDArray[np.float64]
+MOST_EVENTS = 24
+LEAST_GAIN = 80.0
+"""Delta chi2 of one event: 40 for the look over all instants (2 ln N is below 30), 40 for the rule."""
+LEAST_SHARE = 0.03
+SPIKE = 9.0
+MOST_IN_A_ROW = 3
+
+
+@dataclass(frozen=True)
+class Loss:
+    """One event: segment number, time (s) in the recording, samples, and which way."""
+
+    segment: int
+    time_s: float
+    samples: int
+    way: str
+
+
+def mend(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Record, tuple[Loss, ...]]:
+    """The record with unmarked losses masked and re-aligned, and the list of them."""
+    found: list[Loss] = []
+    segments = list(record.segments)
+    for k in range(len(segments)):
+        while len(found) < MOST_EVENTS:
+            current = replace(record, segments=tuple(segments))
+            step = _one(current, k, model, layout, noise)
+            if step is None:
+                break
+            segments[k], loss = step
+            found.append(loss)
+    return replace(record, segments=tuple(segments)), tuple(found)
+
+
+def _one(record: Record, k: int, model: Model, layout: Layout, noise: Noise) -> tuple[Segment, Loss] | None:
+    segment = record.segments[k]
+    prediction = predict(model, record, k, layout)
+    residual = np.where(segment.is_good, segment.currents_a - prediction.currents_a, 0.0)
+    before = _chi2(record, k, segment, model, layout, noise)
+    floor = float(segment.is_good.sum()) * record.facts.phases
+    wanted = max(LEAST_GAIN, LEAST_SHARE * (before - floor))
+    slope = np.gradient(prediction.currents_a, axis=1)
+    best: tuple[float, Segment, Loss] | None = None
+    for at in _suspects(residual, slope, segment, noise):
+        for repaired, loss in _repairs(segment, at):
+            gain = before - _chi2(record, k, repaired, model, layout, noise) - _masked(segment, repaired, record)
+            if gain > wanted and (best is None or gain > best[0]):
+                best = (gain, repaired, loss)
+    return None if best is None else (best[1], best[2])
+
+
+def _masked(old: Segment, new: Segment, record: Record) -> float:
+    """Chi2 that falls just because fewer samples count."""
+    return float(max(int(old.is_good.sum()) - int(new.is_good.sum()), 0) * record.facts.phases) * 3.0
+
+
+def _chi2(record: Record, k: int, segment: Segment, model: Model, layout: Layout, noise: Noise) -> float:
+    segments = list(record.segments)
+    segments[k] = segment
+    changed = replace(record, segments=tuple(segments))
+    residual = segment.currents_a - predict(model, changed, k, layout).currents_a
+    white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
+    return float(white @ white)
+
+
+def _suspects(residual: Array, slope: Array, segment: Segment, noise: Noise) -> Iterator[int]:
+    """Instants worth trying: the strongest jump of the residual, and the best step in delay beside a drifting one."""
+    jump = np.abs(np.diff(residual, axis=1))
+    good = segment.is_good[1:] & segment.is_good[:-1]
+    scale = np.maximum(1.4826 * np.median(jump[:, good], axis=1, keepdims=True) / 0.9, 1.2 * noise.sigma_a[:, None])
+    score = np.where(good, (jump / scale).max(axis=0), 0.0)
+    at = int(np.argmax(score))
+    if score[at] > SPIKE:
+        yield at + 1
+    step = _delay_step(residual / noise.sigma_a[:, None], slope / noise.sigma_a[:, None])
+    if step is not None:
+        yield step
+
+
+def _delay_step(residual: Array, slope: Array) -> int | None:
+    """Where a jump of the delay by whole samples explains most, constant delay and drift projected out."""
+    y, w = (residual * slope).sum(axis=0), (slope**2).sum(axis=0)
+    t = np.linspace(-1.0, 1.0, y.shape[0])
+    basis = np.stack([np.ones_like(t), t])
+    gram = (basis * w) @ basis.T
+    left = y - w * (np.linalg.solve(gram, basis @ y) @ basis)
+    after = np.cumsum(left[::-1])[::-1]
+    moments = np.cumsum((basis * w)[:, ::-1], axis=1)[:, ::-1]
+    power = moments[0] - np.einsum("it,ij,jt->t", moments, np.linalg.inv(gram), moments)
+    inside = slice(20, -20)
+    gain = after[inside] ** 2 / np.maximum(power[inside], 1e-6 * float(w.sum()))
+    at = int(np.argmax(gain))
+    samples = after[inside][at] / max(float(power[inside][at]), 1e-12)
+    is_whole = abs(samples - round(samples)) < 0.3 and abs(round(samples)) >= 1
+    return at + 20 if gain[at] > LEAST_GAIN and is_whole else None
+
+
+def _repairs(segment: Segment, at: int) -> Iterator[tuple[Segment, Loss]]:
+    for near in (at, at - 1, at + 1):
+        if not 2 <= near < segment.count - MOST_IN_A_ROW - 2:
+            continue
+        time = float(segment.time_s[near])
+        held = segment.is_good.copy()
+        held[near] = False
+        yield replace(segment, is_good=held), Loss(segment.number, time, 1, "held value")
+        for n in range(1, MOST_IN_A_ROW + 1):
+            yield _shifted(segment, near, n), Loss(segment.number, time, n, "current samples")
+            yield _inserted(segment, near, n), Loss(segment.number, time, n, "whole rows")
+
+
+def _shifted(segment: Segment, at: int, n: int) -> Segment:
+    """Currents from `at` on belong n samples later."""
+    currents, good = segment.currents_a.copy(), segment.is_good.copy()
+    currents[:, at + n :] = segment.currents_a[:, at:-n]
+    good[at + n :] = segment.is_good[at:-n]
+    good[at : at + n] = False
+    return replace(segment, currents_a=currents, is_good=good)
+
+
+def _inserted(segment: Segment, at: int, n: int) -> Segment:
+    """n rows put back before `at`: command interpolated, currents masked; the end is cut to keep the length."""
+    v = segment.voltage_axis_v
+    gap = np.interp(np.arange(1, n + 1) / (n + 1), [0.0, 1.0], [v[at - 1], v[at]])
+    voltage = np.concatenate([v[:at], gap, v[at:-n]])
+    blank = np.zeros((segment.currents_a.shape[0], n))
+    currents = np.hstack([segment.currents_a[:, :at], blank, segment.currents_a[:, at:-n]])
+    good = np.concatenate([segment.is_good[:at], np.zeros(n, dtype=bool), segment.is_good[at:-n]])
+    return replace(segment, voltage_axis_v=voltage, currents_a=currents, is_good=good)

@@ -1,0 +1,90 @@
+"""A short piece of each campaign, and proof that the campaigns can fail: defects put into the product are seen."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from commissioner.link.inverter import Inverter
+from commissioner.run import runner
+from sim.scenario import build, read_document
+from tests.campaigns import mutants
+from tests.campaigns.faults import Sequence, campaign, report, run_one, run_until_undisturbed
+from tests.campaigns.short_course import Script
+
+SCENARIO = build(read_document("default"), "default")
+
+
+@pytest.mark.parametrize(("wire", "seed"), [("tcp", 100_000), ("rtu", 200_000)])
+def test_random_faults_break_no_invariant(wire, seed):
+    outcomes = campaign(8, seed, wire, minutes=1.0)
+    assert not [outcome.broken for outcome in outcomes if outcome.broken]
+    assert report(outcomes)["energised sessions"] >= 3
+
+
+def sequence(*faults, wire="tcp", decision="write back", rogue="", rogue_at=0):
+    return Sequence(7, wire, Script(decision, 1, 1.0, rogue, rogue_at), faults, None)
+
+
+@pytest.mark.parametrize("wire", ["tcp", "rtu"])
+@pytest.mark.parametrize(
+    ("faults", "outcome"),
+    [
+        ((), "commissioned"),
+        (("lost@90+",), "faulted"),
+        (("half_open@90", "lost_request@91+"), "faulted"),
+        (("earth_fault@e0.2s",), "faulted"),
+        (("ignore:control_word@80",), "faulted"),
+        (("store_fails",), "faulted"),
+        (("power_cycle@store",), "faulted"),
+        (("ignore:watchdog_ms",), "faulted"),
+        (("refuse:watchdog_ms",), "rejected"),
+    ],
+)
+def test_each_grave_fault_ends_as_it_must(tmp_path, wire, faults, outcome):
+    done = run_until_undisturbed(sequence(*faults, wire=wire), SCENARIO, tmp_path)
+    assert not done.broken
+    assert done.ended.outcome == outcome, done.ended
+
+
+def test_a_commit_that_never_ends_ends_as_a_fault_with_the_old_parameters(tmp_path):
+    done = run_until_undisturbed(sequence("stuck_commit"), SCENARIO, tmp_path)
+    assert not done.broken
+    assert done.ended.outcome == "faulted"
+
+
+def test_a_service_that_does_not_disarm_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr(Inverter, "disarm", lambda self: None)
+    done = run_one(sequence("overrun:600@80"), SCENARIO, tmp_path)
+    assert any("after the run had ended" in broken for broken in done.broken), done
+
+
+@pytest.mark.parametrize(
+    ("rogue", "decision", "at", "says"),
+    [
+        ("writes unasked", "keep", 18, "wrote"),
+        ("slow watchdog", "keep", 14, "a watchdog of"),
+        ("too much bias", "keep", 40, "a bias of"),
+    ],
+)
+def test_a_gate_that_lets_everything_through_is_seen(tmp_path, monkeypatch, rogue, decision, at, says):
+    done = run_one(sequence(decision=decision, rogue=rogue, rogue_at=at), SCENARIO, tmp_path)
+    assert not done.broken
+    monkeypatch.setattr(runner, "permit", lambda *_: None)
+    done = run_one(sequence(decision=decision, rogue=rogue, rogue_at=at), SCENARIO, tmp_path)
+    assert any(says in broken for broken in done.broken), done
+
+
+def test_the_mutator_changes_one_thing_at_a_time():
+    source = "def f(a):\n    return a <= 3 and not a\n"
+    made = list(mutants.mutants("m", source))
+    texts = [ast.unparse(mutant.tree) for mutant in made]
+    assert len(texts) == len(set(texts)) == 7
+    assert ast.unparse(ast.parse(source)) not in texts
+
+
+def test_every_explained_survivor_is_still_in_the_code():
+    for key in mutants.EXPLAINED:
+        module, change = key.split(": ", 1)
+        path = mutants.ROOT / Path(module.replace(".", "/") + ".py")
+        assert change.split(" -> ")[0] in path.read_text()
