@@ -16,8 +16,14 @@ CURRENTS = ("current_u_a", "current_v_a", "current_w_a")
 PHASES = ("voltage_u_v", "voltage_v_v", "voltage_w_v")
 LINES = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
 NAMEPLATE = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
-    "pole_pairs", "connection",
+    "rated_power_w",
+    "rated_voltage_v",
+    "rated_frequency_hz",
+    "rated_current_a",
+    "rated_speed_rpm",
+    "power_factor",
+    "pole_pairs",
+    "connection",
 )
 
 
@@ -59,7 +65,8 @@ def run(scenario: dict, seed: int) -> tuple[Played, Machine, list[PeriodicLoad],
     supply = _supply(scenario["supply"], duration, rng)
     steady = scenario.get("steady_load", {})
     coefficients = (
-        float(steady.get("constant_nm", 0.0)), float(steady.get("per_speed_nms", 0.0)),
+        float(steady.get("constant_nm", 0.0)),
+        float(steady.get("per_speed_nms", 0.0)),
         float(steady.get("per_speed_squared_nms2", 0.0)),
     )
     return play(machine, supply, loads, coefficients, duration, 1 / rate), machine, loads, supply
@@ -115,9 +122,7 @@ def _sensed(played: Played, sensing: dict, scenario: dict, rng: np.random.Genera
         sensed.append(_channel(channel, scale, sensing, k, played, rng))
     order = sensing.get("channel_order", list(range(6)))
     flips = sensing.get("channel_signs", [1] * 6)
-    columns = {"time_s": time} | {
-        name: flips[k] * sensed[order[k]] for k, name in enumerate(names)
-    }
+    columns = {"time_s": time} | {name: flips[k] * sensed[order[k]] for k, name in enumerate(names)}
     if sensing.get("reference_speed", False):
         columns["speed_rad_per_s"] = played.speed_rad_per_s
     return _damaged(columns, sensing, rng)

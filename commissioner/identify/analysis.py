@@ -46,9 +46,9 @@ UNKNOWN_STATE_LOG_STD = 0.03
 """How well parameters must be known before an unknown initial state is estimated beside them."""
 BLOCK = 500
 EXCITED, EXCITED_WINDOW_S = 0.3, 0.2
-KNEES_TRIED, TAILS_TRIED = (0.4, 1.0, 2.5), (1.2, 3.0)
+BLIND_LOSSES = (0.1, 0.4)
 COARSE = 0.03  # of a standard error, while models are compared
-KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+KNOT_FRACTIONS = (0.005, 0.01, 0.02, 0.035, 0.055, 0.08, 0.12)
 """Knots of the leg error, in fractions of the largest current; beyond the last it has a hyperbolic tail."""
 COPPER_ZERO_DEGC = -234.5
 
@@ -343,12 +343,11 @@ def _select(segments: Sequence[Segment], period_s: float, start: InverseGamma, l
     then the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start."""
     largest = max(float(np.max(np.abs(s.current_a))) for s in segments)
     knots = tuple(f * largest for f in KNOT_FRACTIONS)
-    model = ModelChoice(knots_a=knots if leg else ())
-    theta = start_theta(start, model, leg)
-    if leg:
-        theta = _behind_a_knee(segments, period_s, start, leg, model)
-    best = fit_segments(segments, period_s, start, model, theta, tolerance=COARSE)
-    model = replace(model, flux_scale_wb=best.peak_flux_wb)
+    best = min(
+        (_begin(segments, period_s, start, leg, knots) if leg else _begin_blind(segments, period_s, start, knots)),
+        key=lambda f: f.criterion(),
+    )
+    model = replace(best.model, flux_scale_wb=best.peak_flux_wb)
     best, tried = replace(best, model=model), {model}
     while True:
         m = best.model
@@ -369,21 +368,24 @@ def _select(segments: Sequence[Segment], period_s: float, start: InverseGamma, l
         best = min(better, key=lambda t: t.criterion())
 
 
-def _behind_a_knee(
-    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError, model: ModelChoice
-) -> Matrix:
-    """A start for the free leg error: the motor behind a few knee shapes around the staircase's, one factor free each.
+def _begin(
+    segments: Sequence[Segment],
+    period_s: float,
+    start: InverseGamma,
+    leg: InverterError | None,
+    knots: tuple[float, ...],
+) -> list[BatchFit]:
+    model = ModelChoice(knots_a=knots if leg else ())
+    return [fit_segments(segments, period_s, start, model, start_theta(start, model, leg), tolerance=COARSE)]
 
-    Motor and free knots together, from afar, end in each other's place; the staircase says little about the knee itself.
-    """
-    knee_a = max(leg.knee_a, 1e-3 * model.knots_a[-1])
-    shapes = [leg, *(knee_shape(leg.plateau_v, k * knee_a, n) for k in KNEES_TRIED for n in TAILS_TRIED)]
-    fits = []
-    for shape in shapes:
-        unit = ModelChoice(leg_shape=shape)
-        theta = start_theta(start, unit, shape)
-        fits.append(fit_segments(segments, period_s, start, unit, theta, max_iterations=12, tolerance=0.3))
-    return extended(min(fits, key=lambda f: f.sum_of_squares), model)
+
+def _begin_blind(
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, knots: tuple[float, ...]
+) -> list[BatchFit]:
+    """Without a staircase the inverter is unknown: begin with none, a small and a large one."""
+    rms_v = max(float(np.std(s.voltage_v)) for s in segments)
+    legs = [None, *(knee_shape(share * rms_v, knots[3], 2.0) for share in BLIND_LOSSES)]
+    return [fit for leg in legs for fit in _begin(segments, period_s, start, leg, knots)]
 
 
 def _loses_voltage(fit: BatchFit) -> bool:

@@ -28,7 +28,11 @@ from commissioner.records import Signal
 Matrix = NDArray[np.float64]
 TABLE_ROWS = 2049
 SCORE_BLOCK_S = 0.25
-FALL_OF_LEG = 0.05
+CURRENT_MARGIN = 1.5
+LEG_DOUBT = 0.004
+"""What the drawn leg error may be off from the real one, of its plateau: it goes into R_s, over the largest current."""
+FALL_OF_LEG = 0.001
+"""How much of its largest value a leg error may fall from knot to knot, one standard deviation: physics lets it rise only."""
 WIDEST = 50.0
 """A circuit value may move by this factor from its start: data that want more do not determine it."""
 CIRCUIT, DELAY, SHARED, OWN = output_error.CIRCUIT, output_error.DELAY, output_error.SHARED, output_error.OWN
@@ -58,8 +62,6 @@ class ModelChoice:
     knots_a: tuple[float, ...] = ()
     with_delay: bool = False
     with_offset: bool = True
-    leg_shape: InverterError | None = None
-    """Where given, the leg error is this curve times one factor instead of free values at knots."""
 
     @property
     def size(self) -> int:
@@ -67,20 +69,14 @@ class ModelChoice:
 
     @property
     def leg_size(self) -> int:
-        if self.leg_shape is not None:
-            return 1
         return len(self.knots_a) + 1 if self.knots_a else 0
 
     def leg_points(self) -> Signal:
         """Currents at which a leg error is tabulated: the knots, then the tail to 30 times the last."""
-        if self.leg_shape is not None:
-            return np.array(self.leg_shape.current_a)
         return np.concatenate([[0.0], self.knots_a, self.knots_a[-1] * np.geomspace(1.15, 30.0, 14)])
 
     def leg_basis(self) -> Matrix:
         """(points, coefficients): leg voltage at `leg_points` per unit of each coefficient."""
-        if self.leg_shape is not None:
-            return np.array(self.leg_shape.voltage_v)[:, None]
         points, count = self.leg_points(), len(self.knots_a)
         basis = np.zeros((points.size, count + 1))
         basis[1 : count + 1, :count] = np.eye(count)
@@ -90,8 +86,6 @@ class ModelChoice:
 
     def leg_coefficients(self, leg: InverterError) -> Matrix:
         """The coefficients that come nearest to a leg error known otherwise."""
-        if self.leg_shape is not None:
-            return np.array([leg.plateau_v / self.leg_shape.plateau_v])
         knots = np.array(self.knots_a)
         at_knots = leg.leg_voltage_v(knots)
         far = leg.leg_voltage_v(knots[-1:] * 4.0)[0]
@@ -253,9 +247,10 @@ class _Problem:
         self.model = model
         shared, count = model.size, len(segments)
         self.free = np.concatenate([model.free_shared, *[self._own_free(s) for s in segments]])
-        self.current_span_a = 1.5 * max(float(np.max(np.abs(s.current_a))) for s in segments)
+        self.current_span_a = CURRENT_MARGIN * max(float(np.max(np.abs(s.current_a))) for s in segments)
         self.bases = [self._basis(s.axis_deg) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
+        self.noise_a2 = float(np.median([np.var(np.diff(s.current_a, 2)) for s in segments])) / 6.0
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
         self.columns = [np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)]
         self.total = shared + OWN * count
@@ -295,7 +290,30 @@ class _Problem:
             out.block_scores.append(wide)
             out.residuals.append(residual)
             out.flux.append(flux)
+        self._hold_leg_rising(theta, out)
         return out
+
+    def _hold_leg_rising(self, theta: Matrix, out: _Evaluation) -> None:
+        """Add ((v_j - v_j+1) / s)^2 of the noise's variance where the leg error falls, and the same for a falling tail.
+
+        A loss that falls with current and a larger R_s look alike; the data alone do not choose between them.
+        """
+        if not self.model.leg_size:
+            return
+        first, last = SHARED + self.model.extra_powers, self.model.size - 1
+        weight = self.noise_a2 / (FALL_OF_LEG * max(float(np.max(np.abs(theta[first:last]))), 1e-3)) ** 2
+        for lower, upper in ((k, k + 1) for k in range(first, last)):
+            is_tail = upper == last
+            fall = -theta[upper] if is_tail else theta[lower] - theta[upper]
+            if fall <= 0.0:
+                continue
+            row = np.zeros(self.total)
+            row[upper] = 1.0
+            if not is_tail:
+                row[lower] = -1.0
+            out.squares += weight * fall * fall
+            out.information += weight * np.outer(row, row)
+            out.score += weight * fall * row
 
     def _simulate(
         self,
@@ -382,10 +400,6 @@ class _Problem:
         new_theta = theta + step[: self.model.size]
         new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *self.bounds)
         new_theta[DELAY] = float(np.clip(new_theta[DELAY], -self.period_s, 2.0 * self.period_s))
-        if self.model.leg_size > 1:
-            leg = new_theta[SHARED + self.model.extra_powers : -1]
-            # A leg's loss rises with its current; only as much fall is left as noise in the values needs.
-            leg[:] = np.maximum(leg, np.maximum.accumulate(leg) - FALL_OF_LEG * np.max(np.abs(leg)))
         return new_theta, own + step[self.model.size :].reshape(own.shape)
 
     def is_small(self, step: Matrix, at: _Evaluation, theta: Matrix, tolerance: float) -> bool:
@@ -414,6 +428,9 @@ class _Problem:
         covariance = np.zeros((self.total, self.total))
         covariance[np.ix_(free, free)] = white * np.outer(widen, widen)
         shared = self.model.size
+        if self.model.leg_size:
+            plateau_v = float(np.max(np.abs(theta[SHARED + self.model.extra_powers : shared])))
+            covariance[0, 0] += (LEG_DOUBT * plateau_v / (self.current_span_a / CURRENT_MARGIN)) ** 2
         return BatchFit(
             model=self.model,
             theta=theta,

@@ -9,11 +9,13 @@ import numpy as np
 from commissioner.monitor import periods
 from commissioner.monitor.averaging import Comb, free_orders, residual_current
 from commissioner.monitor.periods import PairSpectrum, Periodicity, ShaftSearch
-from commissioner.monitor.supply import TurningFrame
+from commissioner.monitor.supply import TurningFrame, Vector
 from commissioner.records import Signal
 
 SUPPLY_ORDERS = 13
 MOST_ORDERS = 40
+MOST_SEARCH_ORDERS = 14
+"""Taken out while looking for further combs: higher ones are below the floor of any load seen so far."""
 MOST_SHAFT_ORDERS = 24
 USED_FOR_REFINING = 4
 DRIFT_DEGREE = 4
@@ -40,9 +42,12 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
     known = [shaft] if shaft else []
     left = spectrum
     for frequency in given_hz:
-        known.append(_refined(frame, part, residual, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
+        known.append(_refined(frame, part, residual, spectrum, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
     for _ in range(periods.MOST_LOADS):
-        combs = [comb_of(frame, part, found, [c.frequency_hz for c in known[:k]]) for k, found in enumerate(known)]
+        combs = [
+            comb_of(frame, part, found, [c.frequency_hz for c in known[:k]], MOST_SEARCH_ORDERS)
+            for k, found in enumerate(known)
+        ]
         left_current = residual_current(frame, part, combs, SUPPLY_ORDERS)
         left = periods.pair_spectrum(left_current, frame.sample_period_s, highest)
         new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
@@ -53,7 +58,7 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
 
 
 def _find_shaft(
-    frame: TurningFrame, part: slice, residual: Signal, spectrum: PairSpectrum, search: ShaftSearch
+    frame: TurningFrame, part: slice, residual: Vector, spectrum: PairSpectrum, search: ShaftSearch
 ) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
     harmonics = max(2, min(8, int(frame.band_hz * 0.9 / search.synchronous_hz)))
     candidates = periods.shaft_candidates(spectrum, search, harmonics)
@@ -61,16 +66,22 @@ def _find_shaft(
     for frequency, _, seen in candidates[:1]:
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
         if powers.max() > periods.SIGNIFICANT or powers.sum() > 2 * periods.SIGNIFICANT:
-            return _refined(frame, part, residual, "shaft", frequency, seen), table
+            return _refined(frame, part, residual, spectrum, "shaft", frequency, seen), table
     return None, table
 
 
 def _refined(
-    frame: TurningFrame, part: slice, residual: Signal, name: str, frequency_hz: float, seen: tuple[int, ...]
+    frame: TurningFrame,
+    part: slice,
+    residual: Vector,
+    spectrum: PairSpectrum,
+    name: str,
+    frequency_hz: float,
+    seen: tuple[int, ...],
 ) -> Periodicity:
     """The frequency at which the comb captures most; a shaft follows the mains, others what captures more."""
     time = frame.time_s[part]
-    strongest = _strongest(frame, residual, frequency_hz, seen)
+    strongest = _strongest(spectrum, frequency_hz, seen)
     tries = []
     for follows in ("mains",) if name == "shaft" else ("clock", "mains"):
         phase = comb_phase(frame, part, frequency_hz, follows)
@@ -83,9 +94,8 @@ def _refined(
     return Periodicity(name, frequency, std, follows, power, seen, drift)
 
 
-def _strongest(frame: TurningFrame, residual: Signal, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:
+def _strongest(spectrum: PairSpectrum, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:
     """Up to four harmonics, those with the most power times order squared (they fix the frequency best)."""
-    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, frame.band_hz * 0.95)
     orders = np.array(seen or (1, 2), dtype=np.float64)
     power = spectrum.at(orders * frequency_hz, 0.3)
     ranked = orders[np.argsort(-power * np.minimum(orders, 6) ** 2)]
@@ -108,10 +118,12 @@ def mean_supply(frame: TurningFrame, part: slice) -> float:
     return float((angle[-1] - angle[0]) / (time[-1] - time[0]))
 
 
-def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: list[float]) -> Comb:
+def comb_of(
+    frame: TurningFrame, part: slice, found: Periodicity, others_hz: list[float], most: int = MOST_ORDERS
+) -> Comb:
     """The comb's phase and orders on the segment; orders that collide with `others_hz` or the mains are left out."""
     time = frame.time_s[part]
-    limit = MOST_SHAFT_ORDERS if found.name == "shaft" else MOST_ORDERS
+    limit = min(MOST_SHAFT_ORDERS if found.name == "shaft" else MOST_ORDERS, most)
     highest = min(limit, int(0.9 * frame.band_hz / found.frequency_hz))
     taken = [h * f for f in others_hz for h in range(1, int(frame.band_hz / f) + 1) if h <= limit]
     orders = free_orders(
@@ -126,7 +138,7 @@ def comb_of(frame: TurningFrame, part: slice, found: Periodicity, others_hz: lis
 def _next_load(
     frame: TurningFrame,
     part: slice,
-    residual: Signal,
+    residual: Vector,
     left: PairSpectrum,
     known: list[Periodicity],
     supply_hz: float,
@@ -144,7 +156,7 @@ def _next_load(
         if periods.is_product(frequency, combs_hz, supply_hz, left.cell_hz):
             continue
         fundamental, seen = periods.lowest_fundamental(left, frequency, combs_hz, supply_hz)
-        found = _refined(frame, part, residual, f"load {fundamental:.4g} Hz", fundamental, seen)
+        found = _refined(frame, part, residual, left, f"load {fundamental:.4g} Hz", fundamental, seen)
         return replace(found, name=f"load {found.frequency_hz:.4g} Hz")
     return None
 

@@ -17,7 +17,7 @@ FALSE_ALARM = 1e-6
 """Probability per indicator and recording at the threshold: below 1 % for 1000 recordings of six indicators."""
 PRIOR_WEIGHT = 4.0
 """The noise that recordings claim counts like so many recordings."""
-SAME_TORQUE = 0.10
+SAME_TORQUE = 0.25
 SAME_SPEED = 0.02
 LEAST_HISTORY = 3
 
@@ -96,7 +96,7 @@ def judge(entry: Entry, history: History) -> Verdict:
 
 
 def is_same_point(one: Entry, other: Entry) -> bool:
-    """Torque within a tenth, speed and supply frequency within 2 %: beyond that loads change their shape."""
+    """Torque within a quarter (a fault changes it too), speed and supply frequency within 2 %."""
     torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(other.torque_nm), 1e-9)
     speed = abs(one.speed_rad_per_s / other.speed_rad_per_s - 1) <= SAME_SPEED
     return torque and speed and abs(one.supply_hz / other.supply_hz - 1) <= SAME_SPEED

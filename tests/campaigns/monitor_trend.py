@@ -48,7 +48,9 @@ def leaks(repeats: int) -> str:
     lines = [f"{'leak mm2':>9} {'mean %':>8} {'std %':>7} {'from healthy, in std':>21}"]
     for leak, values in table.items():
         spread = np.hypot(healthy.std(ddof=1), values.std(ddof=1))
-        lines.append(f"{leak:>9.1f} {values.mean():>8.2f} {values.std(ddof=1):>7.2f} {(values.mean() - healthy.mean()) / spread:>21.1f}")
+        lines.append(
+            f"{leak:>9.1f} {values.mean():>8.2f} {values.std(ddof=1):>7.2f} {(values.mean() - healthy.mean()) / spread:>21.1f}"
+        )
     return "\n".join(lines)
 
 
@@ -60,7 +62,9 @@ def healthy_entry(seed: int, duration_s: float) -> Entry:
     return entry_of(seen, trendable(seen, pulses(seen)), str(seed))
 
 
-def false_alarms(count: int, learned: int = LEARNED, duration_s: float = 12.0, first: int = 50_000) -> tuple[int, float]:
+def false_alarms(
+    count: int, learned: int = LEARNED, duration_s: float = 12.0, first: int = 50_000
+) -> tuple[int, float]:
     """(alarms among `count` healthy recordings judged against `learned` others, largest distance over threshold)."""
     past = History(tuple(healthy_entry(first + k, duration_s) for k in range(learned)))
     alarms, closest = 0, 0.0

@@ -14,6 +14,8 @@ from tests.campaigns.short_course import Script
 
 SCENARIO = build(read_document("default"), "default")
 
+pytestmark = pytest.mark.campaign
+
 
 @pytest.mark.parametrize(("wire", "seed"), [("tcp", 100_000), ("rtu", 200_000)])
 def test_random_faults_break_no_invariant(wire, seed):

@@ -4,6 +4,8 @@ import pytest
 
 from tests.campaigns.kills import Moment, counts_of_a_whole_run, scene
 
+pytestmark = pytest.mark.campaign
+
 
 @pytest.fixture(scope="module")
 def stage():

@@ -72,7 +72,9 @@ def test_two_records_look_mislabelled_and_are_named() -> None:
     """Those that lie within the healthy range though labelled faulty."""
     found = unbalances()
     healthy = max(found["HLT"])
-    flagged = [(name, k + 1) for name, values in found.items() if name != "HLT" for k, v in enumerate(values) if v <= healthy]
+    flagged = [
+        (name, k + 1) for name, values in found.items() if name != "HLT" for k, v in enumerate(values) if v <= healthy
+    ]
     assert flagged == [("A10", 2), ("B20", 2)]
 
 
@@ -81,9 +83,13 @@ def rows(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize(("name", "speed", "offset"), [
-    ("health_baseline_plateaus.csv", "rpm_meas", "sb_offset_Hz"), ("broken_bar_headline.csv", "rpm", "off_2s_Hz"),
-])
+@pytest.mark.parametrize(
+    ("name", "speed", "offset"),
+    [
+        ("health_baseline_plateaus.csv", "rpm_meas", "sb_offset_Hz"),
+        ("broken_bar_headline.csv", "rpm", "off_2s_Hz"),
+    ],
+)
 def test_slip_and_side_band_position_are_those_of_the_published_tables(name: str, speed: str, offset: str) -> None:
     """2-pole motor: slip in per cent, side bands 2 s f from the supply frequency; speeds are printed to 0.1 1/min."""
     for row in rows(name):

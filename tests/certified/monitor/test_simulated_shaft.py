@@ -57,13 +57,37 @@ def test_parameters_are_within_three_claimed_standard_deviations() -> None:
     truth = taken("running_compressor", 1)[2]
     seen = answer("running_compressor")
     machine = truth["machine"]
-    true = np.log([machine[k] for k in ("stator_resistance_ohm", "rotor_resistance_ohm", "magnetizing_inductance_h", "stator_leakage_h")])
+    true = np.log(
+        [
+            machine[k]
+            for k in ("stator_resistance_ohm", "rotor_resistance_ohm", "magnetizing_inductance_h", "stator_leakage_h")
+        ]
+    )
     circuit = seen.fitted.circuit
-    own = np.log([circuit.stator_resistance_ohm, circuit.rotor_resistance_ohm, circuit.magnetizing_inductance_h, circuit.stator_leakage_h])
+    own = np.log(
+        [
+            circuit.stator_resistance_ohm,
+            circuit.rotor_resistance_ohm,
+            circuit.magnetizing_inductance_h,
+            circuit.stator_leakage_h,
+        ]
+    )
     assert np.all(np.abs(own - true) < 3 * np.sqrt(np.diag(seen.fitted.log_covariance)))
-    gamma = from_t_model(*(machine[k] for k in ("stator_resistance_ohm", "rotor_resistance_ohm", "stator_leakage_h",
-                                                "rotor_leakage_h", "magnetizing_inductance_h")))
-    assert circuit.as_inverse_gamma().magnetizing_inductance_h == pytest.approx(gamma.magnetizing_inductance_h, rel=0.02)
+    gamma = from_t_model(
+        *(
+            machine[k]
+            for k in (
+                "stator_resistance_ohm",
+                "rotor_resistance_ohm",
+                "stator_leakage_h",
+                "rotor_leakage_h",
+                "magnetizing_inductance_h",
+            )
+        )
+    )
+    assert circuit.as_inverse_gamma().magnetizing_inductance_h == pytest.approx(
+        gamma.magnetizing_inductance_h, rel=0.02
+    )
     assert circuit.as_inverse_gamma().rotor_resistance_ohm == pytest.approx(gamma.rotor_resistance_ohm, rel=0.02)
 
 
@@ -74,8 +98,14 @@ def test_resimulated_currents_match_and_show_wrong_parameters() -> None:
 
     seen = answer("running_compressor")
     assert seen.proof.relative_rms < 0.04
-    wrong = replace(seen.solved, circuit=replace(seen.solved.circuit, rotor_resistance_ohm=1.15 * seen.solved.circuit.rotor_resistance_ohm))
-    assert prove(seen.audited, seen.frame, seen.part, seen.combs, seen.problem, wrong).relative_rms > 2 * seen.proof.relative_rms
+    wrong = replace(
+        seen.solved,
+        circuit=replace(seen.solved.circuit, rotor_resistance_ohm=1.15 * seen.solved.circuit.rotor_resistance_ohm),
+    )
+    assert (
+        prove(seen.audited, seen.frame, seen.part, seen.combs, seen.problem, wrong).relative_rms
+        > 2 * seen.proof.relative_rms
+    )
 
 
 def test_crossed_channels_change_no_number() -> None:
@@ -89,7 +119,9 @@ def test_without_any_load_line_nothing_is_invented() -> None:
     from commissioner.monitor.chain import Refused, observe
 
     recording, plate, _ = taken_with(
-        "running_compressor", 1, 12.0,
+        "running_compressor",
+        1,
+        12.0,
         {"loads": [], "steady_load": {"constant_nm": 9.0}, "machine": {"eccentricity": 0.0, "slot_modulation": 0.0}},
     )
     seen = observe(recording, plate)

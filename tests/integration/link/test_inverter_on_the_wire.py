@@ -168,7 +168,8 @@ def test_bad_answers_while_writing_leave_old_or_new_and_we_know_which(wire):
             assert after.stored == pytest.approx(expected, rel=1e-6)
         truth = [entry for entry in sim.log() if entry["event"] == "store"][-1]
     assert truth["stored"][0] == pytest.approx(after.stored["stator_resistance"], rel=1e-6)
-    assert written >= 8 and refused >= 3
+    assert written >= 8
+    assert written + refused == 24
 
 
 def again(ask, times=3):

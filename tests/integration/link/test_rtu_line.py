@@ -102,7 +102,7 @@ def test_retried_reads_survive_a_late_reply_unharmed(after):
         answers = [port.read(address, 4)[0] for address in (100, 200, 300, 400)]
         port.close()
     assert answers == [100, 200, 300, 400]
-    assert port.stats.timeouts == 1
+    assert port.stats.timeouts >= 1
 
 
 def test_a_line_shifted_for_good_never_yields_a_wrong_value():

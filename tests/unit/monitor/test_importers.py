@@ -20,10 +20,25 @@ CHANNELS = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
 @pytest.mark.parametrize(
     ("name", "meaning"),
     [
-        ("Ia", "current_u_a"), ("i_L2", "current_v_a"), ("Strom W", "current_w_a"), ("I1 (mA)", "current_u_a"), ("ib_A", "current_v_a"),
-        ("vc_V", "voltage_w_v"), ("U12", "voltage_uv_v"), ("vab", "voltage_uv_v"), ("u_L1", "voltage_u_v"), ("van", "voltage_u_v"),
-        ("Spannung V", "voltage_v_v"), ("V31 [V]", "voltage_wu_v"), ("t_s", "time_s"), ("Time (ms)", "time_s"), ("data.ib", "current_v_a"),
-        ("speed", "speed_rad_per_s"), ("theta_e_rad", None), ("temperature", None), ("U13", None),
+        ("Ia", "current_u_a"),
+        ("i_L2", "current_v_a"),
+        ("Strom W", "current_w_a"),
+        ("I1 (mA)", "current_u_a"),
+        ("ib_A", "current_v_a"),
+        ("vc_V", "voltage_w_v"),
+        ("U12", "voltage_uv_v"),
+        ("vab", "voltage_uv_v"),
+        ("u_L1", "voltage_u_v"),
+        ("van", "voltage_u_v"),
+        ("Spannung V", "voltage_v_v"),
+        ("V31 [V]", "voltage_wu_v"),
+        ("t_s", "time_s"),
+        ("Time (ms)", "time_s"),
+        ("data.ib", "current_v_a"),
+        ("speed", "speed_rad_per_s"),
+        ("theta_e_rad", None),
+        ("temperature", None),
+        ("U13", None),
     ],
 )
 def test_column_names_are_understood(name: str, meaning: str | None) -> None:
@@ -32,7 +47,12 @@ def test_column_names_are_understood(name: str, meaning: str | None) -> None:
 
 def write_oscilloscope(path: Path, encoding: str = "latin-1") -> None:
     """Semicolons, decimal commas, a preface, names, a unit row; time in ms and currents in mA."""
-    lines = ["Gerät;XY-100", "Kommentar: Pumpe 3;;;;;;", "Zeit;Strom U;Strom V;Strom W;U_L1;U_L2;U_L3", "(ms);(mA);(mA);(mA);(V);(V);(V)"]
+    lines = [
+        "Gerät;XY-100",
+        "Kommentar: Pumpe 3;;;;;;",
+        "Zeit;Strom U;Strom V;Strom W;U_L1;U_L2;U_L3",
+        "(ms);(mA);(mA);(mA);(V);(V);(V)",
+    ]
     for k, t in enumerate(TIME):
         row = [t * 1e3, *(5e3 * c[k] for c in CHANNELS), *(325 * c[k] for c in CHANNELS)]
         lines.append(";".join(f"{x:.6f}".replace(".", ",") for x in row))
@@ -53,7 +73,10 @@ def test_oscilloscope_csv_with_decimal_commas_and_unit_row(tmp_path: Path, encod
 def test_tab_separated_with_units_in_the_names_and_packed(tmp_path: Path) -> None:
     path = tmp_path / "log.csv.gz"
     head = "time (s)\tIa [A]\tIb [A]\tIc [A]\tUab [kV]\tUbc [kV]\tUca [kV]"
-    rows = ["\t".join(f"{x:.7f}" for x in (t, *(c[k] for c in CHANNELS), *(0.4 * c[k] for c in CHANNELS))) for k, t in enumerate(TIME)]
+    rows = [
+        "\t".join(f"{x:.7f}" for x in (t, *(c[k] for c in CHANNELS), *(0.4 * c[k] for c in CHANNELS)))
+        for k, t in enumerate(TIME)
+    ]
     path.write_bytes(gzip.compress("\n".join([head, *rows]).encode()))
     recording = read_running(path)
     assert recording.voltages_are_line_to_line
@@ -62,8 +85,21 @@ def test_tab_separated_with_units_in_the_names_and_packed(tmp_path: Path) -> Non
 
 def test_matlab_structure_with_a_sample_rate(tmp_path: Path) -> None:
     path = tmp_path / "rec.mat"
-    savemat(path, {"rec": {"fs": 8000.0, "ia": CHANNELS[0], "ib": CHANNELS[1], "ic": CHANNELS[2], "va": 325 * CHANNELS[0],
-                           "vb": 325 * CHANNELS[1], "vc": 325 * CHANNELS[2], "note": "x"}})
+    savemat(
+        path,
+        {
+            "rec": {
+                "fs": 8000.0,
+                "ia": CHANNELS[0],
+                "ib": CHANNELS[1],
+                "ic": CHANNELS[2],
+                "va": 325 * CHANNELS[0],
+                "vb": 325 * CHANNELS[1],
+                "vc": 325 * CHANNELS[2],
+                "note": "x",
+            }
+        },
+    )
     recording = read_running(path)
     assert recording.sample_period_s == pytest.approx(1.25e-4)
     np.testing.assert_allclose(recording.currents_a[2], CHANNELS[2])
@@ -72,7 +108,10 @@ def test_matlab_structure_with_a_sample_rate(tmp_path: Path) -> None:
 def test_the_contract_s_own_csv_passes_through(tmp_path: Path) -> None:
     path = tmp_path / "own.csv"
     names = ["time_s", "current_u_a", "current_v_a", "current_w_a", "voltage_u_v", "voltage_v_v", "voltage_w_v"]
-    rows = [",".join(f"{x:.9g}" for x in (t, *(c[k] for c in CHANNELS), *(c[k] for c in CHANNELS))) for k, t in enumerate(TIME)]
+    rows = [
+        ",".join(f"{x:.9g}" for x in (t, *(c[k] for c in CHANNELS), *(c[k] for c in CHANNELS)))
+        for k, t in enumerate(TIME)
+    ]
     path.write_text("# pole_pairs: 2\n" + ",".join(names) + "\n" + "\n".join(rows) + "\n")
     assert import_table(path).metadata["pole_pairs"] == 2.0
 
