@@ -70,6 +70,8 @@ DRIVE_FAULTS = (
     "ignore:staged_stator_resistance", "ignore:commit", "ignore:tones", "refuse:watchdog_ms", "refuse:amplitude_scale",
     "refuse:commit", "other_map",
 )  # fmt: skip
+SHARE = 25
+"""Sequences that a process takes at a time: seeds stay together, and the time limit cuts off whole shares."""
 REPEATS, STALL_S = 3, 0.02
 """A sequence that broke something while this machine let threads wait for so long is run again."""
 MOMENTS = ("commit", "store")
@@ -368,13 +370,18 @@ def in_processes(processes: int, sequences: int, first_seed: int, wire: str, min
     """The campaign shared out: a sequence mostly waits for time-outs, so several fit on one core."""
     if processes == 1:
         return campaign(sequences, first_seed, wire, minutes)
-    share = -(-sequences // processes)
+    share, end = SHARE, time.monotonic() + 60 * minutes
     starts = range(first_seed, first_seed + sequences, share)
     with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         futures = [
-            pool.submit(campaign, min(share, first_seed + sequences - start), start, wire, minutes) for start in starts
+            pool.submit(_until, end, min(share, first_seed + sequences - start), start, wire) for start in starts
         ]
         return [outcome for future in futures for outcome in future.result()]
+
+
+def _until(end: float, sequences: int, first_seed: int, wire: str) -> list[Outcome]:
+    """One share; nothing where the campaign's time is over."""
+    return campaign(sequences, first_seed, wire, (end - time.monotonic()) / 60) if time.monotonic() < end else []
 
 
 def report(outcomes: list[Outcome]) -> dict[str, Any]:

@@ -53,7 +53,7 @@ from tests.support.sim_process import SimProcess
 LONGEST_RUN_S = 60.0
 PROFILE = "simulated"
 VICTIMS = multiprocessing.get_context("forkserver")
-VICTIMS.set_forkserver_preload(["tests.campaigns.kills", "tests.campaigns.warm"])
+VICTIMS.set_forkserver_preload(["tests.campaigns.faults", "tests.campaigns.warm"])
 WHOLE_RUN_ATTEMPTS = 5
 """A busy machine can miss the short reply time-out of these runs."""
 
