@@ -45,10 +45,14 @@ UNUSUAL = {
 }
 
 
-def draw(seed: int, stratum: str = "one", excitation: str = "rich", only: str = "") -> Scenario:
-    """A scenario with hidden causes. `only` forces the single cause's name. Same seed, same case.
+def draw(
+    seed: int, stratum: str = "one", excitation: str = "rich", only: str = "", noise: str = "", seconds: float = 0.0
+) -> Scenario:
+    """A scenario with hidden causes. Same arguments, same case.
 
-    ValueError for an unknown stratum or excitation (`rich`, `poor`: one axis, two tones, one level).
+    `only` forces the single cause's name, `noise` its kind (`white`, `red`, `flicker`, `quantised`: white and a 12 bit
+    converter), `seconds` the length of every segment. ValueError for an unknown stratum or excitation (`rich`; `poor`:
+    one axis, two tones, one level).
     """
     if stratum not in STRATA or excitation not in ("rich", "poor"):
         raise ValueError(f"stratum {stratum!r} of {STRATA}, excitation {excitation!r} of ('rich', 'poor')")
@@ -61,13 +65,22 @@ def draw(seed: int, stratum: str = "one", excitation: str = "rich", only: str = 
         "power_stage": {"dead_time_s": 0.0, "threshold_v": 0.0, "slope_ohm": 0.0, "link_ripple": 0.0},
         "sensors": _sensors(plate, random),
         "heating": {"stator_per_min": 0.0, "rotor_per_min": 0.0},
-        "noise": {"kind": str(random.choice(["white", "white", "red", "flicker"]))},
+        "noise": {"kind": _noise_kind(noise, random)},
         "effects": _causes(stratum, plate, random, only),
         "recording": {"segments": segments(plate, machine, excitation, random)},
     }
     if stratum == "absent":
         document["unlisted"] = _unlisted(plate, random)
+    if noise == "quantised":
+        document["sensors"]["bits"] = 12
+    for segment in document["recording"]["segments"] if seconds else ():
+        segment["duration_s"] = seconds
     return _possible(document)
+
+
+def _noise_kind(asked: str, random: np.random.Generator) -> str:
+    drawn = str(random.choice(["white", "white", "red", "flicker"]))
+    return {"": drawn, "quantised": "white"}.get(asked, asked)
 
 
 def _possible(document: dict[str, Any]) -> Scenario:
@@ -118,13 +131,21 @@ def _causes(stratum: str, plate: dict[str, Any], random: np.random.Generator, on
     if stratum in ("null", "absent"):
         return {}
     if stratum == "tie":
-        return {"sampling_delay": {"size": float(random.uniform(4e-6, 2e-5))}}
+        return _tied(plate, random)
     count = {"one": 1, "two": 2, "three": 3, "four": 4, "wrong_form": int(random.integers(1, 3))}[stratum]
     pool = sorted(UNUSUAL if stratum == "wrong_form" else CATALOGUE)
     if count > 1:
         pool = [name for name in pool if name not in HARMLESS]
     names = random.choice(pool, count, replace=False)
     return {str(n): _size(str(n), plate, random, unusual=stratum == "wrong_form") for n in names}
+
+
+def _tied(plate: dict[str, Any], random: np.random.Generator) -> dict[str, Any]:
+    """A cause with a twin that looks the same from the terminals: a short delay or lag, a leg's loss of voltage."""
+    name = str(random.choice(["sampling_delay", "sensor_lag", "dead_time", "device_drop"]))
+    if name in ("sampling_delay", "sensor_lag"):
+        return {name: {"size": float(random.uniform(4e-6, 2e-5))}}
+    return {name: _size(name, plate, random, unusual=False)}
 
 
 def _size(name: str, plate: dict[str, Any], random: np.random.Generator, *, unusual: bool) -> dict[str, Any]:
