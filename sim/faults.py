@@ -1,7 +1,8 @@
 """Faults on demand: `NAME[:ARGUMENT][@WHEN]`, on the wire byte by byte, or in the drive.
 
-WHEN: `17` the 17th request, `17+` from there on, `17x3` three of them, `2.5s` motor time, `e0.5s` motor time since the
-first energising, `commit` / `store` just before that command is carried out. Without it: from the first request on.
+WHEN: `17` the 17th request, `17+` from there on, `17x3` three of them; `w5`, `w5+`, `w5x2` the same among the requests
+that write (FC16); `2.5s` motor time, `e0.5s` motor time since the first energising, `commit` / `store` just before that
+command is carried out. Without it: from the first request on.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ DRIVE = {
     "overrun": 100, "sample_gap": 5, "power_cycle": None, "stuck_commit": None, "store_fails": None,
     "heartbeat_ignored": None, "ignore": "control_word", "refuse": "watchdog_ms", "other_map": 100,
 }
+WRITE_REGISTERS = 16
 NUMBERED = {"late", "truncated", "wrong_unit", "short_reply", "stall", "restart", "overrun", "sample_gap", "other_map"}
 
 
@@ -35,7 +37,7 @@ class FaultError(Exception):
 
 @dataclass(frozen=True)
 class Fault:
-    """One knob. `first`, `last`: request numbers; `motor_time_s` and `command` are the other triggers."""
+    """One knob. `first`, `last`: numbers of requests, or of writing ones; `motor_time_s`, `command`: other triggers."""
 
     name: str
     argument: str | float | None
@@ -44,10 +46,13 @@ class Fault:
     motor_time_s: float | None = None
     since_energised: bool = False
     command: str | None = None
+    among_writes: bool = False
 
-    def hits(self, request: int) -> bool:
-        """Whether this request (counted from 1) is one the fault is meant for."""
-        return self.motor_time_s is None and self.command is None and self.first <= request <= self.last
+    def hits(self, request: int, write: int | None) -> bool:
+        """Whether the fault is meant for this request; both counted from 1, `write` None where it does not write."""
+        number = write if self.among_writes else request
+        is_numbered = self.motor_time_s is None and self.command is None
+        return is_numbered and number is not None and self.first <= number <= self.last
 
 
 def parse(text: str) -> Fault:
@@ -87,11 +92,11 @@ def _timed(text: str, fault: Fault, when: str | None) -> Fault:
         return replace(fault, command=when)
     if match := re.fullmatch(r"(e?)(\d+(?:\.\d+)?)s", when):
         return replace(fault, motor_time_s=float(match[2]), since_energised=bool(match[1]))
-    if match := re.fullmatch(r"(\d+)(?:(\+)|x(\d+))?", when):
-        first = int(match[1])
-        last = math.inf if match[2] else first + int(match[3] or 1) - 1
-        return replace(fault, first=first, last=last)
-    raise FaultError(f"fault {text!r}: WHEN is N, N+, NxCOUNT, SECONDSs, eSECONDSs, commit or store")
+    if match := re.fullmatch(r"(w?)(\d+)(?:(\+)|x(\d+))?", when):
+        first = int(match[2])
+        last = math.inf if match[3] else first + int(match[4] or 1) - 1
+        return replace(fault, first=first, last=last, among_writes=bool(match[1]))
+    raise FaultError(f"fault {text!r}: WHEN is N, N+, NxCOUNT (w before N: writes), SECONDSs, eSECONDSs, commit, store")
 
 
 @dataclass
@@ -189,6 +194,7 @@ class Plan:
     def __init__(self, faults: list[Fault]) -> None:
         self.faults = faults
         self.requests = 0
+        self.writes = 0
         self.struck: set[int] = set()
 
     def arm(self, drive: Firmware) -> None:
@@ -209,15 +215,21 @@ class Plan:
 
         drive.on_energised.append(once)
 
-    def next_request(self, drive: Firmware) -> list[Fault]:
+    def next_request(self, drive: Firmware, function: int) -> list[Fault]:
         """Count a request, strike the drive faults due by number, return the wire and server faults that hit it."""
         self.requests += 1
+        self.writes += function == WRITE_REGISTERS
+        number = self.requests, self.writes if function == WRITE_REGISTERS else None
         for j, fault in enumerate(self.faults):
-            if fault.name in DRIVE and fault.hits(self.requests) and j not in self.struck and fault.name != "other_map":
+            if fault.name in DRIVE and fault.hits(*number) and j not in self.struck and fault.name != "other_map":
                 self.struck.add(j)
                 strike(fault, drive)
-        due = self._timed_due(drive)
-        return due + [f for f in self.faults if f.name not in DRIVE and f.hits(self.requests)]
+        hits = self._timed_due(drive) + [f for f in self.faults if f.name not in DRIVE and f.hits(*number)]
+        for fault in hits:
+            drive.log.write(
+                "fault", drive.t, name=fault.name, argument=fault.argument, request=self.requests, function=function
+            )
+        return hits
 
     def _timed_due(self, drive: Firmware) -> list[Fault]:
         """Wire and server faults whose motor time has come: each hits the next request once."""

@@ -187,7 +187,7 @@ class Handler(ServerRequestHandler):
             if not self.line.is_rtu:
                 self._refuse(pdu, ExcCodes.GATEWAY_NO_RESPONSE)
             return
-        self.hits = drive.plan.next_request(drive.firmware)
+        self.hits = drive.plan.next_request(drive.firmware, pdu.function_code)
         if any(fault.name == "lost_request" for fault in self.hits):
             return
         if not self._server_fault():

@@ -38,7 +38,8 @@ from commissioner.run.commission import _bounds, _watch
 from commissioner.run.restore import restore
 from commissioner.run.runner import Runner
 from tests.campaigns import truth
-from tests.campaigns.faults import WIRES, make_job
+from tests.campaigns.one_run import make_job
+from tests.campaigns.sequences import WIRES
 from tests.campaigns.short_course import (
     NEW_ON_THE_WIRE,
     OLD_ON_THE_WIRE,
@@ -53,7 +54,7 @@ from tests.support.sim_process import SimProcess
 LONGEST_RUN_S = 60.0
 PROFILE = "simulated"
 VICTIMS = multiprocessing.get_context("forkserver")
-VICTIMS.set_forkserver_preload(["tests.campaigns.faults", "tests.campaigns.warm"])
+VICTIMS.set_forkserver_preload(["tests.campaigns.one_run", "tests.campaigns.warm"])
 WHOLE_RUN_ATTEMPTS = 5
 """A busy machine can miss the short reply time-out of these runs."""
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sim.faults import SERVER, WIRE, Fault
+
 GRACE_S = 0.1
 """Beyond the watchdog's time, until the output must be dead."""
 FLUX_TOLERANCE = 1.02
@@ -41,6 +43,21 @@ class Requests:
                 break
             begun = (begun or when) if is_harmed else None
         return None if begun is None else wall - begun
+
+
+def deny_the_answer(hits: Sequence[Fault], wire: str, reply_timeout_s: float) -> bool:
+    """Whether no believable answer comes in time. Of several wire faults the simulator carries out the first."""
+    first = next((fault for fault in hits if fault.name in WIRE), None)
+    acting = [fault for fault in hits if fault is first or fault.name in SERVER or fault.name == "lost_request"]
+    return any(_denies_the_answer(fault, wire, reply_timeout_s) for fault in acting)
+
+
+def _denies_the_answer(fault: Fault, wire: str, reply_timeout_s: float) -> bool:
+    if fault.name in ("late", "stall"):
+        return float(fault.argument or 0.0) > reply_timeout_s
+    if wire == "rtu" and fault.name in ("stray_before", "wrong_transaction"):  # passed over; no such number in RTU
+        return False
+    return fault.name not in ("repeated", "stray_after")
 
 
 def read_log(path: Path) -> list[Entry]:

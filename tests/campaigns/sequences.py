@@ -1,0 +1,102 @@
+"""What is random in one short run, as Hypothesis strategies: the script, the faults and their moments, the operator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hypothesis import strategies as st
+
+from sim.faults import SERVER
+from tests.campaigns.short_course import DECISIONS, ROGUES, Script
+
+WIRES = ("tcp", "rtu")
+WIRE_FAULTS = (
+    "late:0.03", "late:0.09", "late:0.2", "late:0.5", "lost", "lost_request", "repeated", "truncated", "truncated:1",
+    "corrupted", "reordered", "stray_before", "stray_before:01", "stray_after", "wrong_unit", "wrong_function",
+    "short_reply", "short_reply:4", "wrong_transaction", "stall:0.05", "stall:0.4", "restart:0.02", "restart:0.3",
+    "half_open",
+)  # fmt: skip
+DRIVE_FAULTS = (
+    "overcurrent", "heatsink", "winding", "earth_fault", "sto", "undervoltage", "overrun:50", "overrun:600",
+    "sample_gap:3", "sample_gap:400", "power_cycle", "stuck_commit", "store_fails", "heartbeat_ignored",
+    "ignore:control_word", "ignore:watchdog_ms", "ignore:current_limit_a", "ignore:amplitude_scale",
+    "ignore:staged_stator_resistance", "ignore:commit", "ignore:tones", "refuse:watchdog_ms", "refuse:amplitude_scale",
+    "refuse:commit",
+)  # fmt: skip
+REQUESTS = {1: 170, 2: 270}
+"""About how many requests a sound run of one or two tests makes."""
+WRITES = {1: 24, 2: 36}
+"""Of them with function 16."""
+FAULT_COUNTS = (0, *(1,) * 8, *(2,) * 6, *(3,) * 3, *(4,) * 2)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """All that is random in one run; `seed` is the simulated drive's noise."""
+
+    seed: int
+    wire: str
+    script: Script
+    faults: tuple[str, ...]
+    stop_after: int | None
+
+
+@st.composite
+def sequences(draw: st.DrawFn, wire: str) -> Sequence:
+    """One run over `wire` (`both`: either)."""
+    tests = draw(st.sampled_from([1, 1, 1, 1, 2]))
+    script = Script(
+        draw(st.sampled_from([*DECISIONS[:1] * 3, *DECISIONS[1:]])),
+        tests,
+        draw(st.floats(0.8, 2.5)),
+        *draw(_rogue(tests)),
+    )
+    return Sequence(
+        seed=draw(st.integers(0, 9999)),
+        wire=wire if wire in WIRES else draw(st.sampled_from(WIRES)),
+        script=script,
+        faults=tuple(draw(_fault(tests)) for _ in range(draw(st.sampled_from(FAULT_COUNTS)))),
+        stop_after=draw(_seldom(st.integers(0, REQUESTS[tests]))),
+    )
+
+
+def _seldom(strategy: st.SearchStrategy[int]) -> st.SearchStrategy[int | None]:
+    """About one time in twenty."""
+    return st.integers(0, 19).flatmap(lambda n: strategy if n == 13 else st.none())
+
+
+@st.composite
+def _rogue(draw: st.DrawFn, tests: int) -> tuple[str, int]:
+    """A defective procedure, one time in six, and its moment."""
+    if draw(st.integers(0, 5)) != 3:
+        return "", 0
+    return draw(st.sampled_from(list(ROGUES))), draw(st.integers(0, REQUESTS[tests]))
+
+
+def _fault(tests: int) -> st.SearchStrategy[str]:
+    """Six of ten on the wire, one in a hundred another firmware's register map."""
+    kinds = st.integers(0, 99)
+    return kinds.flatmap(
+        lambda n: st.just("other_map") if n == 50 else _drive_fault(tests) if n > 60 else _wire_fault(tests)
+    )
+
+
+@st.composite
+def _wire_fault(draw: st.DrawFn, tests: int) -> str:
+    """At a request, mostly once; one in four among those that write."""
+    name, among_writes = draw(st.sampled_from(WIRE_FAULTS)), draw(st.integers(0, 3)) == 3
+    first = draw(st.integers(1, (WRITES if among_writes else REQUESTS)[tests]))
+    at = f"{name}@{'w' if among_writes else ''}{first}"
+    if name.startswith(tuple(SERVER)):
+        return at
+    return at + draw(st.sampled_from(["", "", "", *(f"x{n}" for n in range(2, 8)), "+"]))
+
+
+@st.composite
+def _drive_fault(draw: st.DrawFn, tests: int) -> str:
+    """At a request, at a time since the first energising, or just before a command is carried out."""
+    name = draw(st.sampled_from(DRIVE_FAULTS))
+    at_request = st.integers(1, REQUESTS[tests]).map(str)
+    energised = st.integers(0, 6000).map(lambda n: f"e{n / 1e4:.4f}s")
+    when = draw(st.one_of(at_request, at_request, energised, energised, st.sampled_from(["commit", "store"])))
+    return f"{name}@{when}"
