@@ -143,7 +143,7 @@ def _watch_requests(running: Running, wire: str) -> truth.Requests:
 
     def next_request(drive: Any, function: int) -> list[Any]:
         hits = count(drive, function)
-        requests.seen.append((time.time(), truth.deny_the_answer(hits, wire, REPLY_TIMEOUT_S)))
+        requests.seen.append((time.time(), truth.deny_the_answer(hits, wire, function, REPLY_TIMEOUT_S)))
         return hits
 
     plan.next_request = next_request  # type: ignore[method-assign]

@@ -13,6 +13,8 @@ from sim.faults import SERVER, WIRE, Fault
 GRACE_S = 0.1
 """Beyond the watchdog's time, until the output must be dead."""
 FLUX_TOLERANCE = 1.02
+READING = (3, 23)
+"""Functions whose reply can be cut shorter and stay well-formed."""
 PARAMETER_ITEMS = ("staged_", "commit", "store")
 
 Entry = Mapping[str, Any]
@@ -45,16 +47,18 @@ class Requests:
         return None if begun is None else wall - begun
 
 
-def deny_the_answer(hits: Sequence[Fault], wire: str, reply_timeout_s: float) -> bool:
-    """Whether no believable answer comes in time. Of several wire faults the simulator carries out the first."""
+def deny_the_answer(hits: Sequence[Fault], wire: str, function: int, reply_timeout_s: float) -> bool:
+    """Whether a request of this function gets no believable answer in time. Of several wire faults the first is carried out."""
     first = next((fault for fault in hits if fault.name in WIRE), None)
     acting = [fault for fault in hits if fault is first or fault.name in SERVER or fault.name == "lost_request"]
-    return any(_denies_the_answer(fault, wire, reply_timeout_s) for fault in acting)
+    return any(_denies_the_answer(fault, wire, function, reply_timeout_s) for fault in acting)
 
 
-def _denies_the_answer(fault: Fault, wire: str, reply_timeout_s: float) -> bool:
+def _denies_the_answer(fault: Fault, wire: str, function: int, reply_timeout_s: float) -> bool:
     if fault.name in ("late", "stall"):
         return float(fault.argument or 0.0) > reply_timeout_s
+    if fault.name == "short_reply" and function not in READING:
+        return False
     if wire == "rtu" and fault.name in ("stray_before", "wrong_transaction"):  # passed over; no such number in RTU
         return False
     return fault.name not in ("repeated", "stray_after")

@@ -26,16 +26,19 @@ from commissioner.link.drive_file import load_profile
 from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import open_port
 from commissioner.link.url import TcpUrl, parse_url
+from sim.faults import parse
+from tests.campaigns import truth
 from tests.support.raw_servers import Bank, TcpDevice
 from tests.support.sim_process import SimProcess
 
 PROFILE = load_profile("simulated")
+REPLY_TIMEOUT_S = 0.25
 WIRES = {"tcp": ("--tcp", "0"), "rtu": ("--rtu", "pty")}
 
 
 @contextlib.contextmanager
 def connect(sim, query=""):
-    port = open_port(parse_url(sim.url + query), PROFILE, reply_timeout_s=0.25)
+    port = open_port(parse_url(sim.url + query), PROFILE, reply_timeout_s=REPLY_TIMEOUT_S)
     with contextlib.closing(port):
         yield Inverter(port, PROFILE)
 
@@ -143,33 +146,53 @@ def test_bad_answers_cost_a_session_no_sample_or_end_it_with_the_motor_dead(wire
     assert whole >= 4 and broken >= 1
 
 
+TURNS, EVERY_WRITES = 24, 7
+
+
 @pytest.mark.parametrize("wire", WIRES)
 def test_bad_answers_while_writing_leave_old_or_new_and_we_know_which(wire):
-    written = refused = 0
-    with SimProcess(*WIRES[wire], *one_every(31)) as sim, connect(sim) as inverter:
+    """Every seventh write meets a fault. A turn whose write was denied its answer is refused, and no turn is refused
+    without a failure on the link: both by the simulator's log, on a busy host as on an idle one."""
+    places = enumerate(FAULTS * 2, start=1)
+    faults = [word for k, fault in places for word in ("--fault", f"{fault}@w{EVERY_WRITES * k}")]
+    denied = written = refused = 0
+    with SimProcess(*WIRES[wire], *faults) as sim, connect(sim) as inverter:
         inverter.port.read_retries = 2
-        for turn in range(24):
+        stats = inverter.port.stats
+        for turn in range(TURNS):
             snapshot = again(inverter.snapshot)
             new = {"stator_resistance": 3.0 + 0.01 * turn, "magnetizing_inductance": 0.2 + 0.001 * turn}
+            seen, failed = len(sim.log()), stats.timeouts + stats.mismatches
+            refusal = None
             try:
                 inverter.write_parameters(new, snapshot)
-            except WriteBackFailed as error:
-                refused += 1
-                assert error.was_restored or again(lambda before=snapshot: inverter.restore(before))
-                expected = dict(snapshot.in_use)
-            except DriveError:
-                refused += 1
-                expected = dict(snapshot.in_use)
-            else:
-                written += 1
-                expected = dict(snapshot.in_use) | new
+            except DriveError as error:
+                refusal = error
+            was_denied = any(denies(entry, wire) for entry in sim.log()[seen:])
+            has_failed = stats.timeouts + stats.mismatches > failed
+            assert refusal is not None or not was_denied
+            assert refusal is None or has_failed
+            if isinstance(refusal, WriteBackFailed) and not refusal.was_restored:
+                again(lambda before=snapshot: inverter.restore(before))
+            denied, written, refused = denied + was_denied, written + (refusal is None), refused + (refusal is not None)
+            expected = dict(snapshot.in_use) | ({} if refusal else new)
             after = again(inverter.snapshot)
             assert after.in_use == pytest.approx(expected, rel=1e-6)
             assert after.stored == pytest.approx(expected, rel=1e-6)
-        truth = [entry for entry in sim.log() if entry["event"] == "store"][-1]
-    assert truth["stored"][0] == pytest.approx(after.stored["stator_resistance"], rel=1e-6)
-    assert written >= 8
-    assert written + refused == 24
+        log = sim.log()
+    assert [entry for entry in log if entry["event"] == "store"][-1]["stored"][0] == pytest.approx(
+        after.stored["stator_resistance"], rel=1e-6
+    )
+    assert denied >= 8
+    assert (written + refused, refused >= denied) == (TURNS, True)
+
+
+def denies(entry, wire):
+    """Whether this entry of the simulator's log is a fault of the wire that leaves a request without an answer."""
+    if entry["event"] != "fault" or "request" not in entry:
+        return False
+    fault = parse(entry["name"] if entry["argument"] is None else f"{entry['name']}:{entry['argument']}")
+    return truth.deny_the_answer([fault], wire, entry["function"], REPLY_TIMEOUT_S)
 
 
 def again(ask, times=3):
