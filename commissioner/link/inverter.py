@@ -23,8 +23,11 @@ from commissioner.link.items import Items, number
 from commissioner.link.port import Port
 from commissioner.link.reading import read_identity, read_nameplate, read_state, read_status
 from commissioner.link.write_back import WriteBack
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
 from commissioner.registers.codec import Value
+from commissioner.registers.convention import drive_values
 from commissioner.registers.profile import DriveProfile, WindowLayout
 from commissioner.registers.status import DriveState
 from commissioner.registers.window import (
@@ -234,6 +237,13 @@ class Inverter:
         """
         self.profile.require("write_back")
         return self._write_back().write(values, snapshot, store=store)
+
+    def write_circuit(
+        self, circuit: InverseGamma, nameplate: Nameplate, snapshot: ParameterSnapshot, *, store: bool = True
+    ) -> WriteReport:
+        """As `write_parameters`: every parameter the drive file knows, in the drive's own circuit, form and unit."""
+        written = drive_values(self.profile, circuit, nameplate)
+        return self.write_parameters(written.values, snapshot, store=store)
 
     def restore(
         self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None

@@ -105,6 +105,8 @@ class Findings:
     has_looked: bool = False
     first_look: Identification | None = None
     estimate: InverseGamma | None = None
+    is_measured: bool = False
+    """All four values of `estimate` were measured on this motor, none is the plate's."""
     blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)
     segment: int = -1
     peak_flux_fraction: float = 0.0
@@ -192,6 +194,5 @@ def judge(job: Job, findings: Findings) -> Step:
 def write(job: Job, findings: Findings) -> Step:
     """The accepted values into the drive, verified; the runner restores the snapshot where that fails."""
     assert findings.identification is not None
-    values = asdict(findings.identification.parameters)
-    findings.written = yield WriteParameters({name: values[part] for name, part in job.parameter_names.items()})
+    findings.written = yield WriteParameters(findings.identification.parameters, job.nameplate)
     return Event.VERIFIED

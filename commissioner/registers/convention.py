@@ -77,6 +77,12 @@ def drive_value(item: Item, circuit: InverseGamma, nameplate: Nameplate | None =
     return known[quantity] * factor
 
 
+def is_our_own(item: Item) -> bool:
+    """Whether the item holds the quantity as the service itself states it: R_s of any circuit, inverse-Gamma else."""
+    model, form = CONVENTIONS.get(item.convention, ("", ""))
+    return form == "per_phase" and (model == "inverse_gamma" or (item.quantity or item.name) == "stator_resistance")
+
+
 def representation_factor(quantity: str, form: str, nameplate: Nameplate | None) -> float:
     """What a per-phase SI value is multiplied by: 2 line to line, omega_N, 100/Z_N or 100 omega_N/Z_N.
 

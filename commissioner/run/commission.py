@@ -24,6 +24,7 @@ from commissioner.procedure.findings import RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.verdict import PARAMETERS
 from commissioner.records import DriveIdentity
+from commissioner.registers.convention import INDUCTANCES, RESISTANCES, is_our_own
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run_page import run_page
 from commissioner.report.summary import summarise
@@ -196,8 +197,11 @@ def _job(
 
 
 def _parameter_names(profile: DriveProfile) -> dict[str, str]:
-    """The drive's name of each circuit parameter -> the contract's."""
-    return dict(zip(profile.parameters.order, PARAMETERS, strict=True)) if profile.parameters else {}
+    """The drive's name of each parameter that is one of the contract's, not another circuit's or in another form."""
+    by_quantity = dict(zip((*RESISTANCES, *INDUCTANCES[:2]), PARAMETERS, strict=True))
+    items = [profile.item(name) for name in profile.parameters.order] if profile.parameters else []
+    known = {item.name: by_quantity.get(item.quantity or item.name) for item in items if is_our_own(item)}
+    return {name: field for name, field in known.items() if field is not None}
 
 
 def _drive_limits(profile: DriveProfile) -> DriveLimits:
@@ -212,16 +216,13 @@ def _drive_limits(profile: DriveProfile) -> DriveLimits:
 
 
 def _bounds(job: Job, profile: DriveProfile) -> Bounds:
-    box = prior(job.nameplate)
     return Bounds(
         max_watchdog_s=job.plan.supervision.max_watchdog_s,
         drive_current_a=job.trip_current_a,
         test_voltage_v=job.test_voltage_v,
         axis_time_s=job.axis_time_s,
         total_time_s=job.total_time_s,
-        parameter_bounds={
-            name: (getattr(box.lower, field), getattr(box.upper, field)) for name, field in job.parameter_names.items()
-        },
+        parameters=prior(job.nameplate),
     )
 
 

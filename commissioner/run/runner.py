@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from types import FrameType
 from typing import Any
@@ -144,8 +144,8 @@ class Runner:
                 return inverter.read_status()
             case ask.TakeSnapshot():
                 return self._take_snapshot()
-            case ask.WriteParameters(values=values):
-                return self._write(values)
+            case ask.WriteParameters():
+                return self._write(command)
         self._act(command)
         return None
 
@@ -191,10 +191,10 @@ class Runner:
         self._folder.save("snapshot.json", self._snapshot)
         return self._snapshot
 
-    def _write(self, values: Mapping[str, float]) -> tuple[WrittenParameter, ...]:
+    def _write(self, command: ask.WriteParameters) -> tuple[WrittenParameter, ...]:
         assert self._snapshot is not None
         try:
-            report = self._inverter.write_parameters(values, self._snapshot)
+            report = self._inverter.write_circuit(command.circuit, command.nameplate, self._snapshot)
         except WriteBackFailed as failed:
             if failed.was_restored:
                 self._folder.journal("snapshot_restored", failed.as_dict(), durable=True)

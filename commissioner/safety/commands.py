@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate
 
 
 @dataclass(frozen=True)
@@ -103,9 +105,13 @@ class Disarm(Command):
 
 @dataclass(frozen=True)
 class WriteParameters(Command):
-    """Stage, verify, commit, store, verify; by the drive's names. -> tuple of WrittenParameter"""
+    """The circuit in the drive's own terms: stage, verify, commit, store, verify. -> tuple of WrittenParameter
 
-    values: Mapping[str, float]
+    The plate is for drives that want reactances at rated frequency or per cent.
+    """
+
+    circuit: InverseGamma
+    nameplate: Nameplate
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ drive's own answers by `after`) and of the run's bounds. It returns None or the 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
+from commissioner.motor.nameplate import ParameterBox
 from commissioner.safety.commands import (
     ArmWatchdog,
     Command,
@@ -34,7 +34,7 @@ class Bounds:
     test_voltage_v: float
     axis_time_s: float
     total_time_s: float
-    parameter_bounds: Mapping[str, tuple[float, float]]
+    parameters: ParameterBox
 
 
 @dataclass(frozen=True)
@@ -165,13 +165,10 @@ def _judge_write(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusa
         return Refusal("no snapshot of the drive's parameters exists", "WriteParameters", "snapshot archived")
     if not facts.writing_allowed:
         return Refusal("the verdict does not allow writing", "WriteParameters", "verdict: write back")
-    if set(command.values) != set(bounds.parameter_bounds):
-        return Refusal("not the parameters of this drive", sorted(command.values), sorted(bounds.parameter_bounds))
-    for name, value in command.values.items():
-        refusal = _within(name, value, *bounds.parameter_bounds[name])
-        if refusal is not None:
-            return refusal
-    return None
+    circuit, box = command.circuit, bounds.parameters
+    limits = zip(fields(circuit), circuit.as_tuple(), box.lower.as_tuple(), box.upper.as_tuple(), strict=True)
+    refusals = (_within(number.name, value, low, high) for number, value, low, high in limits)
+    return next(filter(None, refusals), None)
 
 
 def _within(name: str, value: float, low: float, high: float) -> Refusal | None:

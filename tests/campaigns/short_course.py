@@ -15,6 +15,7 @@ from unittest import mock
 from commissioner.identify import excitation
 from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
 from commissioner.identify.resistance import IDEAL_INVERTER
+from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.excite import excite
 from commissioner.procedure.findings import RunEnded, StateEntered, VerdictReached
@@ -25,7 +26,6 @@ from commissioner.safety import commands as ask
 from commissioner.settings import load_motor
 
 WATCHDOG_S, REPLY_TIMEOUT_S = 0.25, 0.06
-NAMES = ("stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance")
 NEW_SI = (3.7, 2.2, 0.021, 0.23)
 NEW_ON_THE_WIRE = (3.7, 2.2, 21.0, 230.0)
 OLD_ON_THE_WIRE = (3.2, 1.8, 26.0, 200.0)
@@ -52,6 +52,11 @@ class Script:
     rogue_at: int = 0
 
 
+@functools.cache
+def plate() -> Nameplate:
+    return load_motor("motor_2kw2")
+
+
 ROGUES: dict[str, ask.Command | Exception] = {
     "waits": ask.Wait(5.0),
     "slow watchdog": ask.ArmWatchdog(1.9),
@@ -61,17 +66,10 @@ ROGUES: dict[str, ask.Command | Exception] = {
     "not a number": ask.SetBias(float("nan")),
     "too many volts": ask.LoadExcitation(0.0, ((300.0, 2.0, 0.0),), 100.0, 10.0, 0.5),
     "enables again": ask.Enable("rogue"),
-    "writes unasked": ask.WriteParameters(
-        dict(zip(NAMES, NEW_SI, strict=True))
-    ),
+    "writes unasked": ask.WriteParameters(InverseGamma(*NEW_SI), plate()),
     "defect": ZeroDivisionError("a defect of the procedure"),
 }
 """What no procedure should ever do; whether it is refused depends on the moment."""
-
-
-@functools.cache
-def plate() -> Nameplate:
-    return load_motor("motor_2kw2")
 
 
 @functools.cache
@@ -122,7 +120,7 @@ def _steps(script: Script, job: Job, findings: Findings) -> Generator[ask.Comman
         return RunEnded(State.REJECTED.value, "the script says so", 0.0)
     if script.decision == "write back":
         yield _entered(State.WRITING, Event.WRITE_BACK)
-        yield ask.WriteParameters(dict(zip(job.parameter_names, NEW_SI, strict=True)))
+        yield ask.WriteParameters(InverseGamma(*NEW_SI), job.nameplate)
     return RunEnded(State.COMMISSIONED.value, "the script says so", 0.0)
 
 

@@ -7,7 +7,7 @@ parameters put in here.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -103,8 +103,8 @@ class ScriptedDrive:
                 self.is_energised = False
             case ask.Tell(record=record):
                 self.told.append(record)
-            case ask.WriteParameters(values=values):
-                return tuple(WrittenParameter(n, 0, 0.0, v, v) for n, v in values.items())
+            case ask.WriteParameters(circuit=circuit):
+                return tuple(WrittenParameter(n, 0, 0.0, v, v) for n, v in asdict(circuit).items())
         return None
 
     def _start(self) -> None:

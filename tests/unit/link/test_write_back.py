@@ -13,6 +13,8 @@ from commissioner.errors import (
 from commissioner.link.drive_file import load_profile
 from commissioner.link.facts import Action
 from commissioner.link.inverter import Inverter
+from commissioner.motor.circuit import InverseGamma
+from commissioner.settings import load_motor
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -351,6 +353,31 @@ def test_yaskawa_is_stored_by_its_enter_register_once():
     assert drive.log == [(0x312, [6400]), (0x0900, [0])]
     inverter.write_parameters({"stator_resistance": 6.4}, inverter.snapshot())
     assert len(drive.log) == 2
+
+
+CIRCUIT, PLATE = InverseGamma(3.2, 2.1, 0.021, 0.23), load_motor("motor_2kw2")
+
+
+@pytest.mark.parametrize(
+    ("profile", "stopped", "register", "old", "words"),
+    [
+        ("danfoss_fc302", (50199, 0x0002), 1299, [0, 30000], [0, 32000]),  # per phase, 0.1 milliohm, 32 bits
+        ("yaskawa_a1000", (0x20, 0x0004), 0x312, [6000], [6400]),  # line to line, milliohm
+    ],
+)
+def test_an_identified_circuit_is_written_in_each_drives_own_terms(profile, stopped, register, old, words):
+    drive = Registers()
+    drive.words[stopped[0]] = stopped[1]
+    drive.words[register : register + len(old)] = old
+    inverter = Inverter(drive, load_profile(profile), sleep=lambda s: None)
+    report = inverter.write_circuit(CIRCUIT, PLATE, inverter.snapshot())
+    assert (register, words) in drive.log
+    assert [row.name for row in report.written] == ["stator_resistance"]
+
+
+def test_the_simulated_drive_takes_the_whole_circuit(bench):
+    bench.inverter.write_circuit(CIRCUIT, PLATE, bench.snapshot)
+    assert tuple(bench.held().values()) == pytest.approx(CIRCUIT.as_tuple(), rel=1e-6)
 
 
 def test_altivar_is_restored_raw_and_says_that_it_is_not_stored():

@@ -1,10 +1,12 @@
 """The last gate before the wire: each rule, at its edge, from both sides."""
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, fields, replace
 
 import pytest
 
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import ParameterBox
 from commissioner.safety.commands import (
     ArmWatchdog,
     Disarm,
@@ -22,20 +24,23 @@ from commissioner.safety.commands import (
     WriteParameters,
 )
 from commissioner.safety.limits import Bounds, Refusal, SafetyFacts, after, permit
+from commissioner.settings import load_motor
 
+LOWER, UPPER = InverseGamma(1.0, 0.5, 0.001, 0.1), InverseGamma(10.0, 8.0, 0.1, 1.0)
 BOUNDS = Bounds(
     max_watchdog_s=1.0,
     drive_current_a=10.0,
     test_voltage_v=50.0,
     axis_time_s=20.0,
     total_time_s=100.0,
-    parameter_bounds={"stator_resistance": (1.0, 10.0), "leakage_inductance": (0.001, 0.1)},
+    parameters=ParameterBox(LOWER, LOWER, UPPER),
 )
 EXCITATION = LoadExcitation(60.0, ((20.0, 1.0, 0.0), (-20.0, 5.0, 0.0)), 100.0, 1.0, 15.0)
 LIMITS = SetDriveLimits(10.0, 50.0, 20.0)
 READY = SafetyFacts(watchdog_s=0.5, drive_limits=LIMITS, loaded=EXCITATION, checks_passed=True, snapshot_taken=True)
 RUNNING = replace(READY, energised=True)
-GOOD = {"stator_resistance": 3.7, "leakage_inductance": 0.02}
+GOOD = InverseGamma(3.7, 2.2, 0.02, 0.23)
+PLATE = load_motor("motor_2kw2")
 
 
 def test_enable_is_permitted_only_when_everything_is_in_place():
@@ -107,7 +112,7 @@ def test_the_watchdog_is_tightened_never_relaxed(armed, wanted, is_permitted):
     assert (permit(ArmWatchdog(wanted), facts, BOUNDS) is None) is is_permitted
 
 
-@pytest.mark.parametrize("command", [ArmWatchdog(0.5), LIMITS, EXCITATION, Wait(0.1), WriteParameters(GOOD)])
+@pytest.mark.parametrize("command", [ArmWatchdog(0.5), LIMITS, EXCITATION, Wait(0.1), WriteParameters(GOOD, PLATE)])
 def test_what_belongs_to_standstill_is_refused_while_energised(command):
     facts = replace(RUNNING, writing_allowed=True)
     assert permit(command, facts, BOUNDS) is not None
@@ -184,31 +189,26 @@ def test_amplitude_and_bias_are_bounded_and_need_a_running_test(command, is_perm
 )
 def test_writing_needs_a_verdict_a_snapshot_and_a_dead_motor(facts, says):
     allowed = replace(READY, writing_allowed=True)
-    assert permit(WriteParameters(GOOD), allowed, BOUNDS) is None
-    refusal = permit(WriteParameters(GOOD), replace(allowed, **facts), BOUNDS)
+    assert permit(WriteParameters(GOOD, PLATE), allowed, BOUNDS) is None
+    refusal = permit(WriteParameters(GOOD, PLATE), replace(allowed, **facts), BOUNDS)
     assert refusal is not None
     assert refusal.what == says
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"stator_resistance": 3.7},
-        GOOD | {"extra": 1.0},
-        GOOD | {"stator_resistance": 0.99},
-        GOOD | {"stator_resistance": 10.01},
-        GOOD | {"leakage_inductance": math.nan},
-        GOOD | {"leakage_inductance": 0.2},
-        {},
-    ],
-)
-def test_values_outside_the_box_or_of_another_drive_are_not_written(values):
-    assert permit(WriteParameters(values), replace(READY, writing_allowed=True), BOUNDS) is not None
+@pytest.mark.parametrize("field", [field.name for field in fields(InverseGamma)])
+@pytest.mark.parametrize("beyond", ["below", "above", "nan", "inf"])
+def test_no_value_outside_the_box_is_written(field, beyond):
+    low, high = getattr(LOWER, field), getattr(UPPER, field)
+    value = {"below": 0.999 * low, "above": 1.001 * high, "nan": math.nan, "inf": math.inf}[beyond]
+    wrong = WriteParameters(replace(GOOD, **{field: value}), PLATE)
+    refusal = permit(wrong, replace(READY, writing_allowed=True), BOUNDS)
+    assert refusal is not None
+    assert refusal.what == f"{field} is outside its limits"
 
 
-def test_values_on_the_edge_of_the_box_are_written():
-    edge = {"stator_resistance": 10.0, "leakage_inductance": 0.001}
-    assert permit(WriteParameters(edge), replace(READY, writing_allowed=True), BOUNDS) is None
+@pytest.mark.parametrize("edge", [LOWER, UPPER])
+def test_values_on_the_edge_of_the_box_are_written(edge):
+    assert permit(WriteParameters(edge, PLATE), replace(READY, writing_allowed=True), BOUNDS) is None
 
 
 def test_facts_follow_what_the_drive_answered():
