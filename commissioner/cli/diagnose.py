@@ -117,7 +117,8 @@ def _same_motor(recordings: Sequence[StandstillRecording]) -> None:
 def _points(tables: Sequence[Table], out: Path | None, as_json: bool) -> None:
     """Each table on its own; the stator resistance of a locked-rotor table serves the others."""
     from commissioner.diagnose.document import points_document, refused_document
-    from commissioner.diagnose.points import Points, diagnose_points, read_points
+    from commissioner.diagnose.points import Points, read_points
+    from commissioner.diagnose.points_diagnosis import diagnose_points
 
     read = [read_points(t.columns, Path(t.source).stem) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
@@ -141,7 +142,7 @@ def _points(tables: Sequence[Table], out: Path | None, as_json: bool) -> None:
 def _joined(documents: Sequence[dict[str, Any]], tables: Sequence[Table]) -> dict[str, Any]:
     """One document: all causes together, every table's own result under `tables`."""
     verdicts = [d["verdict"] for d in documents]
-    order = ("refused", "explained", "nothing_significant")
+    order = ("explained", "nothing_significant", "refused")
     verdict = next((v for v in order if v in verdicts), verdicts[0])
     return {
         **documents[0],

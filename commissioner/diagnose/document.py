@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Cause, Diagnosis
-from commissioner.diagnose.points import PointsDiagnosis
+from commissioner.diagnose.points_diagnosis import PointsDiagnosis
 from commissioner.motor.circuit import Quantity
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"

@@ -89,7 +89,9 @@ def without_noise(scenario: Scenario, keep: Sequence[str] | None = None) -> Scen
     """The same machine recorded without noise; `keep` names the only effects left in it."""
     plant = scenario.plant
     effects = tuple(e for e in plant.effects if keep is None or e.name in keep)
-    silent = dataclasses.replace(plant, effects=effects, sensors=dataclasses.replace(plant.sensors, noise_a=0.0, bits=0))
+    silent = dataclasses.replace(
+        plant, effects=effects, sensors=dataclasses.replace(plant.sensors, noise_a=0.0, bits=0)
+    )
     return dataclasses.replace(scenario, plant=silent)
 
 

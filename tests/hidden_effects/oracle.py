@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,16 @@ from sim.scenario import Scenario
 from tests.hidden_effects.cases import class_of, other_excitation, recording_of, without_noise
 
 BOUND_TO_THE_RECORDING = frozenset(
-    ["mains_pickup", "dc_link_ripple", "sensor_drift", "remanence", "shaft_motion", "lost_samples", "clipping", "quantization"]
+    [
+        "mains_pickup",
+        "dc_link_ripple",
+        "sensor_drift",
+        "remanence",
+        "shaft_motion",
+        "lost_samples",
+        "clipping",
+        "quantization",
+    ]
 )
 """Causes whose phase, start or place belongs to one recording: no model predicts them on the next one."""
 
@@ -60,15 +70,14 @@ def gain_capture(seen: Diagnosis, scenario: Scenario, seed: int) -> float | None
         return None
     columns, _, _ = record(without_noise(other_excitation(scenario, seed)), seed)
     starts = np.flatnonzero(np.r_[True, np.diff(columns["segment"]) != 0, True])
-    plan = [
-        (float(columns["axis_deg"][a]), columns["voltage_axis_v"][a:b])
-        for a, b in zip(starts[:-1], starts[1:], strict=True)
-    ]
+    plan = [(float(columns["axis_deg"][a]), columns["voltage_axis_v"][a:b]) for a, b in itertools.pairwise(starts)]
     before, after = (_error_power(seen, which, plan, columns) for which in (seen.found.nominal, seen.found.fit))
     return 1.0 - after / before
 
 
-def _error_power(seen: Diagnosis, one: Any, plan: list[tuple[float, np.ndarray]], truth: dict[str, np.ndarray]) -> float:
+def _error_power(
+    seen: Diagnosis, one: Any, plan: list[tuple[float, np.ndarray]], truth: dict[str, np.ndarray]
+) -> float:
     found = seen.found
     assert found is not None
     played = player.play(one.model, found.layout, found.record.facts, plan, found.setting.lines_hz)

@@ -91,7 +91,10 @@ def campaign(cases: Sequence[Case], seconds: float, jobs: int, rows_file: Path) 
     todo = [c for c in cases if (c.name, seconds) not in done]
     names = {c.name for c in cases}
     rows = [r for r in rows if r["case"] in names and r["segment_seconds"] == seconds]
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _one_thread) as pool, rows_file.open("a") as file:
+    with (
+        ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _one_thread) as pool,
+        rows_file.open("a") as file,
+    ):
         waiting = [pool.submit(run, case, seconds) for case in todo]
         for count, future in enumerate(as_completed(waiting), 1):
             row = future.result()
@@ -100,7 +103,10 @@ def campaign(cases: Sequence[Case], seconds: float, jobs: int, rows_file: Path) 
             rows.append(row)
             named = ", ".join(c["name"] for c in row["causes"])
             true = ", ".join(t["name"] for t in row["truth"])
-            print(f"{count}/{len(todo)} {row['seconds']:5.1f} s {row['case']}: {true} -> {named} {row['verdict']}", flush=True)
+            print(
+                f"{count}/{len(todo)} {row['seconds']:5.1f} s {row['case']}: {true} -> {named} {row['verdict']}",
+                flush=True,
+            )
     return rows
 
 
@@ -116,7 +122,10 @@ def markdown(rows: Sequence[Row], cases: Sequence[Case], seconds: float) -> str:
     out += [f"| {x.metric} | {x.value} | {x.target} |" for x in scoring.table(rows)]
     out += ["", "| strength of a single cause, times the noise | named in its class |", "| --- | --- |"]
     out += [f"| {where} | {met} of {count} |" for where, met, count in scoring.by_strength(rows)]
-    out += ["", f"{len(rows)} cases, {seconds:g} s per segment; machines and answers sealed as `{sealed(cases, seconds)[:16]}`."]
+    out += [
+        "",
+        f"{len(rows)} cases, {seconds:g} s per segment; machines and answers sealed as `{sealed(cases, seconds)[:16]}`.",
+    ]
     out += ["", "Failures:", "", *(f"- {sentence}" for sentence in scoring.failures(rows))]
     return "\n".join(out) + "\n"
 
@@ -137,7 +146,12 @@ def reliability(rows: Sequence[Row], path: Path) -> None:
     axes.plot([0, 1], [0, 1], color="0.7", linewidth=1)
     axes.errorbar(sure, right, [[r - s[0] for r, s in zip(right, spread, strict=True)],
                                 [s[1] - r for r, s in zip(right, spread, strict=True)]], fmt="o", capsize=3)  # fmt: skip
-    axes.set(xlabel="stated probability that the name is right", ylabel="share that was right", xlim=(0, 1.02), ylim=(0, 1.02))
+    axes.set(
+        xlabel="stated probability that the name is right",
+        ylabel="share that was right",
+        xlim=(0, 1.02),
+        ylim=(0, 1.02),
+    )
     axes.set_title(f"{len(said)} named causes")
     figure.savefig(path, dpi=120)
 
@@ -161,7 +175,9 @@ def main() -> None:
     parser.add_argument("--strata", default=",".join(STRATA))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seconds-per-segment", type=float, default=6.0)
-    parser.add_argument("--release", type=int, default=1, help="another number: other machines (0 trains the confidence)")
+    parser.add_argument(
+        "--release", type=int, default=1, help="another number: other machines (0 trains the confidence)"
+    )
     parser.add_argument("--out", type=Path, default=Path("protocol.json"))
     parser.add_argument("--from-rows", action="store_true", help="score what is there")
     asked = parser.parse_args()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -144,7 +145,9 @@ def _ties(rows: Sequence[Row]) -> list[Line]:
 
 
 def _distributions(rows: Sequence[Row]) -> list[Line]:
-    errors = [t["size_error"] for r in rows for t in r["truth"] if t["size_error"] is not None and (t["strength"] or 0) >= 0.1]
+    errors = [
+        t["size_error"] for r in rows for t in r["truth"] if t["size_error"] is not None and (t["strength"] or 0) >= 0.1
+    ]
     gains = [r["capture"] for r in rows if r["capture"] is not None and r["stratum"] in IN_LIBRARY and required(r)]
     times = [r["seconds"] for r in rows if r["seconds"]]
     out = []
@@ -154,7 +157,9 @@ def _distributions(rows: Sequence[Row]) -> list[Line]:
     if gains:
         low, middle = np.quantile(gains, [0.01, 0.5])
         text = f"{low:.4f}, {middle:.5f}"
-        out.append(Line("gain on another excitation over the oracle's: 1st percentile, median", text, len(gains), ">= 0.995"))
+        out.append(
+            Line("gain on another excitation over the oracle's: 1st percentile, median", text, len(gains), ">= 0.995")
+        )
     if times:
         text = f"{np.median(times):.1f} s, {max(times):.1f} s at {int(np.median([r['samples'] for r in rows]))} samples x 3"
         out.append(Line("time of a diagnosis: median, worst", text, len(times), "10 s, 40 s at 1e5 x 3"))
@@ -197,7 +202,7 @@ def by_strength(rows: Sequence[Row]) -> list[tuple[str, int, int]]:
     edges = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, math.inf)
     alone = [r for r in rows if r["stratum"] == "one" and r["truth"]]
     out = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         inside = [r for r in alone if low <= (r["truth"][0]["strength"] or 0.0) < high]
         out.append((f"{low:g} to {high:g}", sum(_is_top_correct(r) for r in inside), len(inside)))
     return [entry for entry in out if entry[2]]

@@ -77,7 +77,9 @@ def _sensor(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     """Even at the diagnosis' full scale (twice rated peak) from the simulator's; the odd shapes differ in kind."""
     if effect.shape != "even":
         return None
-    return sizes["even_at_full_scale"][0], effect.size * 2.0 * plant.nameplate.rated_peak_current_a / plant.sensors.full_scale_a
+    return sizes["even_at_full_scale"][
+        0
+    ], effect.size * 2.0 * plant.nameplate.rated_peak_current_a / plant.sensors.full_scale_a
 
 
 def _ripple(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
