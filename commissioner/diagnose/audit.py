@@ -131,6 +131,8 @@ def _converter_steps(recordings: Sequence[StandstillRecording], facts: Facts) ->
 
 
 def _grid(values: Signal, peak: float) -> float:
+    if peak == 0.0:
+        return 0.0
     unique = np.unique(np.round(values[:50000] / peak, 9))
     if unique.size < 4 or unique.size > 0.5 * min(values.size, 50000):
         return 0.0
@@ -258,6 +260,8 @@ def _judge(
         return "no stretch of the recording is long enough to fit anything", out
     if float(max(np.std(s.voltage_axis_v) for s in record.segments)) == 0.0:
         return "the command is constant: nothing is excited", out
+    if record.facts.current_peak_a == 0.0:
+        return "every current sample is zero: no sensor or no motor is connected", out
     lost = sum(h[2] for h in holes)
     if lost:
         out.append(f"{lost} samples are missing in {len(holes)} holes; they were left out, not filled.")

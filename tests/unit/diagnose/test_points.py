@@ -20,7 +20,9 @@ def locked(motor, random, scatter, skin=0.0, saturation=0.0):
     reactance = 2 * np.pi * f * leak * (1.0 - saturation * along)
     resistance = r_s + r_r * rise
     v = np.sqrt(3.0) * i * np.hypot(resistance, reactance)
-    return _table(f, v, i, 3.0 * resistance * i**2, random, scatter) | {"winding_resistance_ohm": np.full(12, 2.0 * r_s)}
+    return _table(f, v, i, 3.0 * resistance * i**2, random, scatter) | {
+        "winding_resistance_ohm": np.full(12, 2.0 * r_s)
+    }
 
 
 def no_load(motor, random, scatter, saturation=0.0, growth=0.0):
@@ -31,7 +33,9 @@ def no_load(motor, random, scatter, saturation=0.0, growth=0.0):
     loss = 0.04 * motor.plate.rated_power_w * (1.0 - growth + growth * (v / v.max()) ** 2)
     reactive = v / np.sqrt(3.0) / (2 * np.pi * f * (main + leak)) * (1.0 + saturation * (v / v.max()) ** 7)
     i = np.hypot(reactive, loss / (np.sqrt(3.0) * v))
-    return _table(f, v, i, loss + 3.0 * r_s * i**2, random, scatter) | {"winding_resistance_ohm": np.full(10, 2.0 * r_s)}
+    return _table(f, v, i, loss + 3.0 * r_s * i**2, random, scatter) | {
+        "winding_resistance_ohm": np.full(10, 2.0 * r_s)
+    }
 
 
 def _table(f, v, i, p, random, scatter):
@@ -95,6 +99,8 @@ def test_too_few_points_impossible_power_and_loaded_motors_are_refused_with_the_
     assert "at least" in read_points({k: v[:3] for k, v in columns.items()}, "few")
     wrong = columns | {"power_w": columns["power_w"] * 10.0}
     assert "exceeds the apparent power" in read_points(wrong, "power")
-    assert "positive numbers" in read_points(columns | {"current_line_a": columns["current_line_a"] - 100.0}, "negative")
+    assert "positive numbers" in read_points(
+        columns | {"current_line_a": columns["current_line_a"] - 100.0}, "negative"
+    )
     loaded = columns | {"frequency_hz": np.full(12, 50.0), "voltage_line_v": np.full(12, 400.0)}
     assert "loaded" in read_points(loaded | {"power_w": 0.5 * 400.0 * columns["current_line_a"]}, "load")

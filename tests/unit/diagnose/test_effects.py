@@ -1,0 +1,146 @@
+"""Every entry of the catalogue: zero is nominal, small is linear, sensitivities are exact, signs and units are kept."""
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.plant import Model, predict
+
+NAMES = (
+    "dead_time device_drop dc_link_sag dc_link_ripple sampling_delay sensor_lag magnetizing_saturation magnetic_hysteresis "
+    "remanence leakage_saturation rotor_skin_effect iron_loss stator_heating rotor_heating sensor_offset sensor_drift "
+    "sensor_gain_mismatch sensor_nonlinearity quantization clipping mains_pickup clock_drift lost_samples shaft_motion "
+    "inductance_anisotropy resistance_anisotropy cable_capacitance"
+).split()
+FITTED = [n for n in NAMES if n not in ("device_drop", "quantization", "clipping", "lost_samples")]
+
+
+def currents(model, setting, segment=1):
+    return predict(model, setting.record, segment, setting.layout).currents_a
+
+
+def extended(nominal, setting, name, theta):
+    """The nominal model with every number of the effect at `theta` steps."""
+    terms = CATALOGUE[name].terms(setting)
+    model = nominal.with_terms(terms)
+    return Model(model.nominal, model.terms, tuple(theta * t.step for t in terms))
+
+
+def test_the_catalogue_has_the_27_names_of_the_contract():
+    assert sorted(CATALOGUE) == sorted(NAMES) and len(NAMES) == 27
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_entry_states_signature_source_confounders_and_what_would_split_it(name):
+    entry = CATALOGUE[name]
+    assert len(entry.signature) > 20 and entry.source and entry.split_by and entry.__doc__
+    assert set(entry.confounders) <= set(NAMES) - {name}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_zero_is_the_nominal_model(name, nominal, setting):
+    plain = currents(nominal, setting)
+    with_zero = currents(extended(nominal, setting, name, 0.0), setting)
+    assert np.abs(with_zero - plain).max() < 2e-6 * np.abs(plain).max()
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_it_grows_continuously_and_first_in_proportion(name, nominal, setting):
+    base = currents(extended(nominal, setting, name, 1e-9), setting)
+    small = currents(extended(nominal, setting, name, 0.01), setting) - base
+    double = currents(extended(nominal, setting, name, 0.02), setting) - base
+    size = np.sqrt(np.mean(small**2))
+    assert size > 0
+    assert np.sqrt(np.mean((double - 2.0 * small) ** 2)) < 0.05 * size
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_the_sensitivities_are_those_of_the_simulation(name, nominal, setting):
+    terms = CATALOGUE[name].terms(setting)
+    k = next((k for k, t in enumerate(terms) if t.segment in (-1, setting.record.segments[1].uid)), 0)
+    model = nominal.with_terms(terms)
+    jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian[4 + k]
+    h = 1e-3
+    moved = [
+        currents(Model(model.nominal, terms, tuple(s * t.step * (j == k) for j, t in enumerate(terms))), setting)
+        for s in (1e-9, h, 2.0 * h)
+    ]
+    slope = (4.0 * (moved[1] - moved[0]) - (moved[2] - moved[0])) / (2.0 * h)
+    size = np.sqrt(np.mean(slope**2))
+    assert size > 0
+    assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.02 * size
+
+
+@pytest.mark.parametrize("name", [n for n in FITTED if CATALOGUE[n].sign > 0])
+def test_the_sign_of_the_size_is_the_sign_of_the_numbers(name, setting):
+    entry = CATALOGUE[name]
+    terms = entry.terms(setting)
+    up = entry.sizes(setting, {t.symbol: t.step for t in terms})
+    value, unit = next(iter(up.values()))
+    assert value > 0 and unit
+
+
+def size(name, setting, **values):
+    return CATALOGUE[name].sizes(setting, values)
+
+
+def with_value(nominal, setting, name, symbol, value):
+    terms = CATALOGUE[name].terms(setting)
+    return Model(nominal.nominal, terms, tuple(value * (t.symbol == symbol) for t in terms))
+
+
+def test_an_offset_of_ten_milliampere_adds_ten_milliampere_to_one_phase(nominal, setting):
+    change = currents(with_value(nominal, setting, "sensor_offset", "v", 0.01), setting) - currents(nominal, setting)
+    assert change[1] == pytest.approx(0.01, abs=1e-9) and np.abs(change[[0, 2]]).max() < 1e-9
+
+
+def test_a_gain_of_one_percent_scales_one_phase(nominal, setting):
+    plain = currents(nominal, setting)
+    change = currents(with_value(nominal, setting, "sensor_gain_mismatch", "w", 0.01), setting) - plain
+    assert change[2] == pytest.approx(0.01 * plain[2], abs=1e-9) and np.abs(change[:2]).max() < 1e-9
+
+
+def test_a_delay_of_one_period_is_the_sample_before(nominal, setting):
+    late = currents(with_value(nominal, setting, "sampling_delay", "delay", 2e-4), setting)
+    plain = currents(nominal, setting)
+    assert np.abs(late[:, 1000:] - plain[:, 999:-1]).max() < 1e-4 * np.abs(plain).max()
+    assert size("sampling_delay", setting, delay=2e-4)["delay_us"] == (pytest.approx(200.0), "us")
+
+
+def test_a_lag_turns_a_tone_by_its_arcus_tangent(nominal, setting):
+    lag = 1e-4
+    late, plain = currents(with_value(nominal, setting, "sensor_lag", "lag", lag), setting), currents(nominal, setting)
+    at = np.exp(-2j * np.pi * 41.9 * np.arange(late.shape[1]) * 2e-4) * np.hanning(late.shape[1])
+    ratio = (late[0] @ at) / (plain[0] @ at)
+    assert ratio == pytest.approx(1.0 / (1.0 + 2j * np.pi * 41.9 * lag), abs=1e-3)
+
+
+def test_stator_heating_of_a_tenth_per_minute_raises_the_resistance_by_a_tenth_per_minute_of_rated_current(
+    nominal, setting
+):
+    """The end of the last segment, against a plain motor whose resistance is higher by the dose reached there."""
+    model = with_value(nominal, setting, "stator_heating", "mean", 0.1)
+    dose = setting.record.channels[2][-1, setting.record.channel("heat_mean_u")]
+    r_s, *others = nominal.nominal
+    plain = currents(nominal, setting, segment=2)
+    warmer = currents(Model((r_s * (1.0 + 0.1 * dose), *others)), setting, segment=2)
+    heated = currents(model, setting, segment=2)
+    asked, made = (warmer - plain)[:, -1500:], (heated - plain)[:, -1500:]
+    assert float((asked * made).sum() / (asked * asked).sum()) == pytest.approx(0.95, abs=0.07)
+
+
+def test_the_leg_loss_reads_as_dead_time_in_microseconds(setting):
+    values = {t.symbol: 2.0 / setting.layout.legs_vectors.shape[0] for t in CATALOGUE["dead_time"].terms(setting)}
+    sizes = size("dead_time", setting, **values)
+    volts = sizes["voltage_v"][0]
+    assert volts > 0
+    assert sizes["time_us"] == (pytest.approx(volts / (5000.0 * 540.0) * 1e6), "us")
+
+
+def test_effects_the_data_cannot_show_have_no_numbers(nominal):
+    from tests.unit.diagnose.conftest import setting_of
+
+    single = setting_of(nominal, axes=(0.0,))
+    assert CATALOGUE["inductance_anisotropy"].terms(single) == ()
+    assert CATALOGUE["resistance_anisotropy"].terms(single) == ()
+    assert CATALOGUE["device_drop"].terms(single) == ()
