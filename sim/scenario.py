@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
 import math
 import tomllib
 from dataclasses import dataclass
@@ -104,8 +105,13 @@ def find(name: str) -> Path:
 
 
 def read_document(name: str, depth: int = 0) -> dict[str, Any]:
-    """The TOML of a scenario; `extends` names one it builds on. ScenarioError where that cannot be."""
+    """The TOML of a scenario; `extends` names one it builds on. ScenarioError where that cannot be.
+
+    A `.json` file is an extended model of `commissioner diagnose`, whose `scenario` is taken.
+    """
     path = find(name)
+    if path.suffix == ".json":
+        return {"name": path.stem, **_extended_model(path)}
     try:
         document = tomllib.loads(path.read_text())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -115,6 +121,14 @@ def read_document(name: str, depth: int = 0) -> dict[str, Any]:
         raise ScenarioError(f"{path}: extends = {base!r} goes in circles")
     below = read_document(str(base), depth + 1) if base is not None else {}
     return _laid_over(below, {"name": path.stem, **document})
+
+
+def _extended_model(path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(path.read_text())
+        return dict(document["scenario"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ScenarioError(f"{path}: not an extended model with a scenario: {error}") from error
 
 
 def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""The extended model as a document: what `commissioner simulate` plays and what a scenario of `python -m sim` needs.
+"""The extended model as a document: what `commissioner simulate` plays and `python -m sim` reads.
 
-Zero effects = the plain four-parameter motor. `terms` and `dictionary` are exact; `effects` gives the same in
-engineering sizes.
+Zero effects = the plain four-parameter motor. `terms` and `dictionary` are exact, `effects` the same in engineering
+sizes, `scenario` the nearest machine of the simulated inverter.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from commissioner.diagnose.plant import Layout, Model, Term
+from commissioner.diagnose.translated import scenario
 
 FORMAT = 1
-GAMMA_KEYS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "inductance_h")
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
@@ -29,35 +29,13 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
             "stator_resistance_ohm": r_s, "rotor_resistance_ohm": r_r,
             "leakage_inductance_h": l_sigma, "magnetizing_inductance_h": l_m,
         },
-        "machine": gamma_machine(found.fit.model.nominal),
         "nameplate": {k: v for k, v in found.record.facts.metadata.items() if not isinstance(v, bool)},
         "effects": {c.name: {key: value for key, (value, _, _) in c.sizes.items()} for c in causes},
         "terms": [_term(t, v) for t, v in kept],
         "dictionary": _dictionary(found.layout) if kept else {},
         "lines_hz": dict(found.setting.lines_hz),
-        "sim_effects": {c.name: sim_effect(c) for c in causes if sim_effect(c)},
+        "scenario": scenario(found.fit.model, found.setting, causes),
     }
-
-
-def gamma_machine(nominal: tuple[float, float, float, float]) -> dict[str, float]:
-    """Gamma form (R_s, R_r, L_leak, L_s) of the inverse-Gamma set (Slemon 1989): ratio L_s / L_M."""
-    r_s, r_r, l_sigma, l_m = nominal
-    ratio = (l_m + l_sigma) / l_m
-    return dict(zip(GAMMA_KEYS, (r_s, r_r * ratio**2, l_sigma * ratio, l_m + l_sigma), strict=True))
-
-
-def sim_effect(cause: Any) -> dict[str, float]:
-    """The cause as an entry of a simulated inverter's scenario: one size in that catalogue's unit, where it has one."""
-    sizes = {key: value for key, (value, _, _) in cause.sizes.items()}
-    scale = {
-        "voltage_v": 1.0, "sag_at_rated_power": 1.0, "delay_us": 1e-6, "time_constant_us": 1e-6, "coercive_current_a": 1.0,
-        "flux_wb": 1.0, "conductance_ms": 1e-3, "rise_per_minute_at_rated_current": 1.0, "drift_ppm": -1.0,
-        "speed_rad_per_s": 1.0, "capacitance_nf": 1e-9, "step_a": 1.0,
-    }
-    first = next(iter(sizes), "")
-    if first.startswith("amplitude_"):
-        return {"size": sizes[first]}
-    return {"size": sizes[first] * scale[first]} if first in scale else {}
 
 
 def _term(term: Term, value: float) -> dict[str, Any]:
@@ -103,6 +81,3 @@ def _layout(entry: Mapping[str, Any]) -> Layout:
 def plain(document: Mapping[str, Any]) -> dict[str, Any]:
     """A nominal-only copy of a document."""
     return {**document, "effects": {}, "terms": [], "dictionary": {}}
-
-
-__all__ = ["gamma_machine", "model_document", "model_from", "plain"]

@@ -106,6 +106,12 @@ def _either(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     return max(value for value, _, _ in sizes.values()), effect.size
 
 
+def _resistance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
+    """Phase resistances that differ by 2 e over direction make a tensor of half that."""
+    stator, rotor = (sizes[f"{part}_anisotropy"][0] for part in ("stator", "rotor"))
+    return (rotor, effect.size) if effect.shape == "cage" else (0.5 * stator, effect.size)
+
+
 def _conductance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     return (_first(sizes), 1e3 * effect.size) if effect.shape in ("", "resistor") else None
 
@@ -120,5 +126,5 @@ COMPARED: dict[str, Compare] = {
     "magnetic_hysteresis": _scaled(1.0), "leakage_saturation": _leakage, "iron_loss": _conductance,
     "stator_heating": _heating, "sensor_offset": _offset, "sensor_gain_mismatch": _gain, "sensor_nonlinearity": _sensor,
     "mains_pickup": _mains, "clock_drift": _clock, "shaft_motion": _motion, "inductance_anisotropy": _either,
-    "resistance_anisotropy": _either, "cable_capacitance": _scaled(1e9), "quantization": _scaled(1.0),
+    "resistance_anisotropy": _resistance, "cable_capacitance": _scaled(1e9), "quantization": _scaled(1.0),
 }  # fmt: skip

@@ -6,7 +6,35 @@ import pytest
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.plant import Model, predict
 
-NAMES = ["dead_time", "device_drop", "dc_link_sag", "dc_link_ripple", "sampling_delay", "sensor_lag", "magnetizing_saturation", "magnetic_hysteresis", "remanence", "leakage_saturation", "rotor_skin_effect", "iron_loss", "stator_heating", "rotor_heating", "sensor_offset", "sensor_drift", "sensor_gain_mismatch", "sensor_nonlinearity", "quantization", "clipping", "mains_pickup", "clock_drift", "lost_samples", "shaft_motion", "inductance_anisotropy", "resistance_anisotropy", "cable_capacitance"]
+NAMES = [
+    "dead_time",
+    "device_drop",
+    "dc_link_sag",
+    "dc_link_ripple",
+    "sampling_delay",
+    "sensor_lag",
+    "magnetizing_saturation",
+    "magnetic_hysteresis",
+    "remanence",
+    "leakage_saturation",
+    "rotor_skin_effect",
+    "iron_loss",
+    "stator_heating",
+    "rotor_heating",
+    "sensor_offset",
+    "sensor_drift",
+    "sensor_gain_mismatch",
+    "sensor_nonlinearity",
+    "quantization",
+    "clipping",
+    "mains_pickup",
+    "clock_drift",
+    "lost_samples",
+    "shaft_motion",
+    "inductance_anisotropy",
+    "resistance_anisotropy",
+    "cable_capacitance",
+]
 FITTED = [n for n in NAMES if n not in ("device_drop", "quantization", "clipping", "lost_samples")]
 
 
