@@ -23,6 +23,11 @@ the limit or expectation it broke, and the remedy.
 
 from __future__ import annotations
 
+import reprlib
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 200
+
 
 class CommissionerError(Exception):
     """What happened (`str`), where (`step`), what was seen (`value`) and allowed (`limit`), what to do (`remedy`)."""
@@ -59,10 +64,11 @@ class ConfigurationError(UsageError):
     """A file said something that cannot be right."""
 
     def __init__(self, *, file: str, key: str, value: object, expected: str) -> None:
+        shown = _SHORT.repr(value)
         super().__init__(
-            f"{file}: {key} = {value!r} cannot be used",
+            f"{file}: {key} = {shown} cannot be used",
             step="read configuration",
-            value=value,
+            value=value if isinstance(value, int | float | None) or value == shown.strip("'") else shown,
             limit=expected,
             remedy=f"correct {key} in {file}: {expected}",
         )

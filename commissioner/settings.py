@@ -13,7 +13,8 @@ from commissioner.motor.nameplate import Nameplate, check
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 
 CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
-MAX_BYTES = 1_000_000
+MAX_BYTES, MAX_DOTS = 250_000, 500
+"""Of a TOML file, and in one line of it: the time that a dotted key takes grows with the square of its parts."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Percent = Annotated[float, Field(gt=0, le=100)]
@@ -129,11 +130,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         )
     if path.stat().st_size > MAX_BYTES:
         raise ConfigurationError(
-            file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected="at most 1 MB"
+            file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected=f"at most {MAX_BYTES} bytes"
         )
     try:
-        return tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = path.read_text("utf-8")
+        if max(line.count(".") for line in text.split("\n")) > MAX_DOTS:
+            raise ValueError(f"more than {MAX_DOTS} dots in a line")
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # syntax, encoding, digits without end, nesting without end
         raise ConfigurationError(
             file=str(path), key="(syntax)", value=str(error), expected="valid TOML in UTF-8"
         ) from error

@@ -78,7 +78,7 @@ def _extended(path: Path, plain: bool) -> tuple[Model, Layout | None, dict[str, 
         document = json.loads(path.read_text(encoding="utf-8"))
         document = without_effects(document) if plain else document
         made, layout = model_from(document)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ConfigurationError(
             file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
         ) from error

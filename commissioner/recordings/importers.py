@@ -8,15 +8,17 @@ TDMS, MDF4 and COMTRADE are named and refused: export them as CSV or Parquet.
 from __future__ import annotations
 
 import csv
-import gzip
 import re
-from collections.abc import Iterator, Mapping
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.recordings.table import MAX_BYTES, Table, read_table, to_running
+from commissioner.recordings import matlab
+from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_bytes
+from commissioner.recordings.table import Table, read_table, to_running
 from commissioner.records import RunningRecording, Signal
 
 FOREIGN = {
@@ -61,7 +63,7 @@ def import_table(path: Path) -> Table:
             remedy="export the recording as CSV or Parquet",
         )
     if suffix == ".mat":
-        return recognise(matlab_vectors(path), {}, str(path))
+        return recognise(matlab.vectors(path), {}, str(path))
     try:
         table = read_table(path)
     except DataRefused as refusal:
@@ -86,15 +88,9 @@ def _foreign_csv(path: Path, refusal: DataRefused) -> Table:
 
 
 def _text(path: Path) -> str:
-    if path.stat().st_size > MAX_BYTES:
-        raise _unreadable(path, "the file is too large")
     try:
-        if path.suffix == ".gz":
-            with gzip.open(path, "rb") as packed:
-                data = packed.read(MAX_BYTES + 1)
-        else:
-            data = path.read_bytes()
-    except (OSError, EOFError) as error:
+        data = bounded_bytes(path, MAX_FOREIGN_BYTES)
+    except (OSError, EOFError, zlib.error) as error:
         raise _unreadable(path, str(error)) from error
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
         try:
@@ -212,36 +208,6 @@ def _preface(lines: list[str]) -> dict[str, float | str]:
             cleaned = value.strip().strip(";,\t")
             metadata[key.strip()] = float(cleaned) if _is_number(cleaned, False) else cleaned
     return metadata
-
-
-def matlab_vectors(path: Path) -> dict[str, Signal]:
-    """Every numeric vector (or matrix column) of a MATLAB v5 file, by its dotted path; v7.3 is named and refused."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except NotImplementedError as error:
-        raise _unreadable(path, "MATLAB v7.3 (HDF5)") from error
-    except (MatReadError, ValueError, TypeError, OSError, KeyError, IndexError) as error:
-        raise _unreadable(path, str(error)) from error
-    return dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
-
-
-def _vectors(prefix: str, content: Mapping[str, object]) -> Iterator[tuple[str, Signal]]:
-    for name, value in content.items():
-        full = f"{prefix}{name}"
-        if hasattr(value, "_fieldnames"):
-            yield from _vectors(full + ".", {field: getattr(value, field) for field in value._fieldnames})
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
-            if value.ndim == 1:
-                yield full, value.astype(np.float64)
-            elif value.ndim == 2 and min(value.shape) <= 64:
-                tall = value if value.shape[0] >= value.shape[1] else value.T
-                for k in range(tall.shape[1]):
-                    yield f"{full}.{k}", tall[:, k].astype(np.float64)
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield full, np.array([float(value)])
 
 
 def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], source: str) -> Table:

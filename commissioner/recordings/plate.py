@@ -75,7 +75,7 @@ def start_from(path: Path) -> Start:
                 "magnetizing_inductance_h",
             )
         ]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ConfigurationError(
             file=str(path),
             key="parameters",

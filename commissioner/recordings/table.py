@@ -9,10 +9,10 @@ from __future__ import annotations
 import gzip
 import io
 import math
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import pyarrow as pa
@@ -20,10 +20,9 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
 from commissioner.errors import DataRefused, UsageError
+from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_bytes, numeric_columns, too_large
 from commissioner.records import RunningRecording, Signal, StandstillRecording
 
-MAX_BYTES = 2 * 1024**3
-"""A file (or what a `.gz` unpacks to) above this is refused: about 8 h of five channels at 5 kHz as Parquet."""
 MAX_METADATA_LINES = 1000
 STEP_TOLERANCE = 0.02
 """Time stamps may deviate from the grid by this fraction of a sample period (printed digits, not jitter)."""
@@ -50,8 +49,6 @@ def read_table(path: Path) -> Table:
             limit="an existing file",
             remedy="check the path",
         )
-    if path.stat().st_size > MAX_BYTES:
-        raise _refuse(path, "the file is too large", path.stat().st_size, f"{MAX_BYTES} bytes", "split the recording")
     try:
         if path.suffix == ".parquet":
             return _read_parquet(path)
@@ -63,6 +60,8 @@ def read_table(path: Path) -> Table:
         OSError,
         UnicodeDecodeError,
         EOFError,
+        zlib.error,
+        KeyError,  # two columns of one name
     ) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise _refuse(
@@ -170,24 +169,19 @@ def sample_period(table: Table, segment: Signal) -> float:
 
 def _read_parquet(path: Path) -> Table:
     file = pa_parquet.ParquetFile(path)
-    rows, columns = file.metadata.num_rows, file.metadata.num_columns
-    if rows * columns * 8 > MAX_BYTES:
-        raise _refuse(path, "the file unpacks to too much", rows * columns * 8, f"{MAX_BYTES} bytes", "split it")
+    if path.stat().st_size > MAX_BYTES:
+        raise too_large(path, path.stat().st_size, MAX_BYTES)
+    numeric = numeric_columns(path, file)
+    for name in file.schema_arrow.names:
+        if name in _KNOWN and name not in numeric:
+            raise _not_numeric(path, name, file.schema_arrow.field(name).type)
     raw = file.schema_arrow.metadata or {}
     metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
-    return _as_table(path, file.read(), _typed(path, metadata))
+    return _as_table(path, file.read(columns=numeric), _typed(path, metadata))
 
 
 def _read_csv(path: Path) -> Table:
-    text: IO[bytes]
-    if path.suffix == ".gz":
-        with gzip.open(path, "rb") as packed:
-            data = packed.read(MAX_BYTES + 1)
-    else:
-        data = path.read_bytes()
-    if len(data) > MAX_BYTES:
-        raise _refuse(path, "the file unpacks to too much", f"> {MAX_BYTES}", f"{MAX_BYTES} bytes", "split it")
-    text = io.BytesIO(data)
+    text = io.BytesIO(bounded_bytes(path))
     metadata: dict[str, str] = {}
     start = 0
     for _ in range(MAX_METADATA_LINES):
@@ -198,6 +192,10 @@ def _read_csv(path: Path) -> Table:
         key, separator, value = line[1:].decode("utf-8").partition(":")
         if separator:
             metadata[key.strip()] = value.strip()
+    text.seek(start)
+    columns = text.readline().count(b",") + 1
+    if columns > MAX_COLUMNS:
+        raise too_large(path, f"{columns} columns", MAX_COLUMNS)
     text.seek(start)
     table = pa_csv.read_csv(text, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
     return _as_table(path, table, _typed(path, metadata))
@@ -213,10 +211,12 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
             values = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
         elif name in _KNOWN:
-            raise _refuse(
-                path, f"column {name} is not numeric", str(column[0]), "numbers in SI units", "decimal points, no units"
-            )
+            raise _not_numeric(path, name, column[0])
     return Table(columns, metadata, str(path))
+
+
+def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
+    return _refuse(path, f"column {name} is not numeric", str(seen), "numbers in SI units", "decimal points, no units")
 
 
 _KNOWN = frozenset(
