@@ -119,7 +119,7 @@ def design(
     commanded = amplitudes * np.abs(
         1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a)
     )
-    top = min(1.0, limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
+    top = min(1.0, (1.0 - 1e-9) * limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
     tones = tuple(
         Tone(float(a * top), float(f), float(p)) for a, f, p in zip(commanded, frequencies, phases, strict=True)
     )

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from commissioner.identify.excitation import Excitation
+from commissioner.identify.forecast import forecast
 from commissioner.identify.observer import BlockEstimate
 from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
@@ -31,9 +32,12 @@ MAX_RAISE = 2.0
 QUIET, SMALL_RAISE = 0.35, 1.25
 """While the estimates are unsure the amplitude climbs in small steps, as long as neither has seen this much flux."""
 AGREEMENT = 0.3
+LOSS_ROWS = 1025
 SURE_LOSS = 0.8
-HOLD_OFF, URGENT = 3.0, 1.05
-"""One step down at a time: reactions to wait for its effect, unless the flux is this far above the limit."""
+HOLD_OFF, URGENT, RISING = 3.0, 1.05, 1.03
+"""One step down at a time: reactions to wait for its effect, unless the flux is this far above the limit and rising."""
+KNOWN_TARGET = 0.85
+"""Flux that the first amplitude may make of a motor already measured, of the limit."""
 
 
 class FluxAdvice(enum.Enum):
@@ -70,6 +74,8 @@ class FluxGuard:
     inverter: InverterError = IDEAL_INVERTER
     axis_deg: float = 0.0
     reaction_s: float = 0.02
+    began_s: float = 0.0
+    """Time between the excitation's start and the first sample."""
     _integral: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _samples: int = field(default=0, init=False)
     _scale_since_s: float = field(default=0.0, init=False)
@@ -77,7 +83,12 @@ class FluxGuard:
     _granted: float = field(default=0.0, init=False)
     _ceiling: float = field(default=1.0, init=False)
     _backed_off_s: float = field(default=-math.inf, init=False)
+    _backed_off_at: float = field(default=0.0, init=False)
     _recent: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        self._span_a = max(self.inverter.current_a[-1], 1e-9)
+        self._lost_v = self.inverter.on_axis(np.linspace(0.0, self._span_a, LOSS_ROWS), self.axis_deg)
 
     @property
     def safe_scale(self) -> float:
@@ -149,22 +160,19 @@ class FluxGuard:
         steps = max(2, math.ceil((self.latency_s + self.reaction_s) / self.sample_period_s))
         stride = max(1, steps // 200)
         period = self.sample_period_s * stride
-        future = time_s + (np.arange(steps // stride + 1) + 0.5) * period
-        voltage = self.excitation.voltage_v(np.asarray(future, dtype=np.float64), scale)
-        matrix, gain = held_input(estimate.parameters, period)
-        current, rotor = float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1])
-        leakage = estimate.parameters.leakage_inductance_h
-        plateau = float(self.inverter.on_axis(np.array([1e9]), self.axis_deg)[0])
-        top, free = 0.0, model_free_wb
-        for u in voltage:
-            drive = u - math.copysign(min(plateau, abs(u)), current)
-            free += period * (drive - estimate.parameters.stator_resistance_ohm * current)
-            current, rotor = (
-                matrix[0, 0] * current + matrix[0, 1] * rotor + gain[0] * drive,
-                matrix[1, 0] * current + matrix[1, 1] * rotor + gain[1] * drive,
-            )
-            top = max(top, abs(rotor + leakage * current), abs(free))
-        return float(top)
+        ahead = (np.arange(steps // stride + 1) + 0.5) * period
+        future = np.asarray(self.began_s + time_s + ahead, dtype=np.float64)
+        start = (float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1]), model_free_wb)
+        return self._forecast(estimate.parameters, future, scale, period, start, self._lost_v)
+
+    def _forecast(
+        self, machine: InverseGamma, time_s: Signal, scale: float | Signal, period_s: float,
+        start: tuple[float, float, float], lost_v: Signal,
+    ) -> float:  # fmt: skip
+        voltage = self.excitation.voltage_v(time_s, scale)
+        matrix, gain = held_input(machine, period_s)
+        r_s, leakage = machine.stator_resistance_ohm, machine.leakage_inductance_h
+        return float(forecast(voltage, period_s, matrix, gain, r_s, leakage, lost_v, self._span_a, *start))
 
     # -- amplitude ------------------------------------------------------------------------------------------------
 
@@ -190,6 +198,33 @@ class FluxGuard:
             sigma = math.sqrt(0.5 * float(np.sum(np.abs(amplitude * admittance) ** 2)))
             amplitude = commanded / np.abs(1.0 + lost / max(sigma, 1e-12) * admittance)
         return float(np.sum(flux * amplitude))
+
+    def begin_known(self, machine: InverseGamma, log_std: float, ramp_per_s: float) -> float:
+        """The scale to begin with on a machine measured before to `log_std`: simulated from rest, its flux stays below
+        `KNOWN_TARGET`. Never below `safe_scale`."""
+        worst = replace(
+            machine,
+            stator_resistance_ohm=machine.stator_resistance_ohm * math.exp(-log_std),
+            magnetizing_inductance_h=machine.magnetizing_inductance_h * math.exp(log_std),
+        )
+        period = 4.0 * self.sample_period_s
+        time_s = np.arange(period, self.excitation.duration_s, period)
+        ramp = np.minimum(time_s * ramp_per_s, 1.0)
+
+        def peak_wb(scale: float) -> float:
+            amplitude = np.minimum(ramp, scale)
+            return self._forecast(
+                worst, self.began_s + time_s, amplitude, period, (0.0, 0.0, 0.0), SURE_LOSS * self._lost_v
+            )
+
+        low, high = self.safe_scale, 1.0
+        if peak_wb(high) < KNOWN_TARGET * self.limit_wb:
+            low = high
+        while high - low > 0.01:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if peak_wb(middle) < KNOWN_TARGET * self.limit_wb else (low, middle)
+        self._granted = low
+        return low
 
     def _permit(self, estimate: BlockEstimate, scale: float, time_s: float, current_a: Signal) -> float:
         safe = TARGET * self.safe_scale
@@ -239,9 +274,10 @@ class FluxGuard:
         since_s = time_s - self._backed_off_s
         if agreed_wb > ABORT_ABOVE * self.limit_wb and self.latency_s + self.reaction_s < since_s < math.inf:
             return FluxAdvice.ABORT, 0.0
-        if since_s < HOLD_OFF * (self.latency_s + self.reaction_s) and fraction < URGENT:
+        is_urgent = fraction > URGENT and fraction > RISING * self._backed_off_at
+        if since_s < HOLD_OFF * (self.latency_s + self.reaction_s) and not is_urgent:
             return FluxAdvice.HOLD, permitted
-        self._backed_off_s = time_s
+        self._backed_off_s, self._backed_off_at = time_s, fraction
         self._granted = max(min(permitted, scale * TARGET / fraction), min(scale, TARGET * self.safe_scale))
         self._ceiling = self._granted
         return FluxAdvice.BACK_OFF, self._granted

@@ -79,6 +79,7 @@ class StoredBlock:
     restarts: bool
     begins_at_rest: bool = False
     open_loop_v: Signal | None = None
+    adapts: bool = True
 
 
 @dataclass
@@ -114,8 +115,8 @@ class ParallelObserver:
             _require_margin(self.prior, self._filter, self.sample_period_s)
             if self.expected_voltage_v is not None:
                 self._gamma = self._gain_matrix(self.expected_voltage_v)
-        is_known = self.start is not None and self.start_log_std < PRIOR_LOG_STD
-        self._shell = self._fresh(first, self.current_scale_a**2, around_start=is_known)
+        self._is_known = self.start is not None and self.start_log_std < PRIOR_LOG_STD
+        self._shell = self._fresh(first, self.current_scale_a**2, around_start=self._is_known)
         self._history: list[StoredBlock] = []
         self._samples = 0
         self._next_review = max(FIRST_REVIEW_S / self.sample_period_s, 100.0)
@@ -128,13 +129,15 @@ class ParallelObserver:
         lost_before: int = 0,
         lost_voltage_v: Signal | None = None,
         begins_at_rest: bool = False,
+        adapts: bool = True,
     ) -> BlockEstimate:
         """Take in one block of `(n,)` voltages along the axis (held over each period) and currents (at its start).
 
         `lost_before` samples are missing between the last block and this one. Where their voltage is known
         (`lost_voltage_v`) the observer runs through the hole open loop with adaptation frozen; otherwise its states
         restart as unknowns. Either way no sample is invented. `begins_at_rest`: the motor was de-energised before this
-        block and has come to rest; known parameters stay, states start from zero.
+        block and has come to rest; known parameters stay, states start from zero. Without `adapts` only the states
+        follow the voltage: for samples that tell about the inverter's dead band and not about the machine.
         """
         voltage_v = np.ascontiguousarray(voltage_v, dtype=np.float64)
         current_a = np.ascontiguousarray(current_a, dtype=np.float64)
@@ -148,7 +151,7 @@ class ParallelObserver:
         restarts &= not begins_at_rest
         self.restarts += int(restarts and not self._first)
         self._first = False
-        return self._advance_with_reviews(StoredBlock(voltage_v, current_a, restarts, begins_at_rest, bridged))
+        return self._advance_with_reviews(StoredBlock(voltage_v, current_a, restarts, begins_at_rest, bridged, adapts))
 
     # -- the parts ------------------------------------------------------------------------------------------------
 
@@ -167,6 +170,7 @@ class ParallelObserver:
                 piece.restarts and done == 0,
                 piece.begins_at_rest and done == 0,
                 piece.open_loop_v if done == 0 else None,
+                piece.adapts,
             )
             signals.append(self._run(self._shell, part))
             squares += float(self._shell.state[kernels.SQUARES])
@@ -202,7 +206,7 @@ class ParallelObserver:
 
     def review(self) -> None:
         """Go over the stored data once more from the present estimate (one Gauss-Newton step of the recursion)."""
-        if not self._history or self.law != "fast":
+        if not self._history or self.law != "fast" or self._is_known:
             return
         # The noise of the last pass includes the model's error, which the new pass starts without.
         fresh = self._fresh(self.parameters, float(self._shell.state[kernels.NOISE]), around_start=True)
@@ -235,7 +239,7 @@ class ParallelObserver:
             _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
             self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
-        return self._kernel(shell, piece.voltage_v, piece.current_a, self._law)
+        return self._kernel(shell, piece.voltage_v, piece.current_a, self._law if piece.adapts else kernels.FROZEN)
 
     def _kernel(self, shell: _Shell, voltage_v: Signal, current_a: Signal, law: int) -> tuple[Signal, Signal, Signal]:
         signals = tuple(np.empty_like(voltage_v) for _ in range(3))

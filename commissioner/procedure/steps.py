@@ -102,8 +102,10 @@ class Findings:
     tests_done: int = 0
     knee: tuple[DcLevel, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
-    has_looked: bool = False
-    first_look: Identification | None = None
+    look: Identification | None = None
+    """The newest batch fit of what had been recorded by then."""
+    axis_s: float = 0.0
+    """Energised on the present axis so far."""
     estimate: InverseGamma | None = None
     is_measured: bool = False
     """All four values of `estimate` were measured on this motor, none is the plate's."""
@@ -118,15 +120,15 @@ class Findings:
 
     @property
     def inverter(self) -> InverterError:
-        """The newest inverter error: of the first look, else of the last staircase, else none."""
-        if self.first_look is not None and self.first_look.inverter is not None:
-            return self.first_look.inverter
+        """The newest inverter error: of the newest look, else of the last staircase, else none."""
+        if self.look is not None and self.look.inverter is not None:
+            return self.look.inverter
         return self.staircases[-1].inverter if self.staircases else IDEAL_INVERTER
 
     def resistance_ohm(self, job: Job) -> float:
-        """The best stator resistance so far: first look, else last staircase, else the plate's typical value."""
-        if self.first_look is not None:
-            look = self.first_look
+        """The best stator resistance so far: newest look, else last staircase, else the plate's typical value."""
+        if self.look is not None:
+            look = self.look
             if look.std[0] < 0.05 * look.parameters.stator_resistance_ohm:
                 return look.parameters.stator_resistance_ohm
         if self.staircases:

@@ -107,7 +107,7 @@ def _steps(script: Script, job: Job, findings: Findings) -> Generator[ask.Comman
     yield _entered(State.CHECKING, Event.IDENTIFIED)
     yield from check(job, findings)
     known = replace(prior(job.nameplate).typical, stator_resistance_ohm=NEW_SI[0])
-    findings.first_look = SimpleNamespace(parameters=known, std=(0.01,) * 4, inverter=None)  # type: ignore[assignment]
+    findings.look = SimpleNamespace(parameters=known, std=(0.01,) * 4, inverter=None)  # type: ignore[assignment]
     chosen = _stronger(_designed(), script.strength)
     for _ in range(script.tests):
         findings.estimate = known

@@ -1,0 +1,63 @@
+"""What both energised steps share: blocks kept as they come, the sensors' offset, the ramp down."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+
+from commissioner.errors import Aborted
+from commissioner.motor.space_vector import axis_current_a
+from commissioner.procedure.steps import Findings
+from commissioner.records import SampleBlock, Signal
+from commissioner.safety.commands import Command, Fetch
+
+BIAS_RAMP_PER_S = 4.0
+"""The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
+OFFSET_S = 0.1
+"""Enabled without voltage before each test: what the current sensors show then is their offset."""
+
+
+def next_block(findings: Findings, step: str, axis_deg: float) -> Generator[Command, Any, SampleBlock]:
+    """The next block of the session, kept for the judgement. A drive that stops by itself ends the run."""
+    block: SampleBlock | None = yield Fetch()
+    if block is None:
+        raise Aborted(
+            "the drive ended the test by itself", step=f"{step}, axis {axis_deg:g} deg", value="session ended",
+            limit="the whole test", remedy="check the drive's own time limit and its status",
+        )  # fmt: skip
+    findings.blocks.append((findings.segment, block))
+    findings.axis_s += duration_s(block)
+    return block
+
+
+def measure_offset(findings: Findings, step: str, axis_deg: float) -> Generator[Command, Any, float]:
+    """Mean current along the axis while the drive is enabled and commands nothing."""
+    seen = np.zeros(0)
+    while (seen.size + 1) * period_s(findings) < OFFSET_S:
+        block = yield from next_block(findings, step, axis_deg)
+        seen = np.append(seen, along_axis(block))
+    return float(np.mean(seen))
+
+
+def ramp_down(findings: Findings, step: str, axis_deg: float, seconds: float) -> Generator[Command, Any, None]:
+    """Fetch until the drive's ramp has reached zero, so that the motor is left without a jerk."""
+    passed = 0.0
+    while passed < seconds:
+        block = yield from next_block(findings, step, axis_deg)
+        passed += duration_s(block)
+
+
+def duration_s(block: SampleBlock) -> float:
+    """Motor time the block stands for, what was lost before it included."""
+    return (block.count + block.lost_before) * block.sample_period_s
+
+
+def along_axis(block: SampleBlock) -> Signal:
+    return axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
+
+
+def period_s(findings: Findings) -> float:
+    assert findings.identity is not None
+    return findings.identity.control_period_s
