@@ -19,6 +19,10 @@ from commissioner.records import Signal, StandstillRecording
 
 BRIDGED_SAMPLES = 5
 CLIPPED_RATIO = 3.5
+HARD_PILE, SOFT_PILE = 1e-6, 2e-3
+"""How close to the end samples pile up, relative to the peak, at a hard limit and at a soft one."""
+BENDS_FROM = 0.88
+"""Share of a soft limit up to which the channel is taken as straight."""
 SHORTEST_STRETCH = 200
 REST_SAMPLES = 1
 
@@ -145,25 +149,34 @@ def _grid(values: Signal, peak: float) -> float:
 
 
 def _clip_limits(recording: StandstillRecording, facts: Facts) -> list[tuple[float, float]]:
-    return [_limits_of(row, facts.current_peak_a) for row in _currents(recording, facts.phases)]
+    """Where the command stands still a current may rest at one value by right: such samples do not count as piled up."""
+    moves = np.r_[True, np.diff(recording.voltage_axis_v) != 0.0]
+    return [_limits_of(row[moves], facts.current_peak_a) for row in _currents(recording, facts.phases)]
 
 
 def _limits_of(values: Signal, peak: float) -> tuple[float, float]:
-    """Lower and upper limit at which samples pile up, infinite where none do."""
-    low, high = -np.inf, np.inf
-    tolerance = 1e-6 * peak
-    for sign in (-1.0, 1.0):
+    """Lower and upper bound of the samples to trust, infinite where none pile up at an end.
+
+    A hard limit holds values to the last digit; before a soft one the channel bends, so trust ends below it.
+    """
+    bounds = []
+    for sign in (1.0, -1.0):
         signed = sign * values
         top = float(signed.max())
-        at_top = signed >= top - tolerance
-        runs = np.diff(np.flatnonzero(np.diff(np.r_[0, at_top.astype(int), 0]))[::1])[::2]
-        below = signed[~at_top]
-        width = max(2e-3 * peak, top - float(below.max()) if below.size else 0.0)
-        beside = int(((signed < top - tolerance) & (signed >= top - tolerance - 1.05 * width)).sum())
-        is_pile = at_top.sum() >= 10 and runs.size and runs.max() >= 3 and at_top.sum() > CLIPPED_RATIO * max(beside, 1)
-        if is_pile and abs(top) > 0.3 * peak:
-            low, high = (-top, high) if sign < 0 else (low, top)
-    return low, high
+        is_hard, is_soft = (_piles_up(signed, top, share * peak) for share in (HARD_PILE, SOFT_PILE))
+        trusted = top if is_hard else BENDS_FROM * top
+        bounds.append(sign * trusted if (is_hard or is_soft) and top > 0.3 * peak else sign * np.inf)
+    return float(bounds[1]), float(bounds[0])
+
+
+def _piles_up(signed: Signal, top: float, width: float) -> bool:
+    """Many samples in a row within `width` of the top, and far fewer just below: a crest has 2.4 times at most."""
+    at_top = signed >= top - width
+    runs = np.diff(np.flatnonzero(np.diff(np.r_[0, at_top.astype(int), 0])))[::2]
+    below = signed[~at_top]
+    next_width = max(2e-3 * top, 1.05 * (top - float(below.max()) if below.size else 0.0), width)
+    beside = int((~at_top & (signed >= top - width - next_width)).sum())
+    return bool(at_top.sum() >= 10 and runs.max() >= 3 and at_top.sum() > CLIPPED_RATIO * max(beside, 1))
 
 
 def _clipped(currents: NDArray[np.float64], limits: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
@@ -177,13 +190,17 @@ def _clipped(currents: NDArray[np.float64], limits: Sequence[tuple[float, float]
 def _clip_report(
     recordings: Sequence[StandstillRecording], limits: Sequence[Sequence[tuple[float, float]]], facts: Facts
 ) -> dict[str, float]:
-    finite = [abs(x) for rows in limits for pair in rows for x in pair if np.isfinite(x)]
-    if not finite:
+    tops = [
+        float(np.abs(row).max())
+        for recording, rows in zip(recordings, limits, strict=True)
+        for row, pair in zip(_currents(recording, facts.phases), rows, strict=True) if np.isfinite(pair).any()
+    ]
+    if not tops:
         return {}
     count = sum(
         int(_clipped(_currents(r, facts.phases), rows).sum()) for r, rows in zip(recordings, limits, strict=True)
     )
-    return {"limit_a": float(np.median(finite)), "samples": float(count)}
+    return {"limit_a": float(np.median(tops)), "samples": float(count)}
 
 
 def _pieces(

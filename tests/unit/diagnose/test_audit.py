@@ -1,0 +1,102 @@
+"""What a recording shows before any model: limits, steps, holes, axes; poor ones are masked or refused with a reason."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.audit import prepare
+from tests.unit.diagnose.conftest import recording
+
+
+def measured(noise=0.01, seed=3, **about):
+    """A recording whose currents follow the command through a resistance, with noise."""
+    blank = recording(**about)
+    random = np.random.default_rng(seed)
+    shape = np.array([[1.0], [-0.5], [-0.5]])
+    rows = 0.1 * shape * blank.voltage_axis_v + noise * random.standard_normal((3, blank.time_s.size))
+    return replace(blank, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])
+
+
+def limited(source, limit):
+    return replace(source, current_u_a=np.clip(source.current_u_a, -limit, limit))
+
+
+def test_a_hard_limit_is_found_to_the_last_digit_and_its_samples_are_masked():
+    record, audit = prepare([limited(measured(), 4.0)])
+    assert audit.clipped["limit_a"] == 4.0
+    bad = sum(int((~s.is_good).sum()) for s in record.segments)
+    assert bad == audit.clipped["samples"] == (np.abs(limited(measured(), 4.0).current_u_a) >= 4.0).sum()
+
+
+def test_a_soft_limit_is_found_and_masked_from_where_it_bends():
+    source = measured()
+    bent = np.where(
+        np.abs(source.current_u_a) > 3.6,
+        np.sign(source.current_u_a) * (3.6 + 0.4 * np.tanh((np.abs(source.current_u_a) - 3.6) / 0.4)),
+        source.current_u_a,
+    )
+    record, audit = prepare([replace(source, current_u_a=bent)])
+    assert audit.clipped["limit_a"] == pytest.approx(4.0, rel=0.01)
+    assert all(np.abs(s.currents_a[0][s.is_good]).max() < 3.6 for s in record.segments)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_unlimited_current_is_not_called_clipped(seed):
+    assert prepare([measured(noise=0.02 / 2**seed, seed=seed)])[1].clipped == {}
+
+
+def test_a_current_resting_under_a_constant_command_is_not_called_clipped():
+    source = measured(noise=0.0)
+    still = np.repeat(source.voltage_axis_v[::1500], 1500)[: source.time_s.size]
+    assert prepare([replace(source, voltage_axis_v=still, current_u_a=np.round(0.1 * still, 2))])[1].clipped == {}
+
+
+def test_coarse_converter_steps_are_measured():
+    source = measured()
+    rows = [np.round(c / 0.05) * 0.05 for c in (source.current_u_a, source.current_v_a, source.current_w_a)]
+    _, audit = prepare([replace(source, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])
+    assert audit.step_a == pytest.approx((0.05, 0.05, 0.05), rel=1e-3)
+    assert prepare([source])[1].step_a == (0.0, 0.0, 0.0)
+
+
+def cut(source, gone):
+    keep = np.setdiff1d(np.arange(source.time_s.size), gone)
+    names = (
+        "time_s",
+        "segment",
+        "axis_deg",
+        "voltage_axis_v",
+        "current_u_a",
+        "current_v_a",
+        "current_w_a",
+        "dc_link_v",
+    )
+    return replace(source, **{n: getattr(source, n)[keep] for n in names})
+
+
+def test_a_short_hole_is_bridged_with_masked_samples_and_a_long_one_starts_a_new_stretch():
+    record, audit = prepare([cut(measured(), np.arange(2000, 2003))])
+    assert len(record.segments) == 3 and audit.holes[0][2] == 3
+    assert sum(int((~s.is_good).sum()) for s in record.segments) == 3
+    record, audit = prepare([cut(measured(), np.arange(2000, 2100))])
+    assert len(record.segments) == 4 and audit.holes[0][2] == 100
+    assert any("missing" in sentence for sentence in audit.sentences)
+
+
+def test_one_tone_is_said_to_carry_little():
+    source = measured()
+    t = source.time_s
+    one = replace(source, voltage_axis_v=20.0 * np.sin(2 * np.pi * 30.0 * t))
+    assert any("single tone" in sentence for sentence in prepare([one])[1].sentences)
+
+
+def test_what_carries_nothing_is_refused_with_the_reason():
+    source = measured()
+    zero = np.zeros(source.time_s.size)
+    assert "zero" in prepare([replace(source, current_u_a=zero, current_v_a=zero, current_w_a=zero)])[1].refusal
+    assert "constant" in prepare([replace(source, voltage_axis_v=zero)])[1].refusal
+    rows = [np.clip(c, -0.5, 0.5) for c in (source.current_u_a, source.current_v_a, source.current_w_a)]
+    most = replace(source, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])
+    assert "clipped" in prepare([most])[1].refusal
+    assert prepare([source])[1].refusal is None
