@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear
 
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import Layout, Model, Term, predict
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
 
@@ -87,8 +87,9 @@ def normal_equations(
     than the excitation has.
     """
     size = 4 + len(wanted)
-    grams, slopes, chi2, counts = [], [], [], []
-    for k, segment in enumerate(record.segments):
+
+    def of_segment(k: int) -> tuple[Array, Array, float, int]:
+        segment = record.segments[k]
         here = [c for c, term in enumerate(wanted) if term.segment in (-1, segment.uid)]
         rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
         prediction = predict(model, record, k, layout, [wanted[c] for c in here])
@@ -102,10 +103,9 @@ def normal_equations(
         gram, slope = np.zeros((size, size)), np.zeros(size)
         gram[np.ix_(rows, rows)] = product[:-1, :-1]
         slope[rows] = product[:-1, -1]
-        grams.append(gram)
-        slopes.append(slope)
-        chi2.append(float(product[-1, -1]))
-        counts.append(int(segment.is_good.sum()) * record.facts.phases)
+        return gram, slope, float(product[-1, -1]), int(segment.is_good.sum()) * record.facts.phases
+
+    grams, slopes, chi2, counts = (list(column) for column in zip(*each_segment(of_segment, record), strict=True))
     prior = layout.penalty(wanted)
     if prior.any():
         theta = np.zeros(size)
@@ -134,12 +134,14 @@ def chi2_of(model: Model, record: Record, layout: Layout, noise: Noise) -> float
 
 def segment_chi2(model: Model, record: Record, layout: Layout, noise: Noise) -> list[float]:
     """Whitened squared residual of each segment."""
-    out = []
-    for k, segment in enumerate(record.segments):
+
+    def of_segment(k: int) -> float:
+        segment = record.segments[k]
         residual = segment.currents_a - predict(model, record, k, layout).currents_a
         white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
-        out.append(float(white @ white))
-    return out
+        return float(white @ white)
+
+    return each_segment(of_segment, record)
 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:

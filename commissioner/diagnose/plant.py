@@ -10,20 +10,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from scipy.signal import lfilter
 
-from commissioner.diagnose import kernel
+from commissioner.diagnose import kinds
+from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, FIFTH, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.resample import resample, resample_hermite
+from commissioner.diagnose.tangent import sensitivities
+from commissioner.diagnose.trajectory import propagate, propagate_linear
 
 Array = NDArray[np.float64]
-
-# Where a term acts behind the motor terminals (kinds below 100 act inside and are the kernel's).
-DELAY, LAG, CLOCK, OFFSET, DRIFT, GAIN, EVEN, ODD, TONE, CABLE, FIFTH = range(100, 111)
-NOMINAL_KINDS = (kernel.R_S, kernel.R_R, kernel.GAMMA_SIGMA, kernel.GAMMA_M)
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Layout:
         knots = (np.arange(count) + 0.5) * self.legs_top / count
         tail = np.sinh(self.legs_top) * 0.15
         for k, term in enumerate(terms):
-            if term.kind in (kernel.LEGS, kernel.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
+            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
                 out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
         return out
 
@@ -175,12 +176,10 @@ def predict(
     segment = record.segments[position]
     channels = record.channels[position] if record.channels else np.zeros((segment.count, 1))
     listed = [] if wanted is None else list(wanted)
-    inside = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
-    kinds = np.array([*NOMINAL_KINDS, *(listed[k].kind for k in inside)], dtype=np.int64)
+    inside = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
+    at_work = np.array([*kinds.NOMINAL, *(listed[k].kind for k in inside)], dtype=np.int64)
     indices = np.array([0, 0, 0, 0, *(listed[k].index for k in inside)], dtype=np.int64)
-    current, after, before, tangent, rotor, iron, last = _propagate(
-        model, segment, channels, layout, kinds, indices, wanted is not None
-    )
+    path = _trajectory(model, segment, channels, layout, at_work)
     jacobian = np.zeros((0, record.facts.phases, segment.count))
     if wanted is not None:
         jacobian = np.zeros((4 + len(listed), record.facts.phases, segment.count))
@@ -188,68 +187,123 @@ def predict(
             model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
             *(listed[k].step for k in inside),
         ])
-        scaled = np.ascontiguousarray((tangent * scale).transpose(2, 1, 0))
-        _to_phases(scaled, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
-    measured = _sense(model, record, segment, channels, layout, (current, after, before), jacobian, listed)
-    return Prediction(measured, jacobian, rotor, iron, before, (float(last[0]), float(last[1])))
+        tangent = _tangent(path, segment, channels, layout, at_work, indices)
+        _to_phases(tangent, scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
+    measured = _sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
+    nu = path.machine[0][4]
+    iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
+    last = path.states[-1, 2:4]
+    return Prediction(measured, jacobian, path.rotor_current, iron, path.before, (float(last[0]), float(last[1])))
 
 
-def _to_phases(tangent: Array, jacobian: Array, rows: list[int]) -> None:
+def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -> None:
     for source, row in enumerate(rows):
         for phase in range(jacobian.shape[1]):
-            np.multiply(tangent[source, 0], TO_PHASES[phase, 0], out=jacobian[row, phase])
+            np.multiply(tangent[0, source], scale[source] * TO_PHASES[phase, 0], out=jacobian[row, phase])
             if TO_PHASES[phase, 1] != 0.0:
-                jacobian[row, phase] += TO_PHASES[phase, 1] * tangent[source, 1]
+                jacobian[row, phase] += scale[source] * TO_PHASES[phase, 1] * tangent[1, source]
 
 
-def _propagate(
-    model: Model, segment: Segment, channels: Array, layout: Layout, kinds: Array, indices: Array, with_tangent: bool
-) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+@dataclass(frozen=True)
+class _Path:
+    """A trajectory and what it was driven by: `drive` known functions of time, `machine` constants and dictionaries."""
+
+    states: Array
+    stops: Array
+    current: Array
+    after: Array
+    before: Array
+    rotor_current: Array
+    drive: tuple[Array, ...]
+    machine: tuple[Any, ...]
+
+
+def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, at_work: Array) -> _Path:
+    drive = _drive(model, segment, channels)
+    every = set(at_work.tolist()) | {t.kind for t in model.terms}
+    machine = _machine(model, layout, every)
+    period = _period(segment)
+    start = _initial_state(model, segment)
+    voltage = segment.voltage_ab_v
+    va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
+    acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v} | (every & {kinds.STOP, kinds.BRANCH})
+    if all(k in (kinds.INITIAL_FLUX, kinds.CARRY) or k >= kinds.FIRST_OF_SENSING for k in acting):
+        transition, gain, output, slope = _exact_step(model.nominal, period)
+        states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
+        rotor = states[:-1, 2:4].T / model.nominal[3] - current
+        return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+    states, stops, current, after, before, rotor = propagate(
+        va, vb, *drive, period, _substeps(model, layout, segment), layout.crossing_substeps, *machine, start
+    )
+    return _Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
+
+
+def _exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
+    r_s, r_r, l_sigma, l_m = nominal
+    output = np.array([1.0 / l_sigma, -1.0 / l_sigma])
+    rate = np.array([[-r_s, r_s], [r_r, -r_r * (1.0 + l_sigma / l_m)]]) / l_sigma
+    whole = np.zeros((3, 3))
+    whole[:2, :2], whole[0, 2] = rate, 1.0
+    step = expm(whole * period_s)
+    return step[:2, :2].copy(), step[:2, 2].copy(), output, np.array([*(output @ rate), output[0]])
+
+
+def _tangent(
+    path: _Path, segment: Segment, channels: Array, layout: Layout, at_work: Array, indices: Array
+) -> Array:
+    wanted = set(at_work.tolist())
+    out = np.empty((2, at_work.shape[0], segment.count))
+    sensitivities(
+        path.states, path.stops, *path.drive, channels, _period(segment), *path.machine, at_work, indices,
+        _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK}), layout.legs_vectors),
+        _if(kinds.IRON_CURVE in wanted, layout.iron_vectors), _if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors),
+        np.array(segment.flux_before_wb), out,
+    )
+    return out
+
+
+def _period(segment: Segment) -> float:
+    return float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
+
+
+def _drive(model: Model, segment: Segment, channels: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Factors on voltage, link, phase resistances and rotor resistance, and the speed, at every sample."""
     n = segment.count
     voltage_factor, rotor_factor = np.ones(n), np.ones(n)
     omega, phase_factor = np.zeros(n), np.ones((n, 3))
     for term, value in zip(model.terms, model.values, strict=True):
         if term.segment not in (-1, segment.uid):
             continue
-        if term.kind == kernel.VOLTAGE_MOD:
+        if term.kind == kinds.VOLTAGE_MOD:
             voltage_factor += value * channels[:, term.index]
-        elif term.kind == kernel.ROTOR_MOD:
+        elif term.kind == kinds.ROTOR_MOD:
             rotor_factor += value * channels[:, term.index]
-        elif term.kind == kernel.OMEGA:
+        elif term.kind == kinds.OMEGA:
             omega += value * channels[:, term.index]
-        elif term.kind == kernel.PHASE_RESISTANCE:
+        elif term.kind == kinds.PHASE_RESISTANCE:
             phase_factor += value * channels[:, term.index : term.index + 3]
+    return voltage_factor, segment.link_ratio, phase_factor, rotor_factor, omega
+
+
+def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
     aniso = [model.sum_kind(k, 2) for k in (
-        kernel.ROTOR_ANISOTROPY, kernel.LEAKAGE_ANISOTROPY, kernel.MAGNETIZING_ANISOTROPY)]
+        kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)]
     r_s, r_r, l_sigma, l_m = model.nominal
-    nu = 0.5 + model.total(kernel.NU)
-    base = np.array([r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kernel.IRON_LOSS), *np.concatenate(aniso)])
-    every = set(kinds.tolist()) | {t.kind for t in model.terms}
-    uses_legs = bool(every & {kernel.LEGS, kernel.LEGS_LINK})
-    stops = layout.stop_radius_wb if kernel.STOP in every else np.zeros(0)
-    branches = layout.branch_time_s if kernel.BRANCH in every else np.zeros(0)
+    nu = 0.5 + model.total(kinds.NU)
+    base = np.array([r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS), *np.concatenate(aniso)])
+    stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros(0)
+    branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
     legs_size = layout.legs_vectors.shape[0]
-    voltage = segment.voltage_ab_v
-    result: tuple[Array, Array, Array, Array, Array, Array, Array] = kernel.propagate(
-        np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1]), voltage_factor, segment.link_ratio,
-        phase_factor, rotor_factor, omega, channels,
-        float(np.median(np.diff(segment.time_s))) if n > 1 else 1e-4,
-        _substeps(model, layout, segment), layout.crossing_substeps,
+    return (
         base,
-        model.sum_kind(kernel.LEGS, legs_size) @ layout.legs_vectors,
-        model.sum_kind(kernel.LEGS_LINK, legs_size) @ layout.legs_vectors,
-        model.sum_kind(kernel.IRON_CURVE, layout.iron_vectors.shape[0]) @ layout.iron_vectors,
-        model.sum_kind(kernel.LEAKAGE_CURVE, layout.leak_vectors.shape[0]) @ layout.leak_vectors,
+        model.sum_kind(kinds.LEGS, legs_size) @ layout.legs_vectors,
+        model.sum_kind(kinds.LEGS_LINK, legs_size) @ layout.legs_vectors,
+        model.sum_kind(kinds.IRON_CURVE, layout.iron_vectors.shape[0]) @ layout.iron_vectors,
+        model.sum_kind(kinds.LEAKAGE_CURVE, layout.leak_vectors.shape[0]) @ layout.leak_vectors,
         layout.legs_top, layout.legs_knee_a, layout.iron_top_wb, layout.leak_top_wb,
-        model.sum_kind(kernel.STOP, stops.size) if stops.size else np.zeros(0), stops,
-        model.sum_kind(kernel.BRANCH, branches.size) if branches.size else np.zeros(0), branches,
-        kinds, indices,
-        _if(uses_legs, layout.legs_vectors),
-        _if(kernel.IRON_CURVE in every, layout.iron_vectors),
-        _if(kernel.LEAKAGE_CURVE in every, layout.leak_vectors),
-        _initial_state(model, segment), np.array(segment.flux_before_wb), with_tangent,
+        model.sum_kind(kinds.STOP, stops.size) if stops.size else np.zeros(0), stops,
+        model.sum_kind(kinds.BRANCH, branches.size) if branches.size else np.zeros(0), branches,
     )
-    return result
 
 
 def _if(is_used: bool, vectors: Array) -> Array:
@@ -259,10 +313,10 @@ def _if(is_used: bool, vectors: Array) -> Array:
 def _initial_state(model: Model, segment: Segment) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
-    share = model.total(kernel.CARRY)
+    share = model.total(kinds.CARRY)
     state[:] = [share * f for f in (*segment.flux_before_wb, *segment.flux_before_wb)]
     for term, value in zip(model.terms, model.values, strict=True):
-        if term.kind == kernel.INITIAL_FLUX and term.segment in (-1, segment.uid):
+        if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
             if term.index < 2:
                 state[term.index] += value
                 state[2 + term.index] += value
@@ -275,9 +329,9 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
     """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode)."""
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
-    if model.has_kind(kernel.BRANCH):
+    if model.has_kind(kinds.BRANCH):
         rate = max(rate, 0.5 / float(layout.branch_time_s.min()))
-    if model.has_kind(kernel.LEAKAGE_CURVE):
+    if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
     period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
     return int(layout.substeps * np.clip(np.ceil(rate * period / 0.25), 1, 40))
@@ -301,7 +355,7 @@ def _sense(
     late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
     late = np.broadcast_to(late, elapsed.shape)
     is_late = bool(np.any(late))
-    filled = [k for k, t in enumerate(listed) if t.kind < 100 and t.segment in (-1, segment.uid)]
+    filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
     if is_late:
         current, slope = resample_hermite(current, after, before, late / period, period)
@@ -356,7 +410,7 @@ def _sense(
             row[term.index % 3] = channels[:, term.index // 3]
         elif term.kind == CABLE:
             row[:] = edges[term.index]
-        if term.kind >= 100:
+        if term.kind >= kinds.FIRST_OF_SENSING:
             row *= term.step
     return reported
 

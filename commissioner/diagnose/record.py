@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.records import Signal
+
+Result = TypeVar("Result")
 
 PHASE_ANGLES_RAD = np.array([0.0, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0])
 TO_PHASES = np.stack([np.cos(PHASE_ANGLES_RAD), np.sin(PHASE_ANGLES_RAD)], axis=1)
@@ -102,3 +107,12 @@ class Record:
             return Record(tuple(cut), self.facts)
         channels = tuple(np.ascontiguousarray(self.channels[k][: s.count]) for k, s in zip(keep, cut, strict=True))
         return Record(tuple(cut), self.facts, self.channel_names, channels)
+
+
+def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Result]:
+    """`of_segment(position)` of every segment, in order; the compiled kernels let other threads run meanwhile."""
+    count = len(record.segments)
+    if count == 1:
+        return [of_segment(0)]
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, count, 4)) as pool:
+        return list(pool.map(of_segment, range(count)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from commissioner.diagnose import kernel
+from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
@@ -111,7 +111,7 @@ def _starts(record: Record) -> list[tuple[float, float, float, float]]:
     ]
 
 
-CARRY = Term("", "flux_carried_over", "1", kernel.CARRY, 0, 0.01, 0.0, 1.0)
+CARRY = Term("", "flux_carried_over", "1", kinds.CARRY, 0, 0.01, 0.0, 1.0)
 """Nuisance of the nominal model: how much of the rotor flux outlives the pause between two segments."""
 
 
@@ -178,7 +178,7 @@ def search(
 
 def _without_curves(model: Model) -> Model:
     """Curves set back to zero: spline coefficients beyond the flux reached so far mean nothing on other data."""
-    curves = (kernel.IRON_CURVE, kernel.LEAKAGE_CURVE, kernel.STOP)
+    curves = (kinds.IRON_CURVE, kinds.LEAKAGE_CURVE, kinds.STOP)
     values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
     return replace(model, values=values)
 

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from commissioner.diagnose import kernel
+from commissioner.diagnose import kinds
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
-from commissioner.diagnose.plant import CABLE, Term
+from commissioner.diagnose.kinds import CABLE
+from commissioner.diagnose.plant import Term
 
 
 def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -49,7 +50,7 @@ def dead_time(setting: Setting) -> tuple[Term, ...]:
 
     Scales with link voltage times switching frequency where these differ between segments.
     """
-    return _legs("dead_time", kernel.LEGS_LINK, setting)
+    return _legs("dead_time", kinds.LEGS_LINK, setting)
 
 
 @effect(
@@ -61,7 +62,7 @@ def dead_time(setting: Setting) -> tuple[Term, ...]:
 )
 def device_drop(setting: Setting) -> tuple[Term, ...]:
     """v_x = v_x* - V_th(|i_x|) sign(i_x), V_th >= 0 [V]. Its own terms exist only where dead time can be told from it."""
-    return _legs("device_drop", kernel.LEGS, setting) if setting.link_varies else ()
+    return _legs("device_drop", kinds.LEGS, setting) if setting.link_varies else ()
 
 
 def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -79,7 +80,7 @@ def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """Relative loss of voltage at rated power, k >= 0, through first-order lags of 1, 10 and 100 ms (a dictionary)."""
     names = [n for n in setting.record.channel_names if n.startswith("sag_")]
     return tuple(
-        Term("dc_link_sag", n, "1", kernel.VOLTAGE_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
+        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
     )
 
 
@@ -103,7 +104,7 @@ def dc_link_ripple(setting: Setting) -> tuple[Term, ...]:
     """Relative amplitudes a, b of the rectifier's ripple line (frequency refined on the data)."""
     names = [n for n in setting.record.channel_names if n.startswith("ripple_")]
     return tuple(
-        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kernel.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid)
+        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid)
         for s in setting.record.segments for n in names
     )
 

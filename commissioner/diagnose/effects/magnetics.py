@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from commissioner.diagnose import kernel
+from commissioner.diagnose import kinds
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
 from commissioner.diagnose.plant import Term
 
@@ -37,10 +37,10 @@ def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.iron_vectors.shape[0]
     step = setting.facts.rated_current_peak_a / max(setting.iron_flux_wb, 1e-9) * 0.01
     curve = tuple(
-        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kernel.IRON_CURVE, k, step, 0.0 if k > 2 else -np.inf)
+        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > 2 else -np.inf)
         for k in range(count)
     )
-    return (*curve, Term("magnetizing_saturation", "split", "1", kernel.NU, 0, 0.1, -0.5, 0.5))
+    return (*curve, Term("magnetizing_saturation", "split", "1", kinds.NU, 0, 0.1, -0.5, 0.5))
 
 
 def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -58,7 +58,7 @@ def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
     """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k the stop operator of the iron flux with fixed radius r_k."""
     radii = setting.layout.stop_radius_wb
     return tuple(
-        Term("magnetic_hysteresis", f"loop_{k}", "A", kernel.STOP, k, 0.01, 0.0, np.inf) for k in range(radii.size)
+        Term("magnetic_hysteresis", f"loop_{k}", "A", kinds.STOP, k, 0.01, 0.0, np.inf) for k in range(radii.size)
     )
 
 
@@ -81,7 +81,7 @@ def remanence(setting: Setting) -> tuple[Term, ...]:
     """Initial flux vector (alpha, beta) [Wb] of every segment that starts at rest."""
     step = 0.01 * max(setting.iron_flux_wb, 1e-6)
     return tuple(
-        Term("remanence", f"{axis}_{s.uid}", "Wb", kernel.INITIAL_FLUX, c, step, segment=s.uid)
+        Term("remanence", f"{axis}_{s.uid}", "Wb", kinds.INITIAL_FLUX, c, step, segment=s.uid)
         for s in setting.record.segments if s.starts_at_rest
         for c, axis in enumerate(("alpha", "beta"))
     )
@@ -109,7 +109,7 @@ def leakage_saturation(setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.leak_vectors.shape[0]
     step = 0.01 * setting.facts.current_peak_a / setting.layout.leak_top_wb
     return tuple(
-        Term("leakage_saturation", f"curve_{k}", "1/H", kernel.LEAKAGE_CURVE, k, step, 0.0, np.inf) for k in range(count)
+        Term("leakage_saturation", f"curve_{k}", "1/H", kinds.LEAKAGE_CURVE, k, step, 0.0, np.inf) for k in range(count)
     )
 
 
@@ -127,7 +127,7 @@ def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
     """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners fixed at 40, 120 and 400 Hz."""
     return tuple(
-        Term("rotor_skin_effect", f"branch_{k}", "S", kernel.BRANCH, k, 0.01, 0.0, np.inf)
+        Term("rotor_skin_effect", f"branch_{k}", "S", kinds.BRANCH, k, 0.01, 0.0, np.inf)
         for k in range(setting.layout.branch_time_s.size)
     )
 
@@ -146,7 +146,7 @@ def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 )
 def iron_loss(setting: Setting) -> tuple[Term, ...]:
     """Conductance g >= 0 [S] fed by the stator's induced voltage."""
-    return (Term("iron_loss", "conductance", "S", kernel.IRON_LOSS, 0, 1e-4, 0.0, 0.2),)
+    return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2),)
 
 
 def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -167,7 +167,7 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
     """
     names = [n for n in setting.record.channel_names if n.startswith("heat_") and n.endswith("_u")]
     return tuple(
-        Term("stator_heating", n[5:-2], "1/min", kernel.PHASE_RESISTANCE, setting.record.channel(n), 0.01, 0.0, 5.0)
+        Term("stator_heating", n[5:-2], "1/min", kinds.PHASE_RESISTANCE, setting.record.channel(n), 0.01, 0.0, 5.0)
         for n in names
     )
 
@@ -183,7 +183,7 @@ def rotor_heating(setting: Setting) -> tuple[Term, ...]:
     """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current."""
     names = [n for n in setting.record.channel_names if n.startswith("rotor_heat")]
     return tuple(
-        Term("rotor_heating", n, "1/min", kernel.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
+        Term("rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
     )
 
 
@@ -201,7 +201,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def shaft_motion(setting: Setting) -> tuple[Term, ...]:
     """Electrical speed [rad/s] as hat functions of time, five per segment."""
     return tuple(
-        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kernel.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
+        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
         for s in setting.record.segments
         for n in setting.record.channel_names if n.startswith("hat_")
     )
@@ -225,10 +225,10 @@ def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
     """1/L_sigma times (1 + [c s; s -c]), and the same for 1/L_M; needs at least two axes."""
     if setting.axes < 2:
         return ()
-    kinds = (("leakage", kernel.LEAKAGE_ANISOTROPY), ("magnetizing", kernel.MAGNETIZING_ANISOTROPY))
+    parts = (("leakage", kinds.LEAKAGE_ANISOTROPY), ("magnetizing", kinds.MAGNETIZING_ANISOTROPY))
     return tuple(
         Term("inductance_anisotropy", f"{part}_{name}", "1", kind, c, 0.01, -0.5, 0.5)
-        for part, kind in kinds for c, name in enumerate(("cos", "sin"))
+        for part, kind in parts for c, name in enumerate(("cos", "sin"))
     )
 
 
@@ -252,11 +252,11 @@ def resistance_anisotropy(setting: Setting) -> tuple[Term, ...]:
         return ()
     channel = setting.record.channel
     stator = tuple(
-        Term("resistance_anisotropy", f"stator_{n}", "1", kernel.PHASE_RESISTANCE, channel(f"phase_{n}_u"), 0.01, -0.5, 0.5)
+        Term("resistance_anisotropy", f"stator_{n}", "1", kinds.PHASE_RESISTANCE, channel(f"phase_{n}_u"), 0.01, -0.5, 0.5)
         for n in ("cos", "sin")
     )
     rotor = tuple(
-        Term("resistance_anisotropy", f"rotor_{n}", "1", kernel.ROTOR_ANISOTROPY, c, 0.01, -0.5, 0.5)
+        Term("resistance_anisotropy", f"rotor_{n}", "1", kinds.ROTOR_ANISOTROPY, c, 0.01, -0.5, 0.5)
         for c, n in enumerate(("cos", "sin"))
     )
     return stator + rotor

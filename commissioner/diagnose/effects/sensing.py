@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect
-from commissioner.diagnose.plant import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE, Term
+from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.plant import Term
 
 PHASES = ("u", "v", "w")
 

@@ -1,0 +1,275 @@
+"""The extended two-axis standstill model, compiled: its trajectory under a recorded voltage command.
+
+States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged rotor voltage q_k per extra rotor branch,
+all as (alpha, beta) pairs. With fluxes as states every nonlinearity is explicit:
+
+    psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
+    j      = G(|psi_0|) psi_0 + sum h_k z_k / r_k   extra magnetizing current, z_k stop operator of radius r_k (2)
+    i_s    = (1/L_sigma + S(|psi_sigma|) + A_sigma) psi_sigma + nu j,     psi_sigma = psi_s - psi_R          (3)
+    i      = (i_s + g v) / (1 + g R_s)              iron-loss conductance g across d psi_s/dt                (4)
+    d psi_s/dt = v + v_legs(i) - R_uvw i                                                                     (5)
+    w      = R_R (psi_R / L_M + j - i_s - sum g_k q_k)                                                       (6)
+    d psi_R/dt = -w + omega J psi_R,     T_k d q_k/dt = w - q_k                                              (7)
+
+(1)-(3) and (6) follow from the T circuit with a saturating branch, rotor side scaled by L_m/L_r: an extra current j
+drawn at the magnetizing node gives psi_s = L_sigma i_s + psi_R - mu j, psi_m = psi_R + mu (i_s - j),
+i_R = psi_R/L_M - i_s + j, with mu = nu L_sigma the rotor-side share of the leakage (linear case: G. R. Slemon,
+IEEE Trans. Ind. Appl. 25(6), 1989).
+
+Classical fourth-order Runge-Kutta with the voltage held over the sample, in steps fine enough for the leg curve; a
+model without nonlinearity, branch or modulation is stepped exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from commissioner.diagnose.spline import curve, spline_weights
+
+SQRT3 = np.sqrt(3.0)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def leg_loss(i, legs, top, knee, weights, row):
+    """Voltage a leg loses at current i (odd), and its slope: a spline over asinh(|i|/knee)."""
+    y = np.arcsinh(abs(i) / knee)
+    sign = -1.0 if i < 0 else 1.0
+    j = spline_weights(min(y, top), top, legs.shape[0] - 3, weights, row)
+    slope = 0.0 if y >= top else curve(legs, j, weights, row, 4) / np.sqrt(i * i + knee * knee)
+    return sign * curve(legs, j, weights, row, 0), slope
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def _slope(
+    x, k, stage, va, vb, ru, rv, rw, rr, omega,
+    base, legs, iron, leak, has_legs, legs_top, legs_knee, iron_top, leak_top,
+    stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
+):
+    """Right-hand side (1)-(7) at x into k[stage]; terminal current and its slope into out[0:4], stops into out[4:]."""
+    rs, gs, gm, nu, g = base[0], base[2], base[3], base[4], base[5]
+    ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
+    branches = branch_gain.shape[0]
+    stops = stop_gain.shape[0]
+    # (1), (2)
+    pa = (1.0 - nu) * x[2] + nu * x[0]
+    pb = (1.0 - nu) * x[3] + nu * x[1]
+    big_g = slope_g = 0.0
+    if iron.shape[0] > 0:
+        size = np.sqrt(pa * pa + pb * pb) + 1e-12
+        j = spline_weights(size, iron_top, iron.shape[0] - 3, wts, 0)
+        big_g = curve(iron, j, wts, 0, 0)
+        slope_g = curve(iron, j, wts, 0, 4) / size
+    ja, jb = big_g * pa, big_g * pb
+    jaa, jab, jbb = big_g + slope_g * pa * pa, slope_g * pa * pb, big_g + slope_g * pb * pb
+    for s in range(stops):
+        r = stop_radius[s]
+        ya = z[s, 0] + pa - z_ref[0]
+        yb = z[s, 1] + pb - z_ref[1]
+        length = np.sqrt(ya * ya + yb * yb)
+        f = r / length if length > r else 1.0
+        out[4 + 2 * s] = ya * f
+        out[5 + 2 * s] = yb * f
+        ja += stop_gain[s] * ya * f / r
+        jb += stop_gain[s] * yb * f / r
+    # (3)
+    sa = x[0] - x[2]
+    sb = x[1] - x[3]
+    big_s = slope_s = 0.0
+    if leak.shape[0] > 0:
+        size = np.sqrt(sa * sa + sb * sb) + 1e-12
+        j = spline_weights(size, leak_top, leak.shape[0] - 3, wts, 1)
+        big_s = curve(leak, j, wts, 1, 0)
+        slope_s = curve(leak, j, wts, 1, 4) / size
+    ia = (gs + big_s) * sa + gs * (las * sa + lbs * sb) + nu * ja
+    ib = (gs + big_s) * sb + gs * (lbs * sa - las * sb) + nu * jb
+    iaa = gs + big_s + slope_s * sa * sa + gs * las
+    iab = slope_s * sa * sb + gs * lbs
+    ibb = gs + big_s + slope_s * sb * sb - gs * las
+    # (4)
+    shrink = 1.0 / (1.0 + g * rs)
+    ta = (ia + g * va) * shrink
+    tb = (ib + g * vb) * shrink
+    out[0] = ta
+    out[1] = tb
+    # (5)
+    iu = ta
+    iv = -0.5 * ta + 0.5 * SQRT3 * tb
+    iw = -0.5 * ta - 0.5 * SQRT3 * tb
+    eu, ev, ew = ru * iu, rv * iv, rw * iw
+    if has_legs:
+        eu += leg_loss(iu, legs, legs_top, legs_knee, wts, 2)[0]
+        ev += leg_loss(iv, legs, legs_top, legs_knee, wts, 3)[0]
+        ew += leg_loss(iw, legs, legs_top, legs_knee, wts, 4)[0]
+    k[stage, 0] = va - (2.0 * eu - ev - ew) / 3.0
+    k[stage, 1] = vb - (ev - ew) / SQRT3
+    # (6), (7)
+    ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia
+    cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib
+    for n in range(branches):
+        ca -= branch_gain[n] * x[4 + 2 * n]
+        cb -= branch_gain[n] * x[5 + 2 * n]
+    wa = rr * ((1.0 + ras) * ca + rbs * cb)
+    wb = rr * (rbs * ca + (1.0 - ras) * cb)
+    k[stage, 2] = -wa - omega * x[3]
+    k[stage, 3] = -wb + omega * x[2]
+    for n in range(branches):
+        k[stage, 4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
+        k[stage, 5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
+    if stage > 0:
+        return
+    # slope of the terminal current while the voltage is held
+    qa = (1.0 - nu) * k[0, 2] + nu * k[0, 0]
+    qb = (1.0 - nu) * k[0, 3] + nu * k[0, 1]
+    dja = jaa * qa + jab * qb
+    djb = jab * qa + jbb * qb
+    for s in range(stops):
+        r = stop_radius[s]
+        ya = z[s, 0] + pa - z_ref[0]
+        yb = z[s, 1] + pb - z_ref[1]
+        length = np.sqrt(ya * ya + yb * yb)
+        along = (ya * qa + yb * qb) / (length * length) if length > r else 0.0
+        f = stop_gain[s] / max(length, r)
+        dja += f * (qa - along * ya)
+        djb += f * (qb - along * yb)
+    ea = k[0, 0] - k[0, 2]
+    eb = k[0, 1] - k[0, 3]
+    out[2] = (iaa * ea + iab * eb + nu * dja) * shrink
+    out[3] = (iab * ea + ibb * eb + nu * djb) * shrink
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def _steps_for_legs(out, turn, period, slope_gain, legs, legs_top, legs_knee, fewest, most, wts):
+    """Steps fine enough for the steepest part of the leg curve that the currents may meet in this period."""
+    steep = 0.0
+    for leg in range(3):
+        i, slope = out[0], out[2]
+        if leg > 0:
+            side = 0.5 * SQRT3 if leg == 1 else -0.5 * SQRT3
+            i = -0.5 * out[0] + side * out[1]
+            slope = -0.5 * out[2] + side * out[3]
+        low = max(abs(i) - 1.2 * period * (abs(slope) + turn), 0.0)
+        steep = max(steep, abs(leg_loss(low, legs, legs_top, legs_knee, wts, 2)[1]))
+    return max(fewest, min(most, int(steep * slope_gain * period / 0.3) + 1))
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def propagate(
+    voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega_rad_per_s,
+    period, substeps, crossing_substeps,
+    base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
+    stop_gain, stop_radius, branch_gain, branch_time, initial_state,
+):
+    """Trajectory of one segment from `initial_state` (psi_s, psi_R).
+
+    `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,) and
+    `phase_factor` (n, 3) known functions of time. Returns states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal
+    current (2, n), its slope after and before each sample (2, n), and rotor current (2, n).
+    """
+    samples = voltage_a.shape[0]
+    branches = branch_gain.shape[0]
+    stops = stop_gain.shape[0]
+    order = 4 + 2 * branches
+    states = np.zeros((samples + 1, order))
+    stop_states = np.zeros((samples + 1, stops, 2))
+    current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
+    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
+    x, y, k = np.zeros(order), np.zeros(order), np.zeros((4, order))
+    z, z_ref = np.zeros((stops, 2)), np.zeros(2)
+    wts, out = np.zeros((5, 8)), np.zeros(4 + 2 * stops)
+    legs_now = np.zeros(legs.shape[0])
+    nu, rs, r_r = base[4], base[0], base[1]
+    x[0:4] = initial_state
+    z_ref[0] = (1.0 - nu) * x[2] + nu * x[0]
+    z_ref[1] = (1.0 - nu) * x[3] + nu * x[1]
+    has_legs = bool(np.any(legs != 0.0) or np.any(legs_link != 0.0))
+    last_a = 0.0
+    last_b = 0.0
+    for t in range(samples):
+        now_a = voltage_a[t] * voltage_factor[t]
+        now_b = voltage_b[t] * voltage_factor[t]
+        for c in range(legs.shape[0]):
+            legs_now[c] = legs[c] + link_factor[t] * legs_link[c]
+        ru, rv, rw = rs * phase_factor[t, 0], rs * phase_factor[t, 1], rs * phase_factor[t, 2]
+        rr = r_r * rotor_factor[t]
+        om = omega_rad_per_s[t]
+        states[t] = x
+        stop_states[t] = z
+        # the state at the sample still belongs to the voltage of the period before
+        _slope(
+            x, k, 0, last_a, last_b, ru, rv, rw, rr, om, base, legs_now, iron, leak, has_legs, legs_top, legs_knee,
+            iron_top, leak_top, stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
+        )
+        for c in range(2):
+            current[c, t] = out[c]
+            slope_before[c, t] = out[2 + c]
+            rotor_current[c, t] = -k[0, 2 + c] / rr
+        steps = substeps
+        if has_legs:
+            turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
+            steps = _steps_for_legs(
+                out, turn, period, base[2], legs_now, legs_top, legs_knee, substeps, crossing_substeps, wts
+            )
+        h = period / steps
+        for step in range(steps):
+            for stage in range(4):
+                f = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+                for c in range(order):
+                    y[c] = x[c] if stage == 0 else x[c] + f * k[stage - 1, c]
+                _slope(
+                    y, k, stage, now_a, now_b, ru, rv, rw, rr, om, base, legs_now, iron, leak, has_legs, legs_top,
+                    legs_knee, iron_top, leak_top, stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
+                )
+                if stage == 0 and step == 0:
+                    slope_after[0, t] = out[2]
+                    slope_after[1, t] = out[3]
+            for c in range(order):
+                x[c] += h / 6.0 * (k[0, c] + 2.0 * k[1, c] + 2.0 * k[2, c] + k[3, c])
+            pa = (1.0 - nu) * x[2] + nu * x[0]
+            pb = (1.0 - nu) * x[3] + nu * x[1]
+            for s in range(stops):
+                ya = z[s, 0] + pa - z_ref[0]
+                yb = z[s, 1] + pb - z_ref[1]
+                length = np.sqrt(ya * ya + yb * yb)
+                f = stop_radius[s] / length if length > stop_radius[s] else 1.0
+                z[s, 0] = ya * f
+                z[s, 1] = yb * f
+            z_ref[0] = pa
+            z_ref[1] = pb
+        last_a = now_a
+        last_b = now_b
+    states[samples] = x
+    stop_states[samples] = z
+    return states, stop_states, current, slope_after, slope_before, rotor_current
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, initial_state):
+    """The four-parameter model stepped exactly, the same four-by-four answers as `propagate`, states (n+1, 4).
+
+    `transition` (2, 2) and `gain` (2,) of (psi_s, psi_R) over one period; `output` (2,) gives i, `slope` (3,) di/dt from
+    (psi_s, psi_R, v).
+    """
+    samples = voltage_a.shape[0]
+    states = np.zeros((samples + 1, 4))
+    current = np.zeros((2, samples))
+    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
+    for c in range(2):
+        s, r = initial_state[c], initial_state[2 + c]
+        last = 0.0
+        for t in range(samples):
+            now = voltage_a[t] if c == 0 else voltage_b[t]
+            states[t, c] = s
+            states[t, 2 + c] = r
+            current[c, t] = output[0] * s + output[1] * r
+            bare = slope[0] * s + slope[1] * r
+            slope_before[c, t] = bare + slope[2] * last
+            slope_after[c, t] = bare + slope[2] * now
+            s, r = (
+                transition[0, 0] * s + transition[0, 1] * r + gain[0] * now,
+                transition[1, 0] * s + transition[1, 1] * r + gain[1] * now,
+            )
+            last = now
+        states[samples, c] = s
+        states[samples, 2 + c] = r
+    return states, current, slope_after, slope_before
