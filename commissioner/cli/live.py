@@ -55,21 +55,22 @@ class LiveView:
                 )
             case told.FirstLook(parameters=(r_s, r_r, l_s, l_m)):
                 self._line(
-                    f"    first look: R_s {r_s:.4g}, R_R {r_r:.4g} Ω, L_σ {1e3 * l_s:.4g}, L_M {1e3 * l_m:.4g} mH, "
+                    f"    so far: R_s {r_s:.4g} R_R {r_r:.4g} Ω  L_σ {1e3 * l_s:.4g} L_M {1e3 * l_m:.4g} mH, "
                     f"a leg loses {record.leg_error_v:.3g} V"
                 )
             case told.ExcitationChosen():
-                tones = ", ".join(f"{f:g} Hz {a:.3g} V" for a, f, _ in record.tones)
-                self._line(f"    {record.seconds:g} s of {tones}")
+                volts = sum(amplitude for amplitude, _, _ in record.tones)
+                tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)
+                self._line(f"    {record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
             case told.EstimateUpdated():
                 self._progress(record)
             case told.GuardActed(advice=advice, flux_fraction=fraction):
                 self._line(f"    [yellow]flux guard: {advice} at {fraction:.0%} of the limit[/]")
             case told.AxisFinished():
                 self._close()
+                state = "settled" if record.has_settled else f"not settled, {record.why}"
                 self._line(
-                    f"    {record.why}; energised {record.energised_s:.1f} s, "
-                    f"flux to {record.peak_flux_fraction:.0%} of the limit"
+                    f"    {record.energised_s:.1f} s, flux to {record.peak_flux_fraction:.0%} of the limit; {state}"
                 )
             case told.VerdictReached():
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")

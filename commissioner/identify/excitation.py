@@ -67,7 +67,7 @@ class ExcitationLimits:
 class DesignedExcitation:
     """The excitation, what it will drive through the machine it was designed for, and what it should yield.
 
-    `relative_std` is (R_s, R_R, L_sigma, L_M) for the assumed noise; it falls with the square root of the time:
+    `relative_std` is (R_s, R_R, L_sigma, L_M) for a sensor noise of `noise_a`; it falls with the square root of the time:
     `seconds_for_half` says what halving it costs.
     """
 
@@ -76,6 +76,7 @@ class DesignedExcitation:
     peak_current_a: float
     relative_std: tuple[float, float, float, float]
     seconds: float
+    noise_a: float
 
     @property
     def seconds_for_half(self) -> float:
@@ -126,7 +127,7 @@ def design(
     excitation = Excitation(tones, dc_bias_v, time_s)
     peak_flux, peak_current = predicted_peaks(estimate, replace_tones(excitation, amplitudes), sample_period_s)
     r = [float(v) for v in relative]
-    return DesignedExcitation(excitation, peak_flux, peak_current, (r[0], r[1], r[2], r[3]), time_s)
+    return DesignedExcitation(excitation, peak_flux, peak_current, (r[0], r[1], r[2], r[3]), time_s, limits.noise_a)
 
 
 def replace_tones(excitation: Excitation, amplitudes: Sequence[float] | NDArray[np.float64]) -> Excitation:

@@ -41,7 +41,9 @@ def excite(job: Job, findings: Findings) -> Step:
         yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s)
         yield from _look(job, findings)
     longest_s = max(seconds, AXIS_SECONDS * job.stretch - findings.axis_s)
-    yield from _test(job, findings, axis_deg, _design(job, findings, seconds), seconds, longest_s)
+    chosen = _design(job, findings, seconds)
+    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s)
+    findings.excitations.append(chosen)
     findings.tests_done += 1
     if findings.tests_done == len(job.plan.tests_deg):
         return Event.AXES_DONE

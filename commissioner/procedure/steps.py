@@ -12,6 +12,8 @@ from typing import Any
 
 from commissioner.errors import CheckFailed
 from commissioner.identify.analysis import Identification, identify
+from commissioner.identify.excitation import DesignedExcitation
+from commissioner.identify.longer import LongerTest, longer_test
 from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
@@ -99,6 +101,8 @@ class Findings:
     identity: DriveIdentity | None = None
     snapshot: ParameterSnapshot | None = None
     checks: tuple[CheckResult, ...] = ()
+    winding_degc: float | None = None
+    """Before the first volt; None where the drive has no sensor."""
     tests_done: int = 0
     knee: tuple[DcLevel, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
@@ -109,6 +113,8 @@ class Findings:
     estimate: InverseGamma | None = None
     is_measured: bool = False
     """All four values of `estimate` were measured on this motor, none is the plate's."""
+    excitations: list[DesignedExcitation] = field(default_factory=list)
+    """Of the tests that are done, in order; the look at an unknown motor is not among them."""
     blocks: list[tuple[int, SampleBlock]] = field(default_factory=list)
     segment: int = -1
     peak_flux_fraction: float = 0.0
@@ -124,6 +130,15 @@ class Findings:
         if self.look is not None and self.look.inverter is not None:
             return self.look.inverter
         return self.staircases[-1].inverter if self.staircases else IDEAL_INVERTER
+
+    @property
+    def longer_test(self) -> LongerTest | None:
+        """What tests of twice the length would buy; None before there is a result."""
+        found = self.identification
+        if found is None or len(found.axes) != len(self.excitations):
+            return None
+        noise_a = [axis.batch.noise_a for axis in found.axes]
+        return longer_test(found.parameters, found.std, self.excitations, noise_a)
 
     def resistance_ohm(self, job: Job) -> float:
         """The best stator resistance so far: newest look, else last staircase, else the plate's typical value."""
@@ -154,6 +169,8 @@ def check(job: Job, findings: Findings) -> Step:
         statuses.append((yield ReadStatus()))
     results = judge_drive(findings.identity, statuses, plate, job.nameplate, job.drive_limits, job.test_current_a)
     findings.checks = results
+    winding_degc = statuses[-1].winding_degc
+    findings.winding_degc = winding_degc if math.isfinite(winding_degc) else None
     yield Tell(ChecksJudged(results))
     failed = next((result for result in results if not result.has_passed), None)
     if failed is not None:
@@ -174,7 +191,7 @@ def judge(job: Job, findings: Findings) -> Step:
     """All segments together, by the same code as `identify` uses offline; then the verdict."""
     recording = assemble(findings.blocks, {}, "live run")
     assert recording is not None
-    identification = identify(recording, job.nameplate)
+    identification = identify(recording, job.nameplate, winding_temperature_degc=findings.winding_degc)
     findings.identification = identification
     verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict

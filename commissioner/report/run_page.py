@@ -117,6 +117,9 @@ def _conditions(result: Mapping[str, Any]) -> Iterator[str | Table]:
     leg = (result.get("inverter") or {}).get("leg_error_v")
     if leg:
         yield f"Each inverter leg loses {leg['value']:.3g} V to dead time and device drop; it was identified and taken off."
+    cold, winding_degc = result.get("stator_resistance_20degc_ohm"), result.get("winding_temperature_degc")
+    if cold and winding_degc is not None:
+        yield f"R_s was measured at a winding temperature of {winding_degc:.3g} °C; at 20 °C it is {cold['value']:.4g} Ω."
     circuit = result["t_model"]
     names = (("R_s", "stator_resistance_ohm", 1.0, "Ω"), ("R_r", "rotor_resistance_ohm", 1.0, "Ω"),
              ("L_ls", "stator_leakage_h", 1e3, "mH"), ("L_lr", "rotor_leakage_h", 1e3, "mH"),

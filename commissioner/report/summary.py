@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from commissioner.procedure.findings import RunEnded
@@ -31,12 +31,20 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
     if identification is not None:
         document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
         document["duration_s"] = ended.energised_s
+        document |= _more(findings, document["remarks"])
     document["flux_guard"] = {
         "peak_fraction": findings.peak_flux_fraction,
         "acted": findings.guard_acted,
         "limit_wb": findings.flux_limit_wb,
     }
     return document
+
+
+def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:
+    """The winding's temperature, and what a longer test would buy: in numbers, and as a remark."""
+    longer = findings.longer_test
+    more: dict[str, Any] = {"winding_temperature_degc": findings.winding_degc, "longer_test": longer}
+    return more | {"remarks": [*remarks, longer.sentence]} if longer else more
 
 
 def _before(findings: Findings, names: Mapping[str, str]) -> Mapping[str, float] | None:

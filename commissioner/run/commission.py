@@ -162,6 +162,8 @@ def _close(
     metadata: dict[str, float | str] = {
         key: value for key, value in dataclasses.asdict(nameplate).items() if value is not None
     }
+    if findings.winding_degc is not None:
+        metadata["winding_temperature_degc"] = findings.winding_degc
     write_recording(folder.path, metadata)
     result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names))
     folder.save("result.json", result)

@@ -1,9 +1,9 @@
 """Random cases for the flux guard: `python -m tests.campaigns.flux_guard 1000` prints overshoots and aborts.
 
 Each case: a published machine with its parameters moved (R +-30 %, leakage +-30 %, L_M -30 ... +20 %), iron that begins
-to saturate between 0.7 and 1.3 of rated flux, a DC resistance known to 1 %, an inverter known to 5 % or ideal, an
-observer that starts from the plate alone or from a wrong machine, a link of 5-100 ms, and the amplitude following the
-guard's advice.
+to saturate between 0.7 and 1.3 of rated flux, a DC resistance known to 1 %, an inverter known to 5 % or ideal, with or
+without a DC bias, an observer that starts from the plate alone, from a wrong machine, or from one measured before, a link
+of 5-100 ms, and the amplitude following the guard's advice.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ import numpy as np
 from commissioner.identify.compensation import NOTHING, Compensation
 from commissioner.identify.excitation import ExcitationLimits, design
 from commissioner.identify.flux import FluxAdvice, FluxGuard
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.observer import PRIOR_LOG_STD, ParallelObserver
 from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
+from commissioner.procedure.under_test import KNOWN_LOG_STD
 from tests.support.standstill import saturating_block, usable_motors
 
 PERIOD_S = 2e-4
@@ -74,29 +75,56 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
         known = InverterError(tuple(grid), tuple(plateau * rng.uniform(0.95, 1.05) * np.tanh(grid / knee)))
     resistance = true.stator_resistance_ohm * (1.0 + 0.01 * rng.standard_normal())
     start = replace(box.typical, stator_resistance_ohm=resistance)
-    if rng.random() < 0.5:
+    knowledge = rng.choice(["plate", "wrong", "measured"])
+    if knowledge == "measured":
+        start = InverseGamma(*(np.array(true.as_tuple()) * np.exp(0.03 * rng.standard_normal(4))))
+    if knowledge == "wrong":
         start = InverseGamma(resistance, *(np.array(start.as_tuple())[1:] * np.exp(0.4 * rng.standard_normal(3))))
     limit_wb = FLUX_FRACTION * rated_flux(plate, resistance).stator_peak_wb
     limits = ExcitationLimits(
         limit_wb, 0.9 * current_a, 0.3 * plate.rated_voltage_v, 0.005 * plate.rated_current_peak_a
     )
-    chosen = design(plate, start, limits, PERIOD_S, known, seconds)
+    bias_v = 0.0
+    if rng.random() < 0.25:  # flux of the bias: a tenth to four tenths of the limit in the machine that is known
+        bias_a = rng.uniform(0.1, 0.4) * limit_wb / (start.leakage_inductance_h + start.magnetizing_inductance_h)
+        bias_v = resistance * bias_a + float(known.on_axis(np.array([bias_a]), axis_deg)[0])
+    chosen = design(plate, start, limits, PERIOD_S, known, seconds, bias_v)
     compensation = NOTHING
     if has_inverter:
         span = 2.0 * current_a
         compensation = Compensation(known.on_axis(np.linspace(0.0, span, 1025), axis_deg), span)
-    observer = ParallelObserver(box, PERIOD_S, plate.rated_current_peak_a, start=start, compensation=compensation)
+    log_std = KNOWN_LOG_STD if knowledge == "measured" else PRIOR_LOG_STD
+    observer = ParallelObserver(
+        box, PERIOD_S, plate.rated_current_peak_a, start=start, start_log_std=log_std, compensation=compensation
+    )
     latency = rng.uniform(0.005, 0.1)
     guard = FluxGuard(limit_wb, latency, chosen.excitation, PERIOD_S, resistance, known, axis_deg, reaction_s=0.02)
+    first = min(FIRST_SCALE, guard.safe_scale)
+    if knowledge == "measured":
+        first = guard.begin_known(start, log_std, RAMP_PER_S)
     return _drive(
-        seed, motor.name, machine, plateau, knee, axis_deg, chosen.excitation, observer, guard, latency, seconds, rng
+        seed,
+        motor.name,
+        machine,
+        plateau,
+        knee,
+        axis_deg,
+        chosen.excitation,
+        observer,
+        guard,
+        latency,
+        seconds,
+        rng,
+        first,
     )
 
 
-def _drive(seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng) -> Outcome:
+def _drive(
+    seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng, first_scale
+) -> Outcome:
     block = max(50, round(0.5 * latency / PERIOD_S))
     cosines = np.array(phase_cosines(axis_deg))
-    scale, wanted = 0.0, min(FIRST_SCALE, guard.safe_scale)
+    scale, wanted = 0.0, first_scale
     pending: list[tuple[int, float]] = []
     state, peak, aborted = np.zeros(2), 0.0, False
     noise = 0.005 * observer.current_scale_a
