@@ -9,18 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.monitor import combs as comb_search
+from commissioner.monitor import feeder, periods, waveform
 from commissioner.monitor import fit as fitting
-from commissioner.monitor import inversion, periods, waveform
 from commissioner.monitor.audit import LARGEST_FREQUENCY_WANDER, Audited, Finding, inspect
-from commissioner.monitor.averaging import Comb, Lines, keep, separate
+from commissioner.monitor.averaging import Comb, Lines, separate
 from commissioner.monitor.combs import SUPPLY_ORDERS, Found
+from commissioner.monitor.estimate import band_weights, estimate, speed_lines
 from commissioner.monitor.fit import Fitted, Problem, Start
 from commissioner.monitor.periods import Periodicity, PhaseDrift, ShaftSearch
 from commissioner.monitor.proof import Proof, prove
+from commissioner.monitor.slow_slip import slip_phase
 from commissioner.monitor.supply import TurningFrame, Vector, quietest, turning_frame
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.running import TCircuit, from_nameplate, slip_at_power
+from commissioner.motor.running import from_nameplate, slip_at_power
 from commissioner.records import RunningRecording, Signal
 
 SLIP_TRUST = 0.25
@@ -110,6 +112,7 @@ def observe(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None
         reason = audited.refusal or Finding("unknown", "refused", "the audit did not finish")
         return Refused(audited, reason, audited.findings)
     frame = turning_frame(audited.current_a, audited.voltage_v, audited.supply, audited.sample_period_s)
+    frame = replace(frame, slip_phase_rad=slip_phase(frame, start.circuit))
     part = quietest(frame, wishes.segment_s)
     wander = _wander(frame, part)
     if wander.stops:
@@ -202,14 +205,14 @@ def _invert(
     assert found.shaft is not None
     shaft_speed = 2 * np.pi * found.shaft.frequency_hz
     shaft_std = 2 * np.pi * found.shaft.frequency_std_hz
-    lines = separate(frame, part, list(combs), SUPPLY_ORDERS)
-    lines, problem, fitted = _estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
+    lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
+    lines, problem, fitted = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
     if len(combs) > 1:
         bent = _with_wobble(frame, part, combs, problem, fitted, shaft_speed)
         if bent is not None:
             combs = bent
-            lines = separate(frame, part, list(combs), SUPPLY_ORDERS)
-            lines, problem, fitted = _estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
+            lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
+            lines, problem, fitted = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
     solved = waveform.solve(problem, fitted)
     period = _characteristic(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
@@ -274,51 +277,6 @@ MOST_TURNS = 6
 """A load that repeats after at most so many shaft turns is one comb with the shaft."""
 
 
-def _estimate(
-    lines: Lines, mains: int, start: Start, pairs: int, speed: float, speed_std: float
-) -> tuple[Lines, Problem, Fitted]:
-    """Fit on the orders that the speed shows and the mains harmonics; the waveform's problem leaves out the mains."""
-    trimmed = _trim(lines, mains, start.circuit, pairs)
-    fitted = fitting.fit(
-        fitting.pose(keep(trimmed, fitting.informative(trimmed, mains)), start.circuit, pairs, speed, speed_std), start
-    )
-    trimmed = _trim(lines, mains, fitted.circuit, pairs)
-    loads_only = keep(trimmed, trimmed.comb < mains)
-    return trimmed, fitting.pose(loads_only, fitted.circuit, pairs, speed, speed_std), fitted
-
-
-def _trim(lines: Lines, mains: int, circuit: TCircuit, pairs: int) -> Lines:
-    """Each comb up to its last significant order whose two side bands agree on a real speed."""
-    wanted = np.ones(lines.comb.size, dtype=np.bool_)
-    for comb in range(mains):
-        own = keep(lines, (lines.comb == comb) | (lines.comb < 0))
-        on = inversion.torus(own)
-        _, upper, lower = inversion.complex_speed(circuit, pairs, own, on)
-        _, up, low = inversion.speed_noise(circuit, pairs, own, on)
-        variance_up, variance_low = np.sum(np.abs(up) ** 2, axis=0), np.sum(np.abs(low) ** 2, axis=0)
-        weight = variance_low / (variance_up + variance_low)
-        value = weight * upper + (1 - weight) * lower
-        variance = variance_up * variance_low / (variance_up + variance_low)
-        is_real = np.abs(upper - lower) < np.abs(upper + lower) + 3 * np.sqrt(variance_up + variance_low)
-        last = _last_order(own.order[on.positive], np.abs(value) ** 2 * is_real, variance)
-        wanted &= ~((lines.comb == comb) & (np.abs(lines.order) > last))
-    return keep(lines, wanted)
-
-
-def _last_order(orders: NDArray[np.int64], power: Signal, variance: Signal) -> int:
-    """The cut with the least expected error of the acceleration: the sum of order^2 (|Omega|^2 - 4 var) is largest there.
-
-    Mallows' C_p with 4 for 2, because the cut is the best of many. At least `LEAST_ORDERS`.
-    """
-    rank = np.argsort(orders)
-    gain = np.cumsum((orders[rank] ** 2) * (power[rank] - SELECTION_PRICE * variance[rank]))
-    return max(int(orders[rank][int(np.argmax(gain))]), LEAST_ORDERS)
-
-
-LEAST_ORDERS = 4
-SELECTION_PRICE = 4.0
-
-
 def _with_wobble(
     frame: TurningFrame, part: slice, combs: tuple[Comb, ...], problem: Problem, fitted: Fitted, shaft_speed: float
 ) -> tuple[Comb, ...] | None:
@@ -326,7 +284,7 @@ def _with_wobble(
 
     delta phi = integral of the ripple of all combs that do not follow the shaft: sum 2 Re(Omega / (j rate) e^{j phase}).
     """
-    speed = fitting.speed_lines(problem, fitted, fitting.band_weights(problem, fitted))
+    speed = speed_lines(problem, fitted, band_weights(problem, fitted))
     lines, on = problem.lines, problem.on
     orders, owner, rate = lines.order[on.positive], lines.comb[on.positive], lines.rate_rad_per_s[on.positive]
     wobble = np.zeros(combs[0].phase_rad.size)
@@ -381,7 +339,7 @@ def _whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: L
     if part.start == 0 and part.stop >= frame.time_s.size:
         return speed, std
     time = frame.time_s
-    phase = ratio * frame.supply_angle_rad
+    phase = ratio * (frame.supply_angle_rad + frame.slip_phase_rad)
     blocks = int(np.clip(np.ptp(time) / 0.8, 16, 256))
     orders = sorted(set(shaft.harmonics_seen) | {1, 2}, key=lambda h: -_power(lines, h))[:3]
     demodulated = periods.demodulate(frame.current_a - _smooth(frame.current_a), time, phase, orders, blocks)

@@ -19,7 +19,8 @@ MOST_SEARCH_ORDERS = 14
 MOST_SHAFT_ORDERS = 24
 USED_FOR_REFINING = 4
 DRIFT_DEGREE = 4
-"""A slip that wanders over the segment: phase polynomial beyond a fixed ratio to the mains (or to the clock)."""
+"""A slip that wanders over the segment, as voltage and load do: phase polynomial beyond a fixed ratio to the mains (or to the
+clock), only as far as its coefficients stand out."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,8 @@ class Found:
 def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[float, ...] = ()) -> Found:
     """Shaft and load periods of the segment. Loads at rational multiples of the shaft are the shaft's own comb."""
     residual = residual_current(frame, part, [], SUPPLY_ORDERS)
-    highest = frame.band_hz * 0.95
-    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest)
+    highest, full_scale = frame.band_hz * 0.95, float(abs(frame.current_a[part].mean()))
+    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest, full_scale)
     shaft, candidates = _find_shaft(frame, part, residual, spectrum, search)
     known = [shaft] if shaft else []
     left = spectrum
@@ -49,7 +50,7 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
             for k, found in enumerate(known)
         ]
         left_current = residual_current(frame, part, combs, SUPPLY_ORDERS)
-        left = periods.pair_spectrum(left_current, frame.sample_period_s, highest)
+        left = periods.pair_spectrum(left_current, frame.sample_period_s, highest, full_scale)
         new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
         if new is None:
             break
@@ -103,13 +104,17 @@ def _strongest(spectrum: PairSpectrum, frequency_hz: float, seen: tuple[int, ...
 
 
 def comb_phase(frame: TurningFrame, part: slice, frequency_hz: float, follows: str) -> Signal:
-    """Phase of the fundamental over the segment, zero at its middle: rho theta_e for "mains", 2 pi f t for "clock"."""
+    """Phase of the fundamental over the segment, zero at its middle: 2 pi f t for "clock"; for "mains" rho (theta_e + slip's
+    wander), the wander without its mean slope, so that `frequency_hz` stays the mean frequency.
+    """
     time = frame.time_s[part]
     if follows == "clock":
         return np.asarray(2 * np.pi * frequency_hz * (time - 0.5 * (time[0] + time[-1])))
     angle = frame.supply_angle_rad[part]
     ratio = 2 * np.pi * frequency_hz / mean_supply(frame, part)
-    return np.asarray(ratio * (angle - angle[angle.size // 2]))
+    wander = frame.slip_phase_rad[part]
+    turned = angle + wander - (wander[-1] - wander[0]) * (time - time[0]) / (time[-1] - time[0])
+    return np.asarray(ratio * (turned - turned[turned.size // 2]))
 
 
 def mean_supply(frame: TurningFrame, part: slice) -> float:

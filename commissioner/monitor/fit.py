@@ -15,23 +15,17 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.inversion import SpeedLines, Torus, complex_speed, speed_noise, torus
+from commissioner.monitor.inversion import Torus, complex_speed, speed_noise, torus
+from commissioner.monitor.sidebands import BandError, band_error
 from commissioner.monitor.supply import Vector
 from commissioner.motor.running import TCircuit
-from commissioner.records import Signal
 
 NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "magnetizing_inductance_h", "leakage_inductance_h")
 PRIOR_FROM_NAMEPLATE = (0.30, 0.25, 0.20, 0.35)
 """Standard deviations of the logarithms of (R_s, R_r, L_m, L_l) around a nameplate start. 35 published circuits scatter by
 0.16, 0.02, 0.08, 0.29 around it; plates are rounded and toleranced (20 % of the slip), and motors are warm."""
-AIR_GAP_FLUX = 5e-4
-"""Share of the flux that an eccentric air gap modulates at shaft frequency (a quarter of it at twice): no torque makes it."""
 PRIOR_FROM_COMMISSIONING = (0.12, 0.15, 0.08, 0.08)
 """A warm motor has up to 40 % more resistance than a cold one, and its own saturation."""
-LINE_MODEL_ERROR = 0.015
-"""Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
-SENSOR_ASYMMETRY = 0.001
-"""Difference between the gains of three sensors: that share of the mean appears as a negative sequence."""
 MEAN_MODEL_ERROR = 1e-4
 """Of synchronous speed: mains harmonics and unbalance put this much into the mean of (14) by their squares."""
 DECADE = np.log(10.0)
@@ -48,14 +42,14 @@ class Start:
 
 @dataclass(frozen=True)
 class Problem:
-    """The fit's data. `mean_speed_std` is the spectrum's; infinite where no shaft line was found."""
+    """The fit's data. `mean_speed_std` is the spectrum's; infinite where no shaft line was found. Errors: see `sidebands`."""
 
     lines: Lines
     on: Torus
     pole_pairs: int
     mean_speed_rad_per_s: float
     mean_speed_std: float
-    model_error: Signal
+    band_error: BandError
 
 
 @dataclass(frozen=True)
@@ -75,20 +69,10 @@ class Fitted:
 
 
 def pose(lines: Lines, start: TCircuit, pole_pairs: int, mean_speed_rad_per_s: float, mean_speed_std: float) -> Problem:
-    """The problem with its model error, which is a share of each line's voltages and leakage drops at the start values."""
+    """The problem, with the errors of its side bands at the start values."""
     on = torus(lines)
-    leakage = start.stator_leakage_h + start.rotor_leakage_h
-    drop = np.abs(lines.voltage_v) + leakage * np.abs(lines.rate_rad_per_s * lines.current_a)
-    error = LINE_MODEL_ERROR * (drop[on.positive] + drop[on.partner])
-    twice = np.abs(lines.rate_rad_per_s[on.positive] / lines.supply_rad_per_s - 2.0) < 1e-6
-    error = error + np.where(twice, SENSOR_ASYMMETRY * drop[0], 0.0)
-    flux = np.abs(lines.voltage_v[0]) / lines.supply_rad_per_s
-    turns = lines.rate_rad_per_s[on.positive] / mean_speed_rad_per_s
-    gap = np.where(
-        (np.abs(turns - 1) < 1e-3) | (np.abs(turns - 2) < 1e-3), AIR_GAP_FLUX * mean_speed_rad_per_s / turns, 0.0
-    )
-    own = (0.5 * error / flux + gap) / pole_pairs
-    return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, own)
+    error = band_error(start, pole_pairs, lines, on, mean_speed_rad_per_s)
+    return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, error)
 
 
 def informative(lines: Lines, mains: int) -> NDArray[np.bool_]:
@@ -130,33 +114,6 @@ def fit(problem: Problem, start: Start) -> Fitted:
     )
 
 
-def speed_lines(problem: Problem, fitted: Fitted, weight: Signal) -> SpeedLines:
-    """Each harmonic from its two side bands, `weight` of it from the upper one."""
-    mean, upper, lower = complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
-    value = problem.mean_speed_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
-    return SpeedLines(value, weight * upper + (1 - weight) * lower)
-
-
-def shrinkage(problem: Problem, fitted: Fitted, weight: Signal) -> Signal:
-    """Factor of each harmonic, max(0, 1 - var / |Omega|^2) (positive-part James-Stein): what is noise is not drawn."""
-    amplitude = speed_lines(problem, fitted, weight).amplitude_rad_per_s
-    _, noise_up, noise_low = speed_noise(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
-    variance = np.sum(np.abs(weight * noise_up + (1 - weight) * noise_low) ** 2, axis=0)
-    return np.asarray(np.maximum(0.0, 1 - variance / np.maximum(np.abs(amplitude) ** 2, 1e-300)))
-
-
-def band_weights(problem: Problem, fitted: Fitted) -> Signal:
-    """Share of the upper side band in each harmonic, `(m,)`."""
-    _, noise_up, noise_low = speed_noise(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
-    up, low = np.sum(np.abs(noise_up) ** 2, axis=0), np.sum(np.abs(noise_low) ** 2, axis=0)
-    _, upper, lower = complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
-    for step in steps(fitted):
-        _, moved_up, moved_low = complex_speed(circuit_at(fitted, step), problem.pole_pairs, problem.lines, problem.on)
-        up = up + np.abs(moved_up - upper) ** 2
-        low = low + np.abs(moved_low - lower) ** 2
-    return np.asarray(low / np.maximum(up + low, 1e-300))
-
-
 def steps(fitted: Fitted) -> NDArray[np.float64]:
     """Four moves of the logarithms whose outer products sum to their covariance."""
     values, vectors = np.linalg.eigh(fitted.log_covariance)
@@ -193,7 +150,13 @@ def _misfit(problem: Problem, circuit: TCircuit) -> Vector:
     synchronous = problem.lines.supply_rad_per_s / problem.pole_pairs
     own = np.hypot(np.sqrt(0.5 * np.sum(np.abs(noise_mean) ** 2)), MEAN_MODEL_ERROR * synchronous)
     difference = 0.5 * (upper - lower)
-    variance = 0.25 * np.sum(np.abs(noise_up - noise_low) ** 2, axis=0) + problem.model_error**2
+    gap_up, gap_low = problem.band_error.gap_upper, problem.band_error.gap_lower
+    variance = 0.25 * (
+        np.sum(np.abs(noise_up - noise_low) ** 2, axis=0)
+        + np.sum(np.abs(gap_up - gap_low) ** 2, axis=0)
+        + problem.band_error.upper**2
+        + problem.band_error.lower**2
+    )
     known = np.hypot(own, problem.mean_speed_std)
     real = (mean.real - problem.mean_speed_rad_per_s) / known if np.isfinite(known) else 0.0
     return np.concatenate([[mean.imag / own, real], difference / np.sqrt(0.5 * variance)]).astype(np.complex128)

@@ -105,17 +105,24 @@ def complex_speed(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus) -
     return complex(amplitude[0]), amplitude[on.positive], np.conj(amplitude[on.partner])
 
 
-def speed_noise(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus) -> tuple[Vector, Vector, Vector]:
-    """What each block's residual does to (mean, upper, conj lower), first order: `(blocks,)`, `(blocks, m)` twice.
+def moved_speed(
+    circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, current_change_a: Vector, voltage_change_v: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """What small changes `(b, k)` of the lines do to (mean, upper, conj lower), first order: `(b,)`, `(b, m)` twice.
 
     delta omega = (delta slip voltage - j q delta lambda_r) / (j Lambda_0 p) with q the mean slip frequency.
     """
     rate, supply = lines.rate_rad_per_s, lines.supply_rad_per_s
     mean = flux_lines(circuit, lines.current_a[:1], lines.voltage_v[:1], rate[:1], supply)
     slip_frequency = mean.slip_voltage_v / (1j * mean.rotor_flux_wb)
-    flux = flux_lines(circuit, lines.current_influence, lines.voltage_influence, rate, supply)
+    flux = flux_lines(circuit, current_change_a, voltage_change_v, rate, supply)
     moved = (flux.slip_voltage_v - 1j * slip_frequency * flux.rotor_flux_wb) / (1j * mean.rotor_flux_wb * pole_pairs)
     return moved[:, 0], moved[:, on.positive], np.conj(moved[:, on.partner])
+
+
+def speed_noise(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus) -> tuple[Vector, Vector, Vector]:
+    """`moved_speed` of each block's residual."""
+    return moved_speed(circuit, pole_pairs, lines, on, lines.current_influence, lines.voltage_influence)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ VISIBLE = 9.0
 """Enough where the frequency is already known to a cell: P = 3e-7."""
 CAP = 40.0
 """One line cannot outvote the operating point by more than this."""
+DYNAMIC_RANGE = 1e-5
+"""Below 100 dB no sensor is linear, so without noise the floor is not zero."""
 DEMODULATION_BLOCKS = 64
 LOWEST_LOAD_HZ = 0.8
 HIGHEST_LOAD_HZ = 220.0
@@ -64,8 +66,10 @@ class Periodicity:
     drift: PhaseDrift | None = None
 
 
-def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float) -> PairSpectrum:
-    """Hann-windowed, four times zero-padded spectrum of the pairs, over a running median as floor."""
+def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float, full_scale_a: float = 0.0) -> PairSpectrum:
+    """Hann-windowed, four times zero-padded spectrum of the pairs, over a running median as floor (at least
+    `DYNAMIC_RANGE` of `full_scale_a`).
+    """
     count = vector.size
     window = np.hanning(count + 2)[1:-1]
     padded = fft.next_fast_len(4 * count)
@@ -76,7 +80,7 @@ def pair_spectrum(vector: Vector, sample_period_s: float, highest_hz: float) -> 
     lower = np.conj(spectrum[-np.arange(points + 1)])
     raw = np.abs(upper) ** 2 + np.abs(lower) ** 2
     cell = 1.5 / (count * sample_period_s)
-    floor = _floor(raw, cell / step)
+    floor = np.maximum(_floor(raw, cell / step), (DYNAMIC_RANGE * full_scale_a) ** 2)
     return PairSpectrum(np.arange(points + 1) * step, raw / floor, floor, upper, lower, cell)
 
 

@@ -56,6 +56,7 @@ class TurningFrame:
     """Currents and voltages in the supply's frame, `(n,)` complex, low-passed and resampled to `sample_period_s`.
 
     `start_angle_rad` was added to the frame so that the mean current lies at 45 degrees: i_d and i_q keep their sign.
+    `slip_phase_rad` is how far the rotor has moved away from a constant slip, in electrical radians.
     """
 
     time_s: Signal
@@ -66,6 +67,7 @@ class TurningFrame:
     sample_period_s: float
     band_hz: float
     start_angle_rad: float
+    slip_phase_rad: Signal
 
 
 def space_vector(u: Signal, v: Signal, w: Signal) -> Vector:
@@ -160,6 +162,7 @@ def turning_frame(current: Vector, voltage: Vector, supply: SupplyAngle, sample_
         period,
         band,
         start,
+        np.zeros(slow_time.size),
     )
 
 

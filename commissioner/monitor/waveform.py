@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.fit import Fitted, Problem, band_weights, circuit_at, shrinkage, speed_lines, steps
+from commissioner.monitor.estimate import band_weights, shrinkage, speed_lines
+from commissioner.monitor.fit import Fitted, Problem, circuit_at, steps
 from commissioner.monitor.inversion import (
     RotorState,
     SpeedLines,
@@ -50,7 +51,7 @@ class Solved:
     speed: SpeedLines
     state: RotorState
     raw: SpeedLines
-    weight: Signal
+    weight: Vector
     changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
     """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
 
@@ -65,7 +66,7 @@ def solve(problem: Problem, fitted: Fitted) -> Solved:
     changes = [
         *_noise_changes(problem, fitted, speed, state, weight),
         *_parameter_changes(problem, fitted, speed, weight),
-        *_model_changes(problem, fitted, speed, state),
+        *_model_changes(problem, fitted, speed, state, weight),
     ]
     if np.isfinite(problem.mean_speed_std):
         moved = SpeedLines(speed.mean_rad_per_s + problem.mean_speed_std, speed.amplitude_rad_per_s)
@@ -74,8 +75,9 @@ def solve(problem: Problem, fitted: Fitted) -> Solved:
 
 
 def _noise_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Signal
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    """Each block's residual, in speed, flux and current together."""
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     circuit = fitted.circuit
     _, noise_up, noise_low = speed_noise(circuit, pairs, lines, on)
@@ -94,21 +96,26 @@ def _noise_changes(
 
 
 def _model_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
-    """Each harmonic moved by its model error, real and imaginary part in turn."""
-    changes = []
-    for k, error in enumerate(problem.model_error):
-        for direction in (1.0, 1j):
-            amplitude = speed.amplitude_rad_per_s.copy()
-            amplitude[k] += direction * error / np.sqrt(2.0)
-            moved = SpeedLines(speed.mean_rad_per_s, amplitude)
-            changes.append((fitted.circuit, moved, state.flux_wb, problem.lines.current_a))
-    return changes
+    """Each harmonic moved by its circuit error, real and imaginary part in turn, and all by each air-gap mode."""
+    error = problem.band_error
+    own = np.hypot(np.abs(weight) * error.upper, np.abs(1 - weight) * error.lower) / np.sqrt(2.0)
+    alone = np.diag(own).astype(np.complex128)
+    gap = weight * error.gap_upper + (1 - weight) * error.gap_lower
+    return [
+        (
+            fitted.circuit,
+            SpeedLines(speed.mean_rad_per_s, speed.amplitude_rad_per_s + move),
+            state.flux_wb,
+            problem.lines.current_a,
+        )
+        for move in (*alone, *(1j * alone), *gap[np.any(gap != 0, axis=1)])
+    ]
 
 
 def _parameter_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Signal
+    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Vector
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)

@@ -14,9 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import decimate
 
-from commissioner.monitor.chain import Observation, Refused, observe
+from commissioner.monitor.chain import Observation, Refused, Wishes, observe
+from commissioner.monitor.fit import Start
 from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import TCircuit
 from commissioner.records import RunningRecording
 from sim.running import Played
 from sim.running_recording import CURRENTS, LINES, NAMEPLATE, PHASES, record, run
@@ -24,6 +27,13 @@ from sim.running_recording import CURRENTS, LINES, NAMEPLATE, PHASES, record, ru
 MOTORS = Path(__file__).parents[1] / "data" / "motors" / "motors.csv"
 KINDS = ("compressor", "leak", "imbalance", "pump", "brake", "gear", "both")
 MULTI = ("brake", "gear", "both")
+CIRCUIT = (
+    "stator_resistance_ohm",
+    "rotor_resistance_ohm",
+    "stator_leakage_h",
+    "rotor_leakage_h",
+    "magnetizing_inductance_h",
+)
 
 
 def machines() -> list[dict[str, str]]:
@@ -210,9 +220,9 @@ def _periodic(
     true: np.ndarray, time_s: np.ndarray, angle: np.ndarray, truth: dict[str, Any], seen: Observation
 ) -> np.ndarray:
     """The load-periodic part of a true signal at the estimate's instants."""
-    step = 8
-    sampled = _decimated(true, step)
-    t, a = time_s[step // 2 :: step][: sampled.size], angle[step // 2 :: step][: sampled.size]
+    step = 4
+    sampled = decimate(true, step, ftype="fir")
+    t, a = time_s[::step], angle[::step]
     shaft = truth["mean_speed_rad_per_s"] / (2 * np.pi)
     phases, outputs = [a], [np.interp(seen.period.time_s, time_s, angle)]
     for one in truth["loads"]:
@@ -229,19 +239,15 @@ def _periodic(
         + [f(h * p)[:, None] for p in phases for h in range(1, orders + 1) for f in (np.cos, np.sin)],
         axis=1,
     )
-    window = np.hanning(t.size)[:, None]
-    lines = np.linalg.lstsq(matrix * window, sampled * window[:, 0], rcond=1e-8)[0]
+    weighted = matrix * np.hanning(t.size)[:, None]
+    gram = weighted.T @ matrix
+    lines = np.linalg.solve(gram + 1e-10 * gram[0, 0] * np.eye(gram.shape[0]), weighted.T @ sampled)
     target = np.concatenate(
         [np.ones((seen.period.time_s.size, 1))]
         + [f(h * p)[:, None] for p in outputs for h in range(1, orders + 1) for f in (np.cos, np.sin)],
         axis=1,
     )
     return np.asarray(target @ lines)
-
-
-def _decimated(values: np.ndarray, step: int) -> np.ndarray:
-    count = values.size // step
-    return np.asarray(values[: count * step].reshape(count, step).mean(axis=1))
 
 
 def periods_found(seen: Observation, truth: dict[str, Any]) -> bool:
@@ -262,27 +268,39 @@ def accuracy(count: int, first: int = 0) -> list[dict[str, Any]]:
         seen, truth = play(scenario, seed)
         row: dict[str, Any] = {"seed": seed, "kind": kind, "refused": isinstance(seen, Refused)}
         if isinstance(seen, Observation):
-            row |= score(seen, run(scenario, seed)[0], truth) | {"found": periods_found(seen, truth)}
+            played = run(scenario, seed)[0]
+            row |= score(seen, played, truth) | {"found": periods_found(seen, truth)}
+            row |= {f"{key}_known": value for key, value in _bound(scenario, seed, played).items()}
         row["seconds"] = time.process_time() - started
         rows.append(row)
         print({k: round(v, 4) if isinstance(v, float) else v for k, v in row.items()}, flush=True)
     return rows
 
 
+def _bound(scenario: dict[str, Any], seed: int, played: Played) -> dict[str, float]:
+    """Ripple and load errors of the same chain that starts from the true circuit and must stay there."""
+    columns, metadata, truth = record(scenario, seed)
+    machine = truth["machine"]
+    start = Start(TCircuit(*(machine[key] for key in CIRCUIT)), (1e-6,) * 4, "answer key")
+    seen = observe(as_recording(columns, metadata), as_plate(metadata), Wishes(start=start))
+    errors = score(seen, played, truth) if isinstance(seen, Observation) else {}
+    return {key: errors.get(key, float("nan")) for key in ("ripple", "load")}
+
+
 def summary(rows: list[dict[str, Any]]) -> str:
     lines = [
-        f"{'kind':<11} {'n':>4} {'found':>6} | {'speed % med/max':>18} {'ripple % med/p95':>18} {'load % med/p95':>18} {'torque %':>9}"
+        "errors in %: median / 95th percentile (mean speed: / largest); `known`: the same chain with the true circuit",
+        f"{'kind':<11} {'n':>4} {'found':>6} | {'speed':>16} {'torque':>12} | {'ripple':>12} {'known':>12} | {'load':>12} {'known':>12}",
     ]
     for kind in (*KINDS, "all"):
         own = [r for r in rows if (kind in (r["kind"], "all")) and not r["refused"]]
-        if not own:
-            continue
-        speed, ripple, load, torque = (np.abs([r[k] for r in own]) for k in ("speed", "ripple", "load", "torque"))
-        lines.append(
-            f"{kind:<11} {len(own):>4} {sum(r['found'] for r in own):>6} | {np.median(speed):>9.4f}/{speed.max():<8.4f} "
-            f"{np.median(ripple):>9.2f}/{np.percentile(ripple, 95):<8.2f} {np.median(load):>9.2f}/{np.percentile(load, 95):<8.2f} "
-            f"{np.median(torque):>8.2f}"
-        )
+        if own:
+            speed = np.abs([r["speed"] for r in own])
+            rest = [_spread(own, key) for key in ("torque", "ripple", "ripple_known", "load", "load_known")]
+            lines.append(
+                f"{kind:<11} {len(own):>4} {sum(r['found'] for r in own):>6} | {np.median(speed):>7.4f} /{speed.max():>7.4f} "
+                f"{rest[0]} | {rest[1]} {rest[2]} | {rest[3]} {rest[4]}"
+            )
     return "\n".join(
         [
             *lines,
@@ -290,6 +308,11 @@ def summary(rows: list[dict[str, Any]]) -> str:
             f"periods missed: {[r['seed'] for r in rows if not r['refused'] and not r['found']]}",
         ]
     )
+
+
+def _spread(rows: list[dict[str, Any]], key: str) -> str:
+    values = np.abs([r[key] for r in rows])
+    return f"{np.nanmedian(values):>5.2f} /{np.nanpercentile(values, 95):>5.2f}"
 
 
 def main() -> int:

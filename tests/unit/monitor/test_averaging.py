@@ -26,7 +26,15 @@ def waveform(turns: np.ndarray) -> np.ndarray:
 def frame_of(current: np.ndarray, time: np.ndarray, supply_hz: float = 50.0) -> TurningFrame:
     angle = 2 * np.pi * supply_hz * time
     return TurningFrame(
-        time, current, 0 * current + 300, angle, np.full(time.size, 2 * np.pi * supply_hz), PERIOD_S, 700.0, 0.0
+        time,
+        current,
+        0 * current + 300,
+        angle,
+        np.full(time.size, 2 * np.pi * supply_hz),
+        PERIOD_S,
+        700.0,
+        0.0,
+        0 * time,
     )
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.fit import PRIOR_FROM_NAMEPLATE, Start, band_weights, fit, pose, speed_lines
+from commissioner.monitor.estimate import band_weights, speed_lines
+from commissioner.monitor.fit import PRIOR_FROM_NAMEPLATE, Start, fit, pose
 from commissioner.monitor.inversion import SpeedLines, complex_speed, rotor_state, torque_of, torus
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import (

@@ -1,0 +1,80 @@
+"""One speed from two side bands: what may be wrong with each, and the weights of least variance.
+
+A true speed has upper = conj(lower). Noise and the circuit's own errors hit the two independently; an eccentric air gap, which
+modulates the flux in size, hits them with opposite sign, a speed with equal sign. Generalised least squares with
+these covariances takes the gap's share out as far as the noise allows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.monitor.averaging import Lines
+from commissioner.monitor.inversion import Torus, moved_speed
+from commissioner.monitor.supply import Vector
+from commissioner.motor.running import TCircuit
+from commissioner.records import Signal
+
+AIR_GAP_FLUX = {1: 1e-3, 2: 1e-4}
+"""Amplitude of the flux, as share of the main flux, that an eccentric gap modulates once and twice per turn (standard
+deviation): mixed eccentricity shows 50 dB below the current's fundamental. No torque makes it."""
+LINE_MODEL_ERROR = 0.015
+"""Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
+SENSOR_ASYMMETRY = 0.001
+"""Difference between the gains of three sensors: that share of the mean appears as a negative sequence."""
+
+
+@dataclass(frozen=True)
+class BandError:
+    """Speed errors in rad/s of each order: `upper`, `lower` `(m,)` independent standard deviations; `gap_*` `(modes, m)` the
+    effect of one-sigma air-gap modulations, each mode's real and imaginary part in turn.
+    """
+
+    upper: Signal
+    lower: Signal
+    gap_upper: Vector
+    gap_lower: Vector
+
+
+def band_error(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, mean_speed_rad_per_s: float) -> BandError:
+    """The errors of all orders at the given circuit, first order."""
+    stator_rate = np.abs(lines.rate_rad_per_s + lines.supply_rad_per_s)
+    leak = circuit.stator_leakage_h * stator_rate + circuit.rotor_leakage_h * np.abs(lines.rate_rad_per_s)
+    drop = np.abs(lines.voltage_v) + leak * np.abs(lines.current_a)
+    wrong = LINE_MODEL_ERROR * drop
+    twice = np.abs(np.abs(lines.rate_rad_per_s / lines.supply_rad_per_s) - 2.0) < 1e-6
+    wrong = np.where(twice, np.hypot(wrong, SENSOR_ASYMMETRY * drop[0]), wrong).astype(np.complex128)
+    still = np.zeros((1, lines.order.size), dtype=np.complex128)
+    _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, still, wrong[None, :])
+    gap = _gap_voltages(circuit, lines, mean_speed_rad_per_s)
+    _, gap_upper, gap_lower = moved_speed(circuit, pole_pairs, lines, on, np.zeros_like(gap), gap)
+    return BandError(np.abs(upper[0]), np.abs(lower[0]), gap_upper, gap_lower)
+
+
+def _gap_voltages(circuit: TCircuit, lines: Lines, mean_speed_rad_per_s: float) -> Vector:
+    """`(modes, k)`: d/dt of g(t) psi_m in the turning frame for g = 2 Re(G e^{j h angle}), G = half the amplitude."""
+    stator = lines.voltage_v[0] - circuit.stator_resistance_ohm * lines.current_a[0]
+    main = stator / (1j * lines.supply_rad_per_s) - circuit.stator_leakage_h * lines.current_a[0]
+    turns = lines.rate_rad_per_s / mean_speed_rad_per_s
+    rows = []
+    for per_turn, amplitude in AIR_GAP_FLUX.items():
+        for direction in (1.0, 1j):
+            half = 0.5 * amplitude * direction / np.sqrt(2.0)
+            row = np.where(np.abs(turns - per_turn) < 1e-3, half, 0) + np.where(
+                np.abs(turns + per_turn) < 1e-3, np.conj(half), 0
+            )
+            rows.append(1j * (lines.rate_rad_per_s + lines.supply_rad_per_s) * main * row)
+    return np.array(rows, dtype=np.complex128)
+
+
+def least_variance_weight(upper: Signal, lower: Signal, moved_upper: Vector, moved_lower: Vector) -> Vector:
+    """The upper band's weight w, the lower one's being 1 - w: w = (d - conj b) / (a + d - 2 Re b).
+
+    `upper`, `lower`: independent variances `(m,)`; `moved_*` `(modes, m)`: common causes. C = [[a, b], [conj b, d]].
+    """
+    a = upper + np.sum(np.abs(moved_upper) ** 2, axis=0)
+    d = lower + np.sum(np.abs(moved_lower) ** 2, axis=0)
+    b = np.sum(moved_upper * np.conj(moved_lower), axis=0)
+    return np.asarray((d - np.conj(b)) / np.maximum(a + d - 2 * b.real, 1e-300), dtype=np.complex128)
