@@ -320,13 +320,14 @@ def main() -> int:
     parser.add_argument("what", choices=("accuracy", "healthy", "leaks"))
     parser.add_argument("count", type=int, nargs="?", default=70)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=12.0, help="length of the healthy recordings")
     options = parser.parse_args()
     if options.what == "accuracy":
         print(summary(accuracy(options.count, options.first)))
     else:
         from tests.campaigns.monitor_trend import healthy, leaks
 
-        print(healthy(options.count) if options.what == "healthy" else leaks(options.count))
+        print(healthy(options.count, options.seconds) if options.what == "healthy" else leaks(options.count))
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import sys
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,8 @@ def false_alarms(
     past = History(tuple(healthy_entry(first + k, duration_s) for k in range(learned)))
     alarms, closest = 0, 0.0
     for k in range(count):
+        if k and k % 50 == 0:
+            print(f"{k} judged, {alarms} alarms, closest {closest:.0%} of its threshold", file=sys.stderr, flush=True)
         verdict = judge(healthy_entry(first + learned + k, duration_s), past)
         assert verdict.state is not State.TOO_FEW
         alarms += verdict.state is State.ALARM
@@ -76,6 +79,6 @@ def false_alarms(
     return alarms, closest
 
 
-def healthy(count: int) -> str:
-    alarms, closest = false_alarms(count)
-    return f"{alarms} alarms in {count} healthy recordings; the closest came to {closest:.0%} of its threshold"
+def healthy(count: int, duration_s: float) -> str:
+    alarms, closest = false_alarms(count, duration_s=duration_s)
+    return f"{alarms} alarms in {count} healthy recordings of {duration_s:g} s; the closest came to {closest:.0%} of its threshold"

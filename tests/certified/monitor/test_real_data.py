@@ -14,7 +14,8 @@ from commissioner.monitor.periods import pair_spectrum
 from commissioner.monitor.supply import dominant_frequency_hz, space_vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_power
-from commissioner.recordings.importers import matlab_vectors, read_running
+from commissioner.recordings.importers import read_running
+from commissioner.recordings.matlab import vectors
 from tests.support.running import refused_in
 
 DATA = Path(__file__).parents[2] / "data"
@@ -50,10 +51,10 @@ def test_lias_excerpt_of_two_turns_is_refused_as_too_short() -> None:
 
 def unbalances() -> dict[str, list[float]]:
     """|I-|/|I+| of all 65 records, by class, in the order of the repetitions."""
-    vectors = matlab_vectors(DATA / "itsc_baldor" / "Data_ITSC.mat")
+    read = vectors(DATA / "itsc_baldor" / "Data_ITSC.mat")
     out: dict[str, list[float]] = {}
-    for name in sorted(key[:-2] for key in vectors if key.endswith(".0")):
-        current = space_vector(*(vectors[f"{name}.{k}"] for k in range(3)))
+    for name in sorted(key[:-2] for key in read if key.endswith(".0")):
+        current = space_vector(*(read[f"{name}.{k}"] for k in range(3)))
         frequency = dominant_frequency_hz(current, 1e-3)
         angle = 2 * np.pi * frequency * np.arange(current.size) * 1e-3
         out.setdefault(name.split(".")[1].removeprefix("ITSC_"), []).append(negative_sequence_ratio(current, angle))
