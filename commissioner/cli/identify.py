@@ -74,6 +74,7 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
                 remedy="identify the files one by one",
             )
     has_w = all(r.current_w_a is not None for r in recordings)
+    has_link = all(r.dc_link_v is not None for r in recordings)
     time, segment, time_offset, segment_offset = [], [], 0.0, 0
     for r in recordings:
         time.append(r.time_s - r.time_s[0] + time_offset)
@@ -88,7 +89,7 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
         current_u_a=np.concatenate([r.current_u_a for r in recordings]),
         current_v_a=np.concatenate([r.current_v_a for r in recordings]),
         current_w_a=np.concatenate([r.current_w_a for r in recordings if r.current_w_a is not None]) if has_w else None,
-        dc_link_v=None,
+        dc_link_v=np.concatenate([r.dc_link_v for r in recordings if r.dc_link_v is not None]) if has_link else None,
         sample_period_s=first.sample_period_s,
         metadata=first.metadata,
         source=", ".join(r.source for r in recordings),

@@ -18,11 +18,17 @@ from commissioner.records import Signal, StandstillRecording
 STEP = "audit the recording"
 SHORTEST_S = 0.5
 LARGEST_CROSS_CURRENT = 0.25
+REST_S = 20.0
+"""After a pause this long no rotor holds flux any more; after a shorter one the cage may still carry what the current
+left behind."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Consecutive samples of one segment on one axis without a hole. `kind`: staircase | multitone | biased | zero."""
+    """Consecutive samples of one segment on one axis without a hole. `kind`: staircase | multitone | biased | zero.
+
+    `link_ratio` is the DC link's voltage over its median, where it was recorded sample by sample.
+    """
 
     segment: int
     axis_deg: float
@@ -33,6 +39,7 @@ class Stretch:
     starts_at_rest: bool
     lost_before: int
     start_s: float
+    link_ratio: Signal | None = None
 
     @property
     def is_excited(self) -> bool:
@@ -159,11 +166,12 @@ def _cut(recording: StandstillRecording) -> list[Stretch]:
     for a, b in zip(starts, ends, strict=True):
         begins = a == 0 or bool(new_segment[a - 1])
         lost = 0 if begins else round(float(steps[a - 1]) / recording.sample_period_s) - 1
-        out.append(_stretch(recording, a, int(b), begins, lost))
+        rested = begins and (a == 0 or float(steps[a - 1]) > REST_S)
+        out.append(_stretch(recording, a, int(b), rested, lost))
     return out
 
 
-def _stretch(recording: StandstillRecording, a: int, b: int, begins: bool, lost: int) -> Stretch:
+def _stretch(recording: StandstillRecording, a: int, b: int, rested: bool, lost: int) -> Stretch:
     axis = float(recording.axis_deg[a])
     w = None if recording.current_w_a is None else recording.current_w_a[a:b]
     phases = recording.current_u_a[a:b], recording.current_v_a[a:b], w
@@ -176,13 +184,23 @@ def _stretch(recording: StandstillRecording, a: int, b: int, begins: bool, lost:
         current_a=current,
         cross_a=orthogonal_current_a(*phases, axis),
         kind=_kind(voltage, recording.voltage_axis_v),
-        starts_at_rest=begins and _is_still(current, voltage),
+        starts_at_rest=rested and _is_still(current),
         lost_before=lost,
         start_s=float(recording.time_s[a]),
+        link_ratio=_link_ratio(recording.dc_link_v, a, b),
     )
 
 
-def _is_still(current: Signal, voltage: Signal) -> bool:
+def _link_ratio(dc_link_v: Signal | None, a: int, b: int) -> Signal | None:
+    if dc_link_v is None or not np.all(np.isfinite(dc_link_v)):
+        return None
+    median = float(np.median(dc_link_v))
+    if median <= 0.0 or np.ptp(dc_link_v[a:b]) <= 0.0:
+        return None
+    return np.asarray(dc_link_v[a:b] / median)
+
+
+def _is_still(current: Signal) -> bool:
     """Current near zero where a segment begins: its first samples are small beside the stretch."""
     head = np.abs(current[:2])
     return bool(head.size and np.max(head) < 0.1 * max(float(np.max(np.abs(current))), 1e-12))

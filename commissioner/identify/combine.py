@@ -65,8 +65,12 @@ class Combined:
     remarks: tuple[str, ...]
 
 
-def combine(axes: Sequence[AxisEstimate]) -> Combined:
-    """The motor's parameters from one or more axes (ValueError for none)."""
+def combine(axes: Sequence[AxisEstimate], common: Matrix | None = None) -> Combined:
+    """The motor's parameters from one or more axes (ValueError for none).
+
+    `common` (4, 4) is the part of the axes' covariances that all of them share, such as one inverter's: no number of
+    axes averages it out.
+    """
     logs = np.array([np.log(a.parameters.as_tuple()) for a in axes])
     covariances = [_log_covariance(a) for a in axes]
     weights = [np.linalg.inv(c) for c in covariances]
@@ -78,6 +82,8 @@ def combine(axes: Sequence[AxisEstimate]) -> Combined:
     widen = std / np.sqrt(np.diag(bound))
     values = np.exp(mean)
     covariance = bound * np.outer(widen, widen) * np.outer(values, values)
+    if common is not None:
+        covariance = covariance + (1.0 - 1.0 / len(axes)) * common
     findings = _explain(axes, logs, covariances) if len(axes) >= 3 else ()
     a, b, c, d = map(float, values)
     s = [float(x) for x in spread]

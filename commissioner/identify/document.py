@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from commissioner.identify.analysis import AxisResult, inverter_json
+from commissioner.identify.axis import AxisResult
+from commissioner.identify.resistance import InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma, Quantity
 
 if TYPE_CHECKING:
@@ -103,3 +105,20 @@ def _axis(axis: AxisResult) -> dict[str, object]:
         "delay_s": quantity(axis.batch.delay),
         "energised_s": axis.energised_s,
     }
+
+
+def inverter_json(inverter: InverterError | None, staircase: Staircase | None) -> Mapping[str, object]:
+    """The inverter's part of the document."""
+    if inverter is None:
+        return {"identified": False}
+    out: dict[str, object] = {
+        "identified": True,
+        "leg_error_v": {"value": inverter.plateau_v, "std": inverter.std_v[-1] if inverter.std_v else None},
+        "knee_a": inverter.knee_a,
+        "leg_current_a": list(inverter.current_a),
+        "leg_voltage_v": list(inverter.voltage_v),
+    }
+    if staircase is not None:
+        r = staircase.stator_resistance
+        out["staircase_resistance_ohm"] = {"value": r.value, "std": r.std}
+    return out

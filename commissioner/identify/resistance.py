@@ -8,6 +8,7 @@ stays constant beyond; a device's slope resistance cannot be told from R_s and i
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -77,6 +78,21 @@ class DcLevel:
     current_a: float
     std_a: float
     rise_a_per_s: float = 0.0
+
+
+def dc_levels(voltage_v: Signal, current_a: Signal, tail: float = 0.4) -> list[DcLevel]:
+    """Means over the last `tail` of every stretch of constant voltage that is long enough to settle."""
+    top = float(np.max(np.abs(voltage_v)))
+    edges = np.flatnonzero(np.abs(np.diff(voltage_v)) > 1e-6 * top) + 1
+    bounds = [0, *edges.tolist(), voltage_v.size]
+    longest = max(b - a for a, b in itertools.pairwise(bounds))
+    levels = []
+    for a, b in itertools.pairwise(bounds):
+        if b - a < max(0.3 * longest, 20) or abs(voltage_v[a]) < 1e-6 * top:
+            continue
+        part = current_a[b - int(tail * (b - a)) : b]
+        levels.append(DcLevel(float(voltage_v[a]), float(np.mean(part)), float(np.std(part) / math.sqrt(part.size))))
+    return levels
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ from scipy.linalg import expm
 from scipy.optimize import fmin
 from scipy.signal import lfilter
 
-from commissioner.identify.batch import Segment, cramer_rao, fit_segments
+from commissioner.identify.batch import Segment
+from commissioner.identify.bound import cramer_rao
+from commissioner.identify.fit import fit_segments
 from commissioner.identify.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from commissioner.identify.batch import Segment, fit_segments
+from commissioner.identify.batch import Segment
+from commissioner.identify.fit import fit_segments
 from commissioner.identify.observer import ParallelObserver
 from commissioner.motor.nameplate import prior
 from tests.support.standstill import linear_current, multitone, usable_motors

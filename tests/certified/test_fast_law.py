@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.batch import cramer_rao
+from commissioner.identify.bound import cramer_rao
 from commissioner.identify.excitation import ExcitationLimits, first_guess
 from commissioner.identify.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma

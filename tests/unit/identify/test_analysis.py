@@ -126,7 +126,7 @@ def test_default_drive_recording_from_the_simulator_meets_the_issues_target():
             columns["current_u_a"],
             columns["current_v_a"],
             columns.get("current_w_a"),
-            None,
+            columns["dc_link_v"],
             float(metadata["sample_period_s"]),
             metadata,
         )

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.batch import ModelChoice, Segment, cramer_rao, fit_segments, start_theta
+from commissioner.identify.batch import Segment
+from commissioner.identify.bound import cramer_rao
+from commissioner.identify.fit import fit_segments
+from commissioner.identify.leg_law import LegLaw
+from commissioner.identify.model import ModelChoice, start_theta
 from commissioner.identify.observer import ParallelObserver  # noqa: F401  same package, compiled together
 from commissioner.identify.resistance import knee_shape
 from commissioner.identify.whiteness import whiteness
@@ -65,13 +69,13 @@ def test_a_fractional_delay_is_a_fifth_parameter():
 
 def test_sensitivities_are_the_derivatives_of_the_simulation():
     """Information and score against finite differences of the sum of squares, saturation, knee and delay included."""
-    from commissioner.identify.batch import _Problem
+    from commissioner.identify.problem import Problem
 
     voltage = multitone([(20.0, 0.7, 0.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)], 1.0, PERIOD_S)
     rng = np.random.default_rng(3)
     current = linear_response(TRUTH, voltage, PERIOD_S)[0] + 0.3 * rng.standard_normal(voltage.size)
-    model = ModelChoice(2, 1.0, (0.1, 0.4, 1.0), True)
-    problem = _Problem([Segment(voltage, current, 30.0, False)], PERIOD_S, model)
+    model = ModelChoice(2, 1.0, LegLaw(1.5), True)
+    problem = Problem([Segment(voltage, current, 30.0, False)], PERIOD_S, model)
     theta = start_theta(START, model, knee_shape(2.0, 0.3, 2.0))
     theta[4], theta[5:7] = 8e-5, (0.1, 0.4)
     own = np.array([[0.05, 0.1, 0.08]])
@@ -100,7 +104,7 @@ def test_inverter_and_iron_are_told_from_the_machine():
         saturating_block(u, PERIOD_S, np.zeros(2), machine, 5.0, 0.15, np.array(phase_cosines(0.0)), current, flux)
         segments.append(Segment(u, current + 0.02 * rng.standard_normal(u.size), 0.0, True))
         peak = max(peak, float(np.max(np.abs(flux))))
-    model = ModelChoice(4, 0.9, (0.03, 0.07, 0.15, 0.3, 0.6, 1.2), False)
+    model = ModelChoice(4, 0.9, LegLaw(3.0), with_delay=False)
     start = start_theta(START, model, knee_shape(4.0, 0.1, 2.0))
     fit = fit_segments(segments, PERIOD_S, START, model, start)
     assert fit.peak_flux_wb == pytest.approx(peak, rel=2e-3)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.batch import Segment, fit_segments
+from commissioner.identify.batch import Segment
 from commissioner.identify.excitation import ExcitationLimits, design, predicted_peaks
+from commissioner.identify.fit import fit_segments
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import rated_flux
 from tests.support.standstill import linear_response, multitone, usable_motors
@@ -53,7 +54,7 @@ def test_stated_standard_errors_are_what_a_fit_scatters():
     voltage = chosen.excitation.voltage_v(np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S)
     current = linear_response(motor.truth, voltage, PERIOD_S)[0]
     found = []
-    from commissioner.identify.batch import ModelChoice
+    from commissioner.identify.model import ModelChoice
 
     for seed in range(25):
         measured = current + limits.noise_a * np.random.default_rng(seed).standard_normal(current.size)
@@ -74,7 +75,7 @@ def test_the_design_beats_the_same_peak_flux_spent_on_decade_spaced_tones():
     use = max(
         np.max(np.abs(rotor + motor.truth[2] * current)) / limits.flux_wb, np.max(np.abs(current)) / limits.current_a
     )
-    from commissioner.identify.batch import cramer_rao
+    from commissioner.identify.bound import cramer_rao
 
     ours = chosen.excitation.voltage_v(np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S)
     worst = [

@@ -1,0 +1,69 @@
+"""Which extensions of the linear machine the data ask for: leg loss, delay, saturating iron, drifting offsets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from commissioner.identify.batch import BatchFit, Segment, extended
+from commissioner.identify.fit import fit_segments
+from commissioner.identify.leg_law import LegLaw
+from commissioner.identify.model import Matrix, ModelChoice, start_theta
+from commissioner.identify.resistance import InverterError, knee_shape
+from commissioner.motor.circuit import InverseGamma
+
+EXTRA_POWERS = 4
+BLIND_LOSSES = (0.1, 0.4)
+COARSE, MOST_COARSE_STEPS = 0.03, 20
+"""While models are compared: steps, in standard errors, that count as none, and how many are tried."""
+
+
+def select_model(
+    segments: Sequence[Segment], period_s: float, starts: Sequence[InverseGamma], leg: InverterError | None
+) -> BatchFit:
+    """Greedy choice by the Bayesian criterion: whichever of delay, inverter error, saturation and drift helps most is
+    added, then the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start;
+    without one it is unknown, and the fit begins with none, a small and a large one, from every start."""
+    law = LegLaw(max(float(np.max(np.abs(s.current_a))) for s in segments))
+    rms_v = max(float(np.std(s.voltage_v)) for s in segments)
+    legs = [leg] if leg else [None, *(knee_shape(share * rms_v, law.corner_a, 2.0) for share in BLIND_LOSSES)]
+    begun = [_begin(segments, period_s, start, each, law) for start in starts for each in legs]
+    best = min(begun, key=lambda f: f.criterion())
+    start = best.gamma.as_inverse_gamma()
+    model = replace(best.model, flux_scale_wb=best.peak_flux_wb)
+    best, tried = replace(best, model=model), {model}
+    while True:
+        m = best.model
+        toggled = (
+            replace(m, extra_powers=0 if m.extra_powers else EXTRA_POWERS),
+            replace(m, with_delay=not m.with_delay),
+            replace(m, with_drift=not m.with_drift),
+            replace(m, leg=None if m.leg and not _loses_voltage(best) else law),
+        )
+        trials = [_coarse(segments, period_s, start, t, extended(best, t)) for t in toggled if t not in tried]
+        tried.update(toggled)
+        better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
+        if not better:
+            return fit_segments(segments, period_s, start, best.model, best.theta)
+        best = min(better, key=lambda t: t.criterion())
+
+
+def _begin(
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, leg: InverterError | None, law: LegLaw
+) -> BatchFit:
+    model = ModelChoice(leg=law if leg else None, with_drift=False)
+    return _coarse(segments, period_s, start, model, start_theta(start, model, leg))
+
+
+def _coarse(
+    segments: Sequence[Segment], period_s: float, start: InverseGamma, model: ModelChoice, theta: Matrix
+) -> BatchFit:
+    return fit_segments(segments, period_s, start, model, theta, MOST_COARSE_STEPS, COARSE)
+
+
+def _loses_voltage(fit: BatchFit) -> bool:
+    """The leg error's plateau is beyond doubt, so that a fit without it need not be tried."""
+    leg = fit.inverter()
+    return leg is not None and abs(leg.plateau_v) > 10.0 * leg.std_v[-1]

@@ -1,0 +1,131 @@
+"""One inverter for all tests: their leg curves put together, and drawn to what inverters are known to lose.
+
+The batch fit leaves a leg's loss almost free, and a free curve and a resistance are hard to tell apart. But a leg's loss
+is a dead time (its output capacitance charged by the load current, or one of the smooth signs by which it is usually
+described) and a device threshold. All pairs of such laws are fitted to the curves, weighed by their information; what
+the pairs that fit disagree about stays in the covariance. Where none fits the free curves stand.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from commissioner.identify.batch import BatchFit
+from commissioner.identify.leg_law import TAIL
+from commissioner.records import Signal
+
+Matrix = NDArray[np.float64]
+Shape = Callable[[Signal], Signal]
+WORST_CHANCE = 1e-4
+"""A pair of laws is believed where curves this far from it would be at least this likely."""
+RESOLUTION, FORM = 5e-4, 5e-4
+"""What a curve point may be off although the fit is sure of it: sideways, of the largest current, because a steep loss
+moves much within one sample; in height, of the plateau."""
+TYPICAL_KNEE, KNEE_SPREAD = 0.02, 1.5
+"""Median knee, of the largest current, and standard deviation of its logarithm."""
+TYPICAL_SHARE, SHARE_SPREAD = 0.2, 1.0
+"""The threshold's part of the loss, likewise."""
+
+
+def _capacitive(z: Signal) -> Signal:
+    reach = 1.0 / np.maximum(z, 1.0)
+    return np.asarray(z * reach * (1.0 - 0.5 * reach))
+
+
+def _power(n: float) -> Shape:
+    return lambda z: np.asarray(z / (1.0 + z**n) ** (1.0 / n))
+
+
+DEAD_TIME: dict[str, Shape] = {
+    "capacitive": _capacitive,
+    "tanh": np.tanh,
+    "arc tangent": lambda z: np.asarray(2.0 / math.pi * np.arctan(0.5 * math.pi * z)),
+    "hyperbola": _power(1.0),
+    "root": _power(2.0),
+    "corner": _power(5.0),
+    "clamped": lambda z: np.asarray(z**3 / (1.0 + z**3)),
+}
+THRESHOLD: dict[str, Shape] = {"hyperbola": _power(1.0), "root": _power(2.0), "tanh": np.tanh}
+
+
+@dataclass(frozen=True)
+class _Pair:
+    values: Signal
+    covariance: Matrix
+    misfit: float
+
+
+def one_inverter(fits: Sequence[BatchFit]) -> list[BatchFit]:
+    """The fits with the leg curve they agree on. Unchanged where a leg was not fitted, or no known law describes it."""
+    law = fits[0].model.leg
+    if law is None or any(f.model.leg != law for f in fits):
+        return list(fits)
+    parts = [f.model.leg_slice for f in fits]
+    weights = [np.linalg.pinv(f.covariance[p, p]) for f, p in zip(fits, parts, strict=True)]
+    information = np.sum(weights, axis=0)
+    mean = np.linalg.solve(
+        information, np.sum([w @ f.theta[p] for w, f, p in zip(weights, fits, parts, strict=True)], axis=0)
+    )
+    current = law.corner_a * law.knots / (1.0 - law.knots)
+    steepness = np.gradient(np.append(0.0, mean), np.append(0.0, current))[1:]
+    blur = np.square(steepness * RESOLUTION * law.largest_a) + (FORM * np.max(np.abs(mean))) ** 2
+    root = np.linalg.cholesky(np.linalg.inv(np.linalg.inv(information) + np.diag(blur))).T
+    pairs = [
+        _fit_pair(dead, drop, current, law.largest_a, mean, root)
+        for dead, drop in itertools.product(DEAD_TIME.values(), THRESHOLD.values())
+    ]
+    best = min(p.misfit for p in pairs)
+    if chi2.sf(best, law.size - 4) < WORST_CHANCE:
+        return list(fits)
+    chances = np.array([math.exp(-0.5 * (p.misfit - best)) for p in pairs])
+    chances /= chances.sum()
+    values = np.sum([c * p.values for c, p in zip(chances, pairs, strict=True)], axis=0)
+    covariance = np.sum(
+        [
+            c * (p.covariance + np.outer(p.values - values, p.values - values))
+            for c, p in zip(chances, pairs, strict=True)
+        ],
+        axis=0,
+    )
+    return [_given(f, values, covariance) for f in fits]
+
+
+def _fit_pair(dead: Shape, drop: Shape, current: Signal, largest_a: float, mean: Signal, root: Matrix) -> _Pair:
+    """Plateau, threshold's share and both knees (logarithms) by weighted least squares."""
+    plateau = max(float(np.max(np.abs(mean))), 1e-6)
+    typical = math.log(TYPICAL_KNEE * largest_a)
+
+    def curve(p: Signal) -> Signal:
+        total, ratio, k1, k2 = np.exp(np.clip(p, -30.0, 30.0))
+        share = ratio / (1.0 + ratio)
+        return np.asarray(total * ((1.0 - share) * dead(current / k1) + share * drop(current / k2)))
+
+    def misfit(p: Signal) -> Signal:
+        prior = [
+            (p[1] - math.log(TYPICAL_SHARE)) / SHARE_SPREAD,
+            (p[2] - typical) / KNEE_SPREAD,
+            (p[3] - typical) / KNEE_SPREAD,
+        ]
+        return np.concatenate([root @ (curve(p) - mean), prior])
+
+    fit = least_squares(misfit, [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical], max_nfev=60)
+    spread = np.linalg.pinv(fit.jac.T @ fit.jac)
+    jacobian = np.linalg.solve(root, fit.jac[: mean.size])
+    return _Pair(curve(fit.x), jacobian @ spread @ jacobian.T, 2.0 * float(fit.cost))
+
+
+def _given(fit: BatchFit, values: Signal, covariance: Matrix) -> BatchFit:
+    """The fit when the tail of its leg curve, which passes for resistance, is known to be `values` +- `covariance`."""
+    part = slice(fit.model.leg_slice.start + TAIL, fit.model.leg_slice.stop)
+    gain = fit.covariance[:, part] @ np.linalg.pinv(fit.covariance[part, part])
+    theta = fit.theta + gain @ (values[TAIL:] - fit.theta[part])
+    rest = fit.covariance - gain @ fit.covariance[part, :]
+    return replace(fit, theta=theta, covariance=rest + gain @ covariance[TAIL:, TAIL:] @ gain.T)

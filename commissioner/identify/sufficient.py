@@ -1,0 +1,58 @@
+"""Can the excitation carry four parameters? Refusals that say which combination it does fix."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.identify.audit import Audit, tones_in
+from commissioner.identify.batch import BatchFit
+from commissioner.motor.standstill import admittance_s
+
+WORST_RELATIVE_STD = 0.25
+
+
+def require_tones(examined: Audit, period_s: float) -> None:
+    """One tone fixes two numbers, not four: say which."""
+    if any(s.kind == "staircase" for s in examined.stretches if s.is_excited):
+        return
+    lines = [tones_in(s.voltage_v, period_s) for s in examined.stretches if s.is_excited]
+    distinct = sorted({round(f, 2) for stretch in lines for f in stretch})
+    groups = [f for k, f in enumerate(distinct) if k == 0 or f > 1.2 * distinct[k - 1]]
+    if len(groups) > 1 or not groups:
+        return
+    stretch = max((s for s in examined.stretches if s.is_excited), key=lambda s: s.voltage_v.size)
+    frequency = groups[0]
+    time = np.arange(stretch.voltage_v.size) * period_s
+    carrier = np.exp(-2j * np.pi * frequency * time) * np.hanning(time.size)
+    impedance = complex(np.sum(stretch.voltage_v * carrier) / np.sum(stretch.current_a * carrier))
+    raise DataRefused(
+        "one tone cannot fix four parameters",
+        step="check the excitation",
+        value=f"one tone of {frequency:.4g} Hz",
+        limit="two tones at least, four for a check of the model",
+        remedy=(
+            f"only this combination can be had: R_s + R_R w^2 L_M^2/(R_R^2 + w^2 L_M^2) = {impedance.real:.5g} ohm and "
+            f"L_sigma + L_M R_R^2/(R_R^2 + w^2 L_M^2) = {impedance.imag / (2 * math.pi * frequency):.5g} H at "
+            f"w = 2 pi {frequency:.4g} 1/s; excite several tones from below 1 Hz to above 20 Hz"
+        ),
+    )
+
+
+def require_conditioned(batch: BatchFit) -> None:
+    machine, covariance = batch.inverse_gamma_at(0.0)
+    relative = np.sqrt(np.diag(covariance)) / np.array(machine.as_tuple())
+    if not np.all(np.isfinite(relative)) or np.max(relative) > WORST_RELATIVE_STD:
+        names = ("R_s", "R_R", "L_sigma", "L_M")
+        worst = int(np.argmax(np.where(np.isfinite(relative), relative, np.inf)))
+        impedance = 1.0 / admittance_s(machine, np.array([1.0, 10.0]))
+        raise DataRefused(
+            f"the excitation does not fix {names[worst]}",
+            step="identify",
+            value=f"relative standard error {relative[worst]:.0%}",
+            limit=f"{WORST_RELATIVE_STD:.0%}",
+            remedy="excite more tones between the machine's poles, or record longer; the fit's impedance at 1 Hz is "
+            f"{impedance[0]:.4g} ohm, at 10 Hz {impedance[1]:.4g} ohm",
+        )
