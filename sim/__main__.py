@@ -74,7 +74,8 @@ def _print_truth(truth: dict[str, object]) -> None:
 
 
 def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
-    from sim.server import Options, serve
+    from sim.server import serve
+    from sim.station import Options
     from sim.truth import answer_key
 
     if options.list:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,8 +74,13 @@ def parse_url(text: str) -> DriveUrl:
     if parts.scheme not in parsers:
         raise _refuse(text, parts.scheme or "no scheme", "tcp://, tls:// or rtu://")
     if parts.username is not None or parts.fragment:
-        raise _refuse(text, parts.username or parts.fragment, "no user, password or fragment")
+        raise _refuse(text, parts.fragment or "a user", "no user, password or fragment")
     return parsers[parts.scheme](text, parts)
+
+
+def without_secrets(text: str) -> str:
+    """The address as it may be shown and archived: no user, no password, not where certificate and key are."""
+    return re.sub(r"(?<=[?&])(cert|key)=[^&]*(&|$)", "", re.sub(r"//[^/?#]*@", "//", text)).rstrip("?&")
 
 
 def _tcp(text: str, parts: SplitResult) -> TcpUrl:
@@ -87,9 +93,9 @@ def _tls(text: str, parts: SplitResult) -> TlsUrl:
     if ("cert" in options) != ("key" in options):
         raise _refuse(text, "cert" if "cert" in options else "key", "cert and key together")
     files = {name: Path(options[name]) for name in ("ca", "cert", "key") if name in options}
-    for name, file in files.items():
+    for file in files.values():
         if not file.is_file():
-            raise _refuse(text, f"{name}={file}", "an existing PEM file")
+            raise _refuse(text, file.name, "an existing PEM file")
     return TlsUrl(_host(text, parts), _port(text, parts, 802), _device(text, options), **files)
 
 
@@ -109,12 +115,12 @@ def _options(text: str, parts: SplitResult, known: tuple[str, ...]) -> dict[str,
     try:
         pairs = parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))
     except ValueError as error:
-        raise _refuse(text, parts.query, "name=value pairs joined by &") from error
+        raise _refuse(text, "what stands behind the ?", "name=value pairs joined by &") from error
     for name, value in pairs:
         if name not in known or not value:
-            raise _refuse(text, f"{name}={value}", "one of these options with a value: " + ", ".join(known))
+            raise _refuse(text, name, "one of these options with a value: " + ", ".join(known))
     if len(dict(pairs)) != len(pairs):
-        raise _refuse(text, parts.query, "each option once")
+        raise _refuse(text, "an option twice", "each option once")
     return dict(pairs)
 
 
@@ -149,7 +155,7 @@ def _bracketed(host: str) -> str:
 
 def _refuse(text: str, value: object, expected: str) -> UsageError:
     return UsageError(
-        f"{text!r} is not a drive's address", step="read drive URL", value=value, limit=expected,
+        f"{without_secrets(text)!r} is not a drive's address", step="read drive URL", value=value, limit=expected,
         remedy="write tcp://HOST:PORT?device=1, tls://HOST:802?ca=FILE&cert=FILE&key=FILE "
         "or rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1",
     )

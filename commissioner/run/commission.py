@@ -15,7 +15,7 @@ from commissioner.link.drive_file import load_profile
 from commissioner.link.facts import Action, Intent
 from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import parse_url
+from commissioner.link.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
 from commissioner.procedure.course import Findings, Job, course
@@ -108,7 +108,7 @@ def commission(
         folder.save(
             "request.json",
             {
-                "url": url,
+                "url": without_secrets(url),
                 "profile": profile.file,
                 "nameplate": nameplate,
                 "plan": plan,

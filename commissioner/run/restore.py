@@ -6,11 +6,11 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from commissioner.errors import DataRefused
+from commissioner.errors import DataRefused, UsageError
 from commissioner.link.drive_file import load_profile
 from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import open_port
-from commissioner.link.url import parse_url
+from commissioner.link.url import TlsUrl, parse_url
 from commissioner.records import WrittenParameter
 from commissioner.run.archive import RunFolder
 from commissioner.run.catalogue import RunSummary
@@ -42,9 +42,15 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
         )  # fmt: skip
     request = json.loads((folder / "request.json").read_text("utf-8"))
     profile = load_profile(request["profile"])
+    address = parse_url(url or request["url"])
+    if isinstance(address, TlsUrl) and url is None:
+        raise UsageError(
+            f"the archive of {run.run} keeps no TLS files", step="restore", value=str(address),
+            limit="an address with ca=, cert= and key=", remedy="give the drive's whole address with --drive",
+        )  # fmt: skip
     journal = RunFolder(folder)
     try:
-        port = open_port(parse_url(url or request["url"]), profile, reply_timeout_s=reply_timeout_s)
+        port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
         try:
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             report = inverter.restore(read_snapshot(folder / "snapshot.json"))

@@ -22,8 +22,9 @@ from sim.kernel import play_voltages
 from sim.machine import Heating, Machine, Plant, PowerStage, Sensors, fresh_state, pack
 from sim.memory import Memory
 from sim.scenario import load
-from sim.server import Options, run_in_thread
+from sim.server import run_in_thread
 from sim.states import Setup
+from sim.station import Options
 from tests.sim.client import TcpClient
 
 PEER_PERIOD_S = 3e-4

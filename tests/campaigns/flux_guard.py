@@ -27,7 +27,7 @@ from tests.support.standstill import saturating_block, usable_motors
 
 PERIOD_S = 2e-4
 FLUX_FRACTION = 0.9
-RAMP_PER_S = 2.0
+RAMP_PER_S = 5.0  # as in config/procedure.toml
 FIRST_SCALE = 0.05
 
 
@@ -41,6 +41,8 @@ class Outcome:
     aborted: bool
     final_scale: float
     latency_s: float
+    begin: str
+    """What was known of the machine, and whether there was a bias."""
 
 
 def run_case(seed: int, seconds: float = 6.0) -> Outcome:
@@ -102,25 +104,15 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
     first = min(FIRST_SCALE, guard.safe_scale)
     if knowledge == "measured":
         first = guard.begin_known(start, log_std, RAMP_PER_S)
+    begin = f"{knowledge}{', bias' if bias_v else ''}{', inverter' if has_inverter else ''}"
     return _drive(
-        seed,
-        motor.name,
-        machine,
-        plateau,
-        knee,
-        axis_deg,
-        chosen.excitation,
-        observer,
-        guard,
-        latency,
-        seconds,
-        rng,
-        first,
-    )
+        seed, motor.name, machine, plateau, knee, axis_deg, chosen.excitation, observer, guard, latency, seconds, rng,
+        first, begin,
+    )  # fmt: skip
 
 
 def _drive(
-    seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng, first_scale
+    seed, name, machine, plateau, knee, axis_deg, excitation, observer, guard, latency, seconds, rng, first_scale, begin
 ) -> Outcome:
     block = max(50, round(0.5 * latency / PERIOD_S))
     cosines = np.array(phase_cosines(axis_deg))
@@ -152,7 +144,7 @@ def _drive(
             reading.advice is FluxAdvice.RAISE and abs(scale - wanted) < 1e-6
         ):
             pending.append((due, min(1.0, reading.permitted_scale)))
-    return Outcome(seed, name, peak / guard.limit_wb, aborted, scale, latency)
+    return Outcome(seed, name, peak / guard.limit_wb, aborted, scale, latency, begin)
 
 
 def main(count: int, first: int = 0) -> None:
@@ -168,6 +160,8 @@ def main(count: int, first: int = 0) -> None:
     )
     for o in worst:
         print(o)
+    for o in unnecessary:
+        print("unnecessary", o)
     low = sorted(outcomes, key=lambda o: o.peak)[:8]
     for o in low:
         print("low", o)

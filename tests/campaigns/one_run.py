@@ -9,15 +9,16 @@ import contextlib
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from commissioner.errors import CommissionerError
 from commissioner.link.drive_file import load_profile
 from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
+from commissioner.link.modbus import ModbusPort, open_port
 from commissioner.link.url import parse_url
 from commissioner.motor.nameplate import rated_flux
 from commissioner.procedure.findings import RunEnded
@@ -26,8 +27,10 @@ from commissioner.run.archive import RunFolder
 from commissioner.run.catalogue import RunSummary, summarise
 from commissioner.run.commission import _bounds, _drive_limits, _parameter_names, _watch
 from commissioner.run.runner import Runner
+from sim.line import Handler
 from sim.scenario import Scenario
-from sim.server import Options, Running, run_in_thread
+from sim.server import Running, run_in_thread
+from sim.station import Options
 from tests.campaigns import truth
 from tests.campaigns.sequences import Sequence
 from tests.campaigns.short_course import (
@@ -43,7 +46,9 @@ LINK_LATENCY_S = 0.02
 TRUE_STATOR_RESISTANCE_OHM = 3.7
 WATCHDOG_TRIP = 6
 REPEATS, STALL_S = 5, 0.02
-"""A sequence that this machine disturbed by letting a thread wait for so long is run again, at most so often."""
+"""A sequence that this machine disturbed by letting a thread or an answer wait so long is run again, so often at most."""
+AFTER_STALL_S = 1.0
+"""So long after a stall that was asked for, a slow answer says nothing about the machine."""
 
 
 @dataclass
@@ -51,7 +56,8 @@ class Outcome:
     """How the run ended and which invariants broke.
 
     `dead_after_s`: longest time energised after a loss; `harmed`: requests that the simulator denied an answer;
-    `lost`: answers that the link missed or did not believe; `stall_s`: how long this machine let a thread wait.
+    `lost`: answers that the link missed or did not believe; `stall_s`: how long this machine let a thread wait;
+    `answer_s`: the longest request whose answer was sent sound and at once.
     """
 
     sequence: Sequence
@@ -64,12 +70,14 @@ class Outcome:
     watchdog_bites: int = 0
     seconds: float = 0.0
     stall_s: float = 0.0
+    answer_s: float = 0.0
     repeats: int = 0
 
     @property
     def was_disturbed(self) -> bool:
         """Whether the machine, not the sequence, may have decided the run: reply time-out and watchdog are short."""
-        return self.stall_s >= STALL_S and bool(self.broken or self.lost > self.harmed or self.watchdog_bites)
+        has_stalled = max(self.stall_s, self.answer_s) >= STALL_S
+        return has_stalled and bool(self.broken or self.lost > self.harmed or self.watchdog_bites)
 
 
 class StallWatch:
@@ -90,6 +98,42 @@ class StallWatch:
         while not self._is_over.wait(0.005):
             now = time.monotonic()
             self.longest_s, last = max(self.longest_s, now - last - 0.005), now
+
+
+class AnswerWatch:
+    """The longest request whose answer the simulator sent sound and at once: a few milliseconds, unless this machine
+    is too busy to run the simulator's thread or to carry bytes through a pseudo terminal or its loopback."""
+
+    def __init__(self) -> None:
+        self.longest_s, self._is_sound = 0.0, False
+
+    def __enter__(self) -> AnswerWatch:
+        self._patches = contextlib.ExitStack()
+        self._patches.enter_context(mock.patch.object(Handler, "_put", self._noting(Handler._put)))
+        self._patches.enter_context(mock.patch.object(ModbusPort, "_transact", self._timing(ModbusPort._transact)))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._patches.close()
+
+    def _noting(self, put: Callable[..., None]) -> Callable[..., None]:
+        def noted(handler: Handler, data: bytes) -> None:
+            was_stalled = time.monotonic() - handler.line.drive.stalled_until < AFTER_STALL_S
+            self._is_sound = not (handler.hits or was_stalled)
+            put(handler, data)
+
+        return noted
+
+    def _timing(self, transact: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*arguments: Any) -> Any:
+            self._is_sound, begun = False, time.monotonic()
+            try:
+                return transact(*arguments)
+            finally:
+                if self._is_sound:
+                    self.longest_s = max(self.longest_s, time.monotonic() - begun)
+
+        return timed
 
 
 def run_one(sequence: Sequence, scenario: Scenario, root: Path) -> Outcome:
@@ -123,9 +167,9 @@ def run_one(sequence: Sequence, scenario: Scenario, root: Path) -> Outcome:
 def run_until_undisturbed(sequence: Sequence, scenario: Scenario, root: Path) -> Outcome:
     """As `run_one`; again where the machine itself stalled and the run shows it."""
     for repeats in range(REPEATS + 1):
-        with StallWatch() as watch:
+        with StallWatch() as watch, AnswerWatch() as answers:
             outcome = run_one(sequence, scenario, root)
-        outcome.stall_s, outcome.repeats = watch.longest_s, repeats
+        outcome.stall_s, outcome.answer_s, outcome.repeats = watch.longest_s, answers.longest_s, repeats
         if not outcome.was_disturbed:
             break
     return outcome

@@ -23,9 +23,9 @@ DRIVE_FAULTS = (
     "ignore:staged_stator_resistance", "ignore:commit", "ignore:tones", "refuse:watchdog_ms", "refuse:amplitude_scale",
     "refuse:commit",
 )  # fmt: skip
-REQUESTS = {1: 170, 2: 270}
+REQUESTS = {("tcp", 1): 160, ("tcp", 2): 270, ("rtu", 1): 290, ("rtu", 2): 455}
 """About how many requests a sound run of one or two tests makes."""
-WRITES = {1: 24, 2: 36}
+WRITES = {1: 15, 2: 22}
 """Of them with function 16."""
 FAULT_COUNTS = (0, *(1,) * 8, *(2,) * 6, *(3,) * 3, *(4,) * 2)
 
@@ -44,19 +44,20 @@ class Sequence:
 @st.composite
 def sequences(draw: st.DrawFn, wire: str) -> Sequence:
     """One run over `wire` (`both`: either)."""
-    tests = draw(st.sampled_from([1, 1, 1, 1, 2]))
+    chosen, tests = wire if wire in WIRES else draw(st.sampled_from(WIRES)), draw(st.sampled_from([1, 1, 1, 1, 2]))
+    requests = REQUESTS[chosen, tests]
     script = Script(
         draw(st.sampled_from([*DECISIONS[:1] * 3, *DECISIONS[1:]])),
         tests,
         draw(st.floats(0.8, 2.5)),
-        *draw(_rogue(tests)),
+        *draw(_rogue(requests)),
     )
     return Sequence(
         seed=draw(st.integers(0, 9999)),
-        wire=wire if wire in WIRES else draw(st.sampled_from(WIRES)),
+        wire=chosen,
         script=script,
-        faults=tuple(draw(_fault(tests)) for _ in range(draw(st.sampled_from(FAULT_COUNTS)))),
-        stop_after=draw(_seldom(st.integers(0, REQUESTS[tests]))),
+        faults=tuple(draw(_fault(requests, WRITES[tests])) for _ in range(draw(st.sampled_from(FAULT_COUNTS)))),
+        stop_after=draw(_seldom(st.integers(0, requests))),
     )
 
 
@@ -66,26 +67,28 @@ def _seldom(strategy: st.SearchStrategy[int]) -> st.SearchStrategy[int | None]:
 
 
 @st.composite
-def _rogue(draw: st.DrawFn, tests: int) -> tuple[str, int]:
+def _rogue(draw: st.DrawFn, requests: int) -> tuple[str, int]:
     """A defective procedure, one time in six, and its moment."""
     if draw(st.integers(0, 5)) != 3:
         return "", 0
-    return draw(st.sampled_from(list(ROGUES))), draw(st.integers(0, REQUESTS[tests]))
+    return draw(st.sampled_from(list(ROGUES))), draw(st.integers(0, requests))
 
 
-def _fault(tests: int) -> st.SearchStrategy[str]:
+def _fault(requests: int, writes: int) -> st.SearchStrategy[str]:
     """Six of ten on the wire, one in a hundred another firmware's register map."""
     kinds = st.integers(0, 99)
     return kinds.flatmap(
-        lambda n: st.just("other_map") if n == 50 else _drive_fault(tests) if n > 60 else _wire_fault(tests)
+        lambda n: (
+            st.just("other_map") if n == 50 else _drive_fault(requests) if n > 60 else _wire_fault(requests, writes)
+        )
     )
 
 
 @st.composite
-def _wire_fault(draw: st.DrawFn, tests: int) -> str:
+def _wire_fault(draw: st.DrawFn, requests: int, writes: int) -> str:
     """At a request, mostly once; one in four among those that write."""
     name, among_writes = draw(st.sampled_from(WIRE_FAULTS)), draw(st.integers(0, 3)) == 3
-    first = draw(st.integers(1, (WRITES if among_writes else REQUESTS)[tests]))
+    first = draw(st.integers(1, writes if among_writes else requests))
     at = f"{name}@{'w' if among_writes else ''}{first}"
     if name.startswith(tuple(SERVER)):
         return at
@@ -93,10 +96,10 @@ def _wire_fault(draw: st.DrawFn, tests: int) -> str:
 
 
 @st.composite
-def _drive_fault(draw: st.DrawFn, tests: int) -> str:
+def _drive_fault(draw: st.DrawFn, requests: int) -> str:
     """At a request, at a time since the first energising, or just before a command is carried out."""
     name = draw(st.sampled_from(DRIVE_FAULTS))
-    at_request = st.integers(1, REQUESTS[tests]).map(str)
+    at_request = st.integers(1, requests).map(str)
     energised = st.integers(0, 6000).map(lambda n: f"e{n / 1e4:.4f}s")
     when = draw(st.one_of(at_request, at_request, energised, energised, st.sampled_from(["commit", "store"])))
     return f"{name}@{when}"

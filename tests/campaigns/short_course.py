@@ -8,16 +8,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Generator
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 from commissioner.identify import excitation
 from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
 from commissioner.identify.resistance import IDEAL_INVERTER
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
-from commissioner.procedure.excite import excite
+from commissioner.procedure.excite import _test
 from commissioner.procedure.findings import RunEnded, StateEntered, VerdictReached
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.procedure.states import Event, State
@@ -107,13 +105,12 @@ def _steps(script: Script, job: Job, findings: Findings) -> Generator[ask.Comman
     yield _entered(State.CHECKING, Event.IDENTIFIED)
     yield from check(job, findings)
     known = replace(prior(job.nameplate).typical, stator_resistance_ohm=NEW_SI[0])
-    findings.look = SimpleNamespace(parameters=known, std=(0.01,) * 4, inverter=None)  # type: ignore[assignment]
-    chosen = _stronger(_designed(), script.strength)
-    for _ in range(script.tests):
-        findings.estimate = known
+    chosen, seconds = _stronger(_designed(), script.strength), PLAN.excitation.seconds
+    for axis_deg in PLAN.axes_deg[: script.tests]:
+        findings.estimate, findings.is_measured = known, True
         yield _entered(State.EXCITING, Event.RESISTANCE_KNOWN)
-        with mock.patch.object(excitation, "design", lambda *_: chosen):
-            yield from excite(job, findings)
+        yield from _test(job, findings, axis_deg, chosen, seconds, seconds)
+        findings.tests_done += 1
     yield _entered(State.JUDGING, Event.AXES_DONE)
     yield ask.Tell(VerdictReached(script.decision, "the script says so", None, None, ""))
     if script.decision == "reject":

@@ -59,7 +59,7 @@ def test_a_commit_that_never_ends_ends_as_a_fault_with_the_old_parameters(tmp_pa
 
 def test_a_service_that_does_not_disarm_is_seen(tmp_path, monkeypatch):
     monkeypatch.setattr(Inverter, "disarm", lambda self: None)
-    done = run_one(sequence("overrun:600@80"), SCENARIO, tmp_path)
+    done = run_one(sequence("overrun:600@45"), SCENARIO, tmp_path)
     assert any("after the run had ended" in broken for broken in done.broken), done
 
 

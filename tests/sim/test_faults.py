@@ -8,7 +8,8 @@ import pytest
 
 from sim.faults import DRIVE, SERVER, WIRE, FaultError, parse
 from sim.scenario import load
-from sim.server import Options, run_in_thread
+from sim.server import run_in_thread
+from sim.station import Options
 from tests.sim.client import Refused, RtuClient, Silent, TcpClient, crc_bytes, floats
 
 SCENARIO = load("default")

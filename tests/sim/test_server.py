@@ -22,7 +22,8 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from sim.scenario import load
-from sim.server import Options, run_in_thread
+from sim.server import run_in_thread
+from sim.station import Options
 from tests.sim.client import Client, Refused, RtuClient, Silent, TcpClient, as_float
 
 SCENARIO = load("default")

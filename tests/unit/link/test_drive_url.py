@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from commissioner.errors import UsageError
-from commissioner.link.url import RtuUrl, TcpUrl, TlsUrl, parse_url
+from commissioner.link.url import RtuUrl, TcpUrl, TlsUrl, parse_url, without_secrets
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,30 @@ def test_what_is_not_an_address_is_refused_with_the_form_that_is(text):
         parse_url(text)
     assert "tcp://HOST:PORT" in caught.value.remedy
     assert caught.value.limit
+
+
+def test_a_refused_address_does_not_repeat_its_password():
+    with pytest.raises(UsageError) as caught:
+        parse_url("tcp://operator:hunter2@drive")
+    assert "hunter2" not in str(caught.value.as_dict())
+    with pytest.raises(UsageError) as caught:
+        parse_url("tcp://drive?password=hunter2")
+    assert caught.value.value == "password"
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("tcp://drive:502?device=1", "tcp://drive:502?device=1"),
+        ("tls://drive?ca=/a.pem&cert=/b.pem&key=/c.pem", "tls://drive?ca=/a.pem"),
+        ("tls://drive?key=/c.pem&cert=/b.pem&device=3", "tls://drive?device=3"),
+        ("tls://drive?cert=/b.pem&key=/c.pem", "tls://drive"),
+        ("tcp://user:pw@drive?device=1", "tcp://drive?device=1"),
+        ("rtu:///dev/ttyUSB0?baud=9600", "rtu:///dev/ttyUSB0?baud=9600"),
+    ],
+)
+def test_what_is_archived_of_an_address_leads_to_the_drive_and_to_no_secret(text, kept):
+    assert without_secrets(text) == kept
 
 
 def test_a_character_has_eleven_bits_on_a_standard_line():
