@@ -46,6 +46,7 @@ class ScriptedDrive:
 
     machine: Machine = field(default_factory=Machine)
     noise_a: float = 0.01
+    rated_a: float = 7.0
     seed: int = 1
     status: Mapping[str, Any] = field(default_factory=dict)
     plate: Mapping[str, float] = field(default_factory=dict)
@@ -151,7 +152,7 @@ class ScriptedDrive:
         return float(voltage), float(current)
 
     def _identity(self) -> DriveIdentity:
-        return DriveIdentity("SCRIPTED", 1, "1.0.0", 1, 7.0, PERIOD_S, 5000.0)
+        return DriveIdentity("SCRIPTED", 1, "1.0.0", 1, self.rated_a, PERIOD_S, 5000.0)
 
     def _status(self) -> DriveStatus:
         held: dict[str, Any] = {

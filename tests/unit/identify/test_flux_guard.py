@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-import pytest
+from dataclasses import replace
 
-from commissioner.identify.excitation import Excitation, Tone
+import numpy as np
+import pytest
+from scipy.signal import StateSpace, lsim
+
+from commissioner.identify.excitation import Excitation, ExcitationLimits, Tone, design
 from commissioner.identify.flux import FluxGuard
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate
 from tests.campaigns.flux_guard import run_case
 
 CASES = range(20_000, 20_024)
@@ -33,8 +39,39 @@ def test_the_amplitude_is_raised_where_the_flux_permits(outcomes):
 def test_the_first_scale_is_safe_for_a_machine_without_resistance():
     tones = (Tone(10.0, 0.5, 0.0), Tone(20.0, 7.3, 1.0))
     guard = FluxGuard(0.9, 0.02, Excitation(tones, 0.0, 5.0), 2e-4, 3.7)
-    import numpy as np
-
     time = np.arange(50_000) * 2e-4
     flux = np.cumsum(guard.safe_scale * Excitation(tones, 0.0, 5.0).voltage_v(time)) * 2e-4
     assert np.max(np.abs(flux)) <= 0.9
+
+
+MACHINE = InverseGamma(0.62, 0.376, 0.0107, 0.19)
+TONES = (Tone(18.0, 0.7, 0.0), Tone(15.0, 4.1, 1.5), Tone(4.5, 44.6, 1.6))
+
+
+def true_peak_wb(machine, excitation, scale, ramp_per_s):
+    """Stator flux of the linear machine from rest, by scipy's exact discretisation."""
+    alpha = machine.rotor_resistance_ohm / machine.magnetizing_inductance_h
+    r, leak = machine.stator_resistance_ohm + machine.rotor_resistance_ohm, machine.leakage_inductance_h
+    a = np.array([[-r / leak, alpha / leak], [machine.rotor_resistance_ohm, -alpha]])
+    time = np.arange(0.0, excitation.duration_s, 2e-4)
+    voltage = excitation.voltage_v(time, np.minimum(time * ramp_per_s, scale))
+    system = StateSpace(a, [[1.0 / leak], [0.0]], [[leak, 1.0]], [[0.0]])
+    return float(np.max(np.abs(lsim(system, voltage, time)[1])))
+
+
+def test_the_amplitude_for_a_known_machine_keeps_its_flux_below_the_limit_and_uses_most_of_it():
+    excitation = Excitation(TONES, 0.0, 4.6)
+    guard = FluxGuard(0.9, 0.02, excitation, 2e-4, MACHINE.stator_resistance_ohm)
+    scale = guard.begin_known(MACHINE, 0.05, 5.0)
+    assert guard.safe_scale < scale < 1.0
+    assert 0.7 * 0.9 < true_peak_wb(MACHINE, excitation, scale, 5.0) < 0.87 * 0.9
+    off = replace(MACHINE, magnetizing_inductance_h=1.05 * 0.19, stator_resistance_ohm=0.95 * 0.62)
+    assert true_peak_wb(off, excitation, scale, 5.0) < 0.9
+
+
+def test_tones_beside_a_dc_bias_leave_room_for_its_flux():
+    plate = Nameplate(7500.0, 400.0, 50.0, 14.2, 1454.0, 0.858, 2, "star")
+    limits = ExcitationLimits(0.9, 18.0, 98.0)
+    bias_v = 0.4 * 0.9 / 0.2007 * 0.62  # four tenths of the limit
+    chosen = design(plate, MACHINE, limits, 2e-4, seconds=4.6, dc_bias_v=bias_v)
+    assert 0.7 * 0.9 < true_peak_wb(MACHINE, chosen.excitation, 1.0, 5.0) <= 1.02 * 0.9

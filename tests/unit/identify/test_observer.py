@@ -143,3 +143,31 @@ def test_the_gradient_law_refuses_gains_without_a_positive_real_margin():
 def test_wrong_shapes_are_refused():
     with pytest.raises(ValueError, match="equal"):
         observer().advance(np.zeros(10), np.zeros(9))
+
+
+def known_observer(scale: float, log_std: float) -> ParallelObserver:
+    start = InverseGamma(*(scale * v for v in MOTOR.truth))
+    return ParallelObserver(
+        prior(MOTOR.plate), PERIOD_S, MOTOR.plate.rated_current_peak_a, start=start, start_log_std=log_std
+    )
+
+
+def test_samples_of_the_dead_band_move_the_states_and_not_the_parameters():
+    voltage, measured, _, flux = record(4.0)
+    asleep = known_observer(1.03, 0.05)
+    start = asleep.parameters
+    first = asleep.advance(voltage[:1500], np.zeros(1500), adapts=False)
+    assert first.parameters.as_tuple() == pytest.approx(start.as_tuple(), rel=1e-9)
+    assert first.rotor_flux_wb[-1] == pytest.approx(flux[1499], rel=0.1)
+    then = asleep.advance(voltage[1500:], measured[1500:])
+    assert np.max(np.abs(errors(then.parameters))) < 0.01
+
+
+def test_a_machine_that_is_known_is_not_walked_away_from_by_repeated_reviews():
+    voltage, measured, _, _ = record(0.5, 0.3)
+    known = known_observer(1.0, 0.01)
+    block = known.advance(voltage, measured)
+    for _ in range(10):
+        known.review()
+    assert np.max(np.abs(errors(block.parameters))) < 0.03
+    assert known.parameters == block.parameters

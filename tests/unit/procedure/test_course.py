@@ -5,12 +5,14 @@ from dataclasses import replace
 import pytest
 
 from commissioner.errors import Aborted, CheckFailed
+from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import (
     AxisFinished,
     EstimateUpdated,
     ExcitationChosen,
+    StaircaseFitted,
     StateEntered,
     VerdictReached,
 )
@@ -168,3 +170,47 @@ def test_short_gaps_in_the_stream_are_counted_and_do_not_spoil_the_answer():
     assert ended.outcome == "commissioned"
     assert findings.identification.lost_samples > 0
     assert findings.identification.parameters.stator_resistance_ohm == pytest.approx(drive.machine.r_s, rel=0.01)
+
+
+def test_later_axes_begin_at_the_amplitude_that_the_first_has_earned(good_run):
+    _, drive, _, _ = good_run
+    begun, scales = [], []
+    for command in drive.sent:
+        if isinstance(command, ask.Enable):
+            scales = []
+            begun.append(scales)
+        if isinstance(command, ask.SetScale):
+            scales.append(command.scale)
+    first = [s[0] for s in begun if s]
+    assert len(first) == 4  # the look, and three tests
+    assert all(scale > 0.5 for scale in first[1:])
+
+
+def test_the_winding_temperature_of_the_check_refers_the_resistance_to_20_degrees():
+    drive, findings = ScriptedDrive(status={"winding_degc": 75.0}), Findings()
+    drive.run(course(_job(), findings))
+    at_20, _ = findings.identification.stator_resistance_20degc_ohm
+    # IEC 60034-1: R2/R1 = (235 + t2) / (235 + t1), copper
+    assert at_20 == pytest.approx(drive.machine.r_s * (235 + 20) / (235 + 75), rel=0.004)
+
+
+def test_what_a_longer_test_would_buy_is_known_after_a_run(good_run):
+    _, _, findings, job = good_run
+    longer = findings.longer_test
+    assert longer.seconds == 2 * job.plan.excitation.seconds
+    for now, then in zip(longer.now, longer.then, strict=True):
+        assert 0.7 * now < then <= now
+
+
+def test_the_staircase_of_a_slow_machine_is_not_waited_out():
+    machine = Machine(r_s=0.625, r_r=0.376, l_sigma=0.0107, l_m=0.19)
+    drive, findings = ScriptedDrive(machine, rated_a=20.0), Findings()
+    plate = Nameplate(7500.0, 400.0, 50.0, 14.2, 1454.0, 0.858, 2, "star")
+    job = replace(_job(), nameplate=plate)
+    ended = drive.run(course(job, findings))
+    assert ended.outcome == "commissioned", ended.reason
+    fitted = _told(drive, StaircaseFitted)
+    # 0.8 s time constant: six settled levels would take 24 s
+    assert fitted[0].energised_s < 6.0
+    assert fitted[0].stator_resistance_ohm == pytest.approx(machine.r_s, rel=0.1)
+    assert drive.peak_flux_wb <= 1.02 * job.flux_limit_wb(machine.r_s)
