@@ -62,6 +62,13 @@ class SampleRing:
         words = [*header, crc, *data.tolist()]
         return words + [0] * (self.map.window_words - len(words))
 
+    def behind_gaps(self, index: int) -> int:
+        """The sample of this index, or the first that exists behind the gap it was lost in."""
+        for start, length in self.gaps:
+            if start <= index < start + length:
+                index = start + length
+        return index
+
     def _around_gaps(self, first: int, count: int) -> tuple[int, int]:
         """Fault knob: samples the drive lost; a window ends before them or starts behind them."""
         for start, length in self.gaps:

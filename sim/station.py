@@ -91,7 +91,8 @@ class Drive:
         if self.speed:
             self.keep_pace()
             return
-        wanted = int(self.firmware.values["window_index"]) + self.firmware.samples.fitting(count)
+        samples = self.firmware.samples
+        wanted = samples.behind_gaps(int(self.firmware.values["window_index"])) + samples.fitting(count)
         self.firmware.run_until_sample(wanted)
         self.firmware.check_watchdog()
 

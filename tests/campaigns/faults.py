@@ -29,9 +29,9 @@ import hypothesis
 from hypothesis import HealthCheck, Phase
 
 from commissioner.procedure.excite import warm_up
-from sim.scenario import Scenario, build, read_document
+from sim.scenario import Scenario
 from tests.campaigns import truth
-from tests.campaigns.one_run import Outcome, run_until_undisturbed
+from tests.campaigns.one_run import Outcome, run_until_undisturbed, short_scenario
 from tests.campaigns.sequences import WIRES, Sequence, sequences
 from tests.campaigns.short_course import PLAN, Script, plate
 
@@ -47,7 +47,7 @@ def share(count: int, seed: int, wire: str, end: float = float("inf"), *, shrink
     With `shrinks` the first broken one is reduced and raised as an AssertionError.
     """
     warm_up(plate())
-    scenario, outcomes, seen = build(read_document("default"), "default"), [], set()
+    scenario, outcomes, seen = short_scenario(), [], set()
     with tempfile.TemporaryDirectory(dir=_shared_memory()) as root:
 
         @hypothesis.seed(seed)
@@ -155,7 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.sequence:
         warm_up(plate())
-        outcomes = _alone(_parsed(options.sequence), build(read_document("default"), "default"))
+        outcomes = _alone(_parsed(options.sequence), short_scenario())
     elif options.shrink:
         outcomes = share(SHARE, options.seed, options.wire, shrinks=True)
     else:

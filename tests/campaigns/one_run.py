@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -28,7 +28,7 @@ from commissioner.run.catalogue import RunSummary, summarise
 from commissioner.run.commission import _bounds, _drive_limits, _parameter_names, _watch
 from commissioner.run.runner import Runner
 from sim.line import Handler
-from sim.scenario import Scenario
+from sim.scenario import Scenario, build, read_document
 from sim.server import Running, run_in_thread
 from sim.station import Options
 from tests.campaigns import truth
@@ -47,6 +47,7 @@ TRUE_STATOR_RESISTANCE_OHM = 3.7
 WATCHDOG_TRIP = 6
 REPEATS, STALL_S = 5, 0.02
 """A sequence that this machine disturbed by letting a thread or an answer wait so long is run again, so often at most."""
+RING_SAMPLES = 1000
 AFTER_STALL_S = 1.0
 """So long after a stall that was asked for, a slow answer says nothing about the machine."""
 
@@ -134,6 +135,12 @@ class AnswerWatch:
                     self.longest_s = max(self.longest_s, time.monotonic() - begun)
 
         return timed
+
+
+def short_scenario() -> Scenario:
+    """The default drive with a ring that a short session can overrun."""
+    default = build(read_document("default"), "default")
+    return replace(default, setup=replace(default.setup, ring_capacity=RING_SAMPLES))
 
 
 def run_one(sequence: Sequence, scenario: Scenario, root: Path) -> Outcome:

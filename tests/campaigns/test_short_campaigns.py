@@ -7,14 +7,13 @@ import pytest
 
 from commissioner.link.inverter import Inverter
 from commissioner.run import runner
-from sim.scenario import build, read_document
 from tests.campaigns import mutants
 from tests.campaigns.faults import campaign, report
-from tests.campaigns.one_run import run_one, run_until_undisturbed
+from tests.campaigns.one_run import run_one, run_until_undisturbed, short_scenario
 from tests.campaigns.sequences import Sequence
 from tests.campaigns.short_course import Script
 
-SCENARIO = build(read_document("default"), "default")
+SCENARIO = short_scenario()
 SEQUENCES, FIRST_SEED = 200, 100_000
 
 
@@ -38,6 +37,9 @@ def sequence(*faults, wire="tcp", decision="write back", rogue="", rogue_at=0):
         (("lost@90+",), "faulted"),
         (("half_open@90", "lost_request@91+"), "faulted"),
         (("earth_fault@e0.2s",), "faulted"),
+        (("overrun:600@e0.1s",), "faulted"),
+        (("sample_gap:400@e0.2s",), "faulted"),
+        (("sample_gap:3@e0.2s",), "commissioned"),
         (("ignore:control_word@80",), "faulted"),
         (("store_fails",), "faulted"),
         (("power_cycle@store",), "faulted"),
