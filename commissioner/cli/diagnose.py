@@ -188,7 +188,8 @@ def _show(document: Mapping[str, Any], out: Path | None) -> None:
 
     colour = {"explained": "green", "nothing_significant": "green", "not_distinguishable": "yellow"}.get(document["verdict"], "red")
     screen.print(f"[bold {colour}]{document['verdict']}[/]  {headline(document)}")
-    screen.print(document["reason"])
+    if document["reason"] != headline(document):
+        screen.print(document["reason"])
     if document["causes"]:
         screen.print(table("", ("cause", "size", "share", "sure", "or"), [
             (c["name"], quantity(next(iter(c["parameters"].values()))) if c["parameters"] else "", f"{c['gain_share']:.1%}",

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import Layout, Model, Prediction, predict
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, Segment
 
 Array = NDArray[np.float64]
 BINS = 40
@@ -47,17 +47,17 @@ class Residuals:
 
 def residuals(record: Record, layout: Layout, nominal: Model, extended: Model, noise: Noise) -> Residuals:
     """Binned errors of phase u ... w together, along the excited axis where an axis is meant."""
-    parts: dict[str, list[Array]] = {k: [] for k in ("current", "voltage", "flux", "slope", "age", "before", "after")}
+    parts: dict[str, list[Array]] = {k: [] for k in (*LABELS, "before", "after", "before_along", "after_along")}
     axes: dict[float, list[tuple[float, float, int]]] = {}
     blocks: list[tuple[float, float, float]] = []
     for k, segment in enumerate(record.segments):
         one, two = predict(nominal, record, k, layout), predict(extended, record, k, layout)
         good = segment.is_good
         before, after = segment.currents_a - one.currents_a, segment.currents_a - two.currents_a
-        _collect(parts, segment.currents_a, before, after, good, two, segment.voltage_axis_v, segment.time_s)
+        _collect(parts, segment, before, after, two)
         sums = (float((before[:, good] ** 2).sum()), float((after[:, good] ** 2).sum()), int(good.sum()) * before.shape[0])
         axes.setdefault(segment.axis_deg, []).append(sums)
-        blocks.extend(_blocks(segment.time_s, before, after))
+        blocks.extend(_blocks(segment.time_s[good], before[:, good], after[:, good]))
     longest = max(range(len(record.segments)), key=lambda k: record.segments[k].count)
     frequency, spectra = _spectra(record, longest, layout, nominal, extended)
     order = sorted(axes)
@@ -76,25 +76,24 @@ LABELS: Mapping[str, str] = {
 }
 
 
-def _collect(
-    parts: dict[str, list[Array]], currents: Array, before: Array, after: Array, good: NDArray[np.bool_],
-    prediction: Prediction, voltage: Array, time: Array,
-) -> None:
-    phases = currents.shape[0]
-    flux = np.hypot(*prediction.iron_flux_wb)
-    slope = np.gradient(prediction.currents_a, float(np.median(np.diff(time))), axis=1)
-    for phase in range(phases):
-        parts["current"].append(prediction.currents_a[phase][good])
-        parts["voltage"].append(voltage[good])
-        parts["flux"].append(flux[good])
-        parts["slope"].append(slope[phase][good])
-        parts["before"].append(before[phase][good])
-        parts["after"].append(after[phase][good])
+def _collect(parts: dict[str, list[Array]], segment: Segment, before: Array, after: Array, prediction: Prediction) -> None:
+    """Phase by phase against the phase's own current and slope; along the axis against its voltage and the flux."""
+    good, count = segment.is_good, before.shape[0]
+    slope = np.gradient(prediction.currents_a, float(np.median(np.diff(segment.time_s))), axis=1)
+    parts["flux"].append(np.hypot(*prediction.iron_flux_wb)[good])
+    parts["voltage"].append(segment.voltage_axis_v[good])
+    for name, error in (("before", before), ("after", after)):
+        along = replace(segment, currents_a=error).axis_current_a
+        parts[f"{name}_along"].append(along[good])
+        parts[name].append(error[:, good].ravel())
+    parts["current"].append(prediction.currents_a[:, good].ravel())
+    parts["slope"].append(slope[:count, good].ravel())
 
 
 def _curve(label: str, x: Array, parts: Mapping[str, list[Array]]) -> Curve:
     """Equal-count bins. Against flux (never negative) the size of the error is shown."""
-    before, after = np.concatenate(parts["before"]), np.concatenate(parts["after"])
+    which_error = "_along" if label in (LABELS["voltage"], LABELS["flux"]) else ""
+    before, after = (np.concatenate(parts[f"{name}{which_error}"]) for name in ("before", "after"))
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
     which = np.clip(np.digitize(x, edges) - 1, 0, edges.shape[0] - 2)
     count = np.maximum(np.bincount(which, minlength=edges.shape[0] - 1), 1)

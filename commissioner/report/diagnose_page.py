@@ -33,7 +33,7 @@ HEADLINES = {
 
 def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
     """One self-contained page, in the order: headline, causes, error plots, spectrum, parameters, limits, data."""
-    sections = [Section("In one sentence", [seen.reason, *seen.remarks])]
+    sections = [Section("In one sentence", [_in_words(seen.reason), *seen.remarks])]
     if seen.found is not None and seen.noise is not None:
         left = residuals(seen.found.record, seen.found.layout, seen.found.nominal.model, seen.found.fit.model, seen.noise)
         tones = seen.split.tones_hz if seen.split else ()
@@ -50,7 +50,7 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
                 picture(figures.spectrum(left, tones), "Lines of the error. Errors only at excited frequencies are linear "
                         "(delay, skin effect, iron loss); lines between them are distortion.", raster=True),
             ]),
-            _classes(document), _parameters(document), _limits(document),
+            _classes(document), _parameters(document), _limits(document, _units(seen)),
         ]
     sections.append(Section("The data", [*(seen.audit.sentences or ("Nothing unusual was found in the file.",))]))
     return Page(
@@ -64,12 +64,30 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
 def headline(document: Mapping[str, Any]) -> str:
     """The one sentence of the verdict, with the names."""
     names = ", ".join(_spoken(c["name"]) for c in document["causes"]) or "none"
-    classes = "; ".join(" or ".join(_spoken(n) for n in (c["name"], *c["equivalent"])) for c in document["causes"])
+    if document["kind"] == "points":
+        return str(document["reason"])
+    tied = [c for c in document["causes"] if c["equivalent"]]
+    classes = "; ".join(" or ".join(_spoken(n) for n in (c["name"], *c["equivalent"])) for c in tied)
     return HEADLINES[document["verdict"]].format(names=names, classes=classes)
 
 
 def _spoken(name: str) -> str:
     return name.replace("_", " ")
+
+
+def _quantity_name(key: str) -> str:
+    """`half_current_a` without the unit that the value carries anyway."""
+    for unit in ("_a_per_min", "_rad_per_s", "_ppm", "_us", "_ms", "_wb", "_nf", "_v", "_a", "_s"):
+        if key.endswith(unit):
+            return _spoken(key.removesuffix(unit))
+    return _spoken(key)
+
+
+def _in_words(reason: str) -> str:
+    """The reason with the names of causes as people say them."""
+    for name in CATALOGUE:
+        reason = reason.replace(name, _spoken(name))
+    return reason
 
 
 def _facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -92,7 +110,7 @@ def _causes(document: Mapping[str, Any]) -> Section:
         return Section("Causes", ["No cause passed the rules. The last table lists what would have been seen."])
     rows, tones = [], []
     for cause in document["causes"]:
-        sizes = "; ".join(f"{_spoken(k)} {quantity(v)}" for k, v in cause["parameters"].items())
+        sizes = "; ".join(f"{_quantity_name(k)} {quantity(v)}" for k, v in cause["parameters"].items())
         also = " or ".join(_spoken(n) for n in cause["equivalent"]) or "-"
         rows.append((
             _spoken(cause["name"]), sizes, f"{cause['gain_share']:.1%}", f"{cause['strength_over_noise']:.3g}",
@@ -102,7 +120,7 @@ def _causes(document: Mapping[str, Any]) -> Section:
     meanings = [f"{_spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].signature}." for c in document["causes"]]
     return Section("Causes", [
         Table(
-            ("cause", "size", "share of the error", "times the noise", "probability that the name is right", "could as well be"),
+            ("cause", "size", "share of the error", "its error over the noise", "probability that the name is right", "could as well be"),
             rows, tones,
         ),
         *meanings,
@@ -154,21 +172,29 @@ def _parameters(document: Mapping[str, Any]) -> Section:
     ])
 
 
-def _limits(document: Mapping[str, Any]) -> Section:
+def _units(seen: Diagnosis) -> dict[str, str]:
+    """Unit of every effect's detection limit: that of its first number."""
+    return {} if seen.found is None else {n: x.terms[0].unit for n, x in seen.found.first_screening.scores.items()}
+
+
+def _limits(document: Mapping[str, Any], units: Mapping[str, str]) -> Section:
     found = {c["name"] for c in document["causes"]}
-    rows = [(_spoken(k), CATALOGUE[k].split_by) for k in document["detection_limits"] if k not in found]
+    rows = [
+        (_spoken(k), f"{limit:.2g} {units.get(k, '1')}".removesuffix(" 1"), CATALOGUE[k].split_by)
+        for k, limit in document["detection_limits"].items() if k not in found
+    ]
     never = [f"Never visible from the terminals at standstill: {sentence}." for sentence in document["cannot_tell"]]
     below = document["below_materiality"]
     small = [f"Seen, but too small to matter or not separable from the shape of a named cause: {', '.join(map(_spoken, below))}."] if below else []
     return Section("What was looked for and not found, and what cannot be told", [
-        *small, Table(("looked for", "what would show it better"), rows), *never,
+        *small, Table(("looked for", "these data would have shown it from", "what would show it better"), rows), *never,
     ])
 
 
 def points_page(document: Mapping[str, Any], name: str) -> Page:
     """The page of a points table."""
     rows = [
-        (_spoken(c["name"]), "; ".join(f"{_spoken(k)} {quantity(v)}" for k, v in c["parameters"].items()),
+        (_spoken(c["name"]), "; ".join(f"{_quantity_name(k)} {quantity(v)}" for k, v in c["parameters"].items()),
          f"{c['gain_share']:.1%}", f"{c['p_value']:.1e}")
         for c in document["causes"]
     ]
