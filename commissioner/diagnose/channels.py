@@ -95,10 +95,12 @@ def _heat(record: Record, rotor: Sequence[Array]) -> Named:
 
 
 def _sag(record: Record) -> Named:
-    """Minus lagged electrical power over rated power."""
+    """Minus lagged electrical power over rated power; the command of a sample acts on the current until the next."""
     period, out = record.facts.sample_period_s, []
     for segment in record.segments:
-        power = 1.5 * segment.voltage_axis_v * segment.axis_current_a / record.facts.rated_power_w
+        current = segment.axis_current_a
+        over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
+        power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
         columns = []
         for lag in SAG_LAGS_S:
             a = 1.0 - float(np.exp(-period / lag))

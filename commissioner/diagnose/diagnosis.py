@@ -37,6 +37,7 @@ from commissioner.records import StandstillRecording
 MOSTLY_EXPLAINED_SIGMA, UNEXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.3, 0.95
 COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.7
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+IRON_CORNER_HZ = 300.0
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -141,6 +142,8 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
+    if name == "rotor_skin_effect" and _is_iron_like(found):
+        fixed = ("iron_loss",)
     close = tuple(r for r, loss in rivals.items() if loss < TIE_CHI2)
     features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=1e6), total)
     sure = confidence(features, calibration.WEIGHTS)
@@ -150,6 +153,14 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
         float(np.sqrt(gain / count)), gain, sure, (*fixed, *(c for c in close if c not in fixed)), rivals, tuple(features),
     )
+
+
+def _is_iron_like(found: Found) -> bool:
+    """Second rotor path whose corner lies above those of rotor bars: eddy currents of the iron look the same."""
+    values = found.fit.model.of("rotor_skin_effect")
+    corners = 1.0 / (2.0 * np.pi * found.layout.branch_time_s)
+    weights = np.array([values.get(f"branch_{k}", 0.0) for k in range(corners.size)])
+    return bool(weights[corners >= IRON_CORNER_HZ].sum() > 0.5 * weights.sum())
 
 
 def _audit_causes(audit: Audit, found: Found, noise: Noise) -> list[Cause]:

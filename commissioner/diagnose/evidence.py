@@ -124,7 +124,7 @@ def alternatives(
         for score in screening.ranked()[:3]:
             if score.delta_chi2 < ALTERNATIVE_SHARE * gain:
                 continue
-            trial = fit(without.model.with_terms(score.terms), record, layout, noise)
+            trial = fit(without.model.with_terms(CATALOGUE[score.name].terms(setting)), record, layout, noise)
             if is_plausible(score.name, CATALOGUE[score.name].sizes(setting, trial.model.of(score.name)), record.facts.current_peak_a):
                 rivals[score.name] = (trial.chi2 - found.chi2) * whole / record.samples
         out[name] = rivals

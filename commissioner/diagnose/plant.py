@@ -61,6 +61,8 @@ class Layout:
     substeps: int = 1
     crossing_substeps: int = 12
     legs_slack_v: float = 1.0
+    leak_ratio: float = 0.0
+    """L_sigma / L_M, fixed: how far the rotor current is from the stator current in (3a) of `trajectory`."""
 
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
@@ -290,7 +292,14 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
         kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)]
     r_s, r_r, l_sigma, l_m = model.nominal
     nu = 0.5 + model.total(kinds.NU)
-    base = np.array([r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS), *np.concatenate(aniso)])
+    kappa = 1.0 + (0.5 + model.total(kinds.LEAK_SPLIT)) * layout.leak_ratio
+    # a leakage that differs between directions, half of it on the rotor side, also tilts R_R and 1/L_M (Gamma circuit)
+    coupled = layout.leak_ratio / (1.0 + layout.leak_ratio)
+    rotor, leakage, magnetizing = aniso
+    base = np.array([
+        r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS),
+        *(rotor + coupled * leakage), *leakage, *(magnetizing - 0.5 * coupled * leakage), kappa, layout.leak_ratio, coupled,
+    ])
     stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros(0)
     branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
     legs_size = layout.legs_vectors.shape[0]
@@ -346,10 +355,9 @@ def _sense(
     to_phases = TO_PHASES[:phases]
     current, after, before = (to_phases @ x for x in trajectory)
     period = record.facts.sample_period_s
-    edge = np.diff(to_phases @ segment.voltage_ab_v, axis=1, prepend=0.0) / period
     capacitance = model.sum_kind(CABLE, 3)
-    edges = [edge, np.hstack([np.zeros((phases, 1)), edge[:, :-1]]), np.hstack([edge[:, 1:], np.zeros((phases, 1))])]
-    if capacitance.any():
+    if capacitance.any() or any(t.kind == CABLE for t in listed):
+        edges = _edges(to_phases @ segment.voltage_ab_v / period)
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
     elapsed = segment.time_s - segment.time_s[0]
     late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
@@ -413,6 +421,13 @@ def _sense(
         if term.kind >= kinds.FIRST_OF_SENSING:
             row *= term.step
     return reported
+
+
+def _edges(voltage_per_period: Array) -> list[Array]:
+    """Step of the command at, before and after each sample, over the period."""
+    edge = np.diff(voltage_per_period, axis=1, prepend=0.0)
+    none = np.zeros((edge.shape[0], 1))
+    return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
 
 
 def _low_pass(signal: Array, lag_s: float, period_s: float) -> Array:

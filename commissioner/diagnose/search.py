@@ -30,9 +30,17 @@ RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
 GUARD = 1e-3
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
+CLASS_GUARD = 1e-2
+CLASS_MATES = {
+    "resistance_anisotropy": "inductance_anisotropy", "inductance_anisotropy": "resistance_anisotropy",
+    "iron_loss": "rotor_skin_effect", "rotor_skin_effect": "iron_loss",
+}
+"""Of two causes of one form (a tensor, a second rotor path) the weaker must gain this share of the stronger, else it may
+refine the other's shape."""
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "magnetic_hysteresis", "leakage_saturation"})
 EXPLORED_SAMPLES = 45_000
 CORNERS_HZ = (30.0, 70.0, 150.0, 330.0, 700.0)
+MOST_LEAK_RATIO = 0.15
 STOP_SHARES = (0.02, 0.06, 0.18, 0.5)
 
 Report = Callable[[str], None]
@@ -70,7 +78,7 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         stop_radius_wb=np.array(STOP_SHARES) * flux,
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
-        legs_slack_v=0.003 * peak * model.nominal[0],
+        legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),
     )
     return layout, flux
 
@@ -241,10 +249,15 @@ class _Search:
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
-            trial = fit(current.model.with_terms(score.terms), self.record, self.layout, self.noise)
+            # every number of the effect: how a curve splits between stator and rotor shows only once it bends
+            trial = fit(
+                current.model.with_terms(CATALOGUE[score.name].terms(self.setting)), self.record, self.layout, self.noise
+            )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            if gain < max(guard, self.threshold(score.numbers)) or not self._is_plausible(trial.model, score.name):
+            mate = CLASS_MATES.get(score.name, "")
+            own_guard = CLASS_GUARD * loss_without(current, mate) if mate in {t.effect for t in current.model.terms} else 0.0
+            if gain < max(guard, own_guard, self.threshold(score.numbers)) or not self._is_plausible(trial.model, score.name):
                 if STATISTICAL_FLOOR + STATISTICAL_PER_NUMBER * score.numbers < gain:
                     self.below.append(score.name)
                 continue

@@ -24,6 +24,7 @@ from commissioner.diagnose.kinds import (
     INITIAL_FLUX,
     IRON_CURVE,
     IRON_LOSS,
+    LEAK_SPLIT,
     LEAKAGE_ANISOTROPY,
     LEAKAGE_CURVE,
     LEGS,
@@ -86,6 +87,7 @@ def sensitivities(
     stops = stop_gain.shape[0]
     rs, r_r, gs, gm, nu, g = base[0], base[1], base[2], base[3], base[4], base[5]
     ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
+    kappa, leak_ratio, coupled = base[12], base[13], base[14]
     shrink = 1.0 / (1.0 + g * rs)
     half = 0.5 * period
     has_legs = bool(np.any(legs != 0.0) or np.any(legs_link != 0.0))
@@ -156,16 +158,17 @@ def sensitivities(
         iaa, iab, ibb = gs * (1.0 + las), gs * lbs, gs * (1.0 - las)
         ia, ib = iaa * sa + iab * sb + nu * ja, iab * sa + ibb * sb + nu * jb
         jl = 0
+        ea = eb = eaa = eab = ebb = la = lb = 0.0
         if wants_leak or has_leak:
-            size = np.sqrt(sa * sa + sb * sb) + 1e-12
+            la, lb = x0 - kappa * x2, x1 - kappa * x3
+            size = np.sqrt(la * la + lb * lb) + 1e-12
             jl = spline_weights(size, leak_top, leak.shape[0] - 3, wts, 1)
             big = curve(leak, jl, wts, 1, 0)
             steep = curve(leak, jl, wts, 1, 4) / size
-            ia += big * sa
-            ib += big * sb
-            iaa += big + steep * sa * sa
-            iab += steep * sa * sb
-            ibb += big + steep * sb * sb
+            ea, eb = big * la, big * lb
+            eaa, eab, ebb = big + steep * la * la, steep * la * lb, big + steep * lb * lb
+            ia += ea
+            ib += eb
         # (4)
         ta, tb = (ia + g * va) * shrink, (ib + g * vb) * shrink
         _phases(ta, tb, now)
@@ -194,8 +197,9 @@ def sensitivities(
         vab = (secant[1] - secant[2]) / (2.0 * SQRT3)
         vbb = -0.5 * (secant[1] + secant[2])
         # (6)
-        ca = gm * ((1.0 + mas) * x2 + mbs * x3) + ja - ia
-        cb = gm * (mbs * x2 + (1.0 - mas) * x3) + jb - ib
+        over = kappa - 1.0
+        ca = gm * ((1.0 + mas) * x2 + mbs * x3) + ja - ia - over * ea
+        cb = gm * (mbs * x2 + (1.0 - mas) * x3) + jb - ib - over * eb
         for n in range(branches):
             ca -= branch_gain[n] * states[t, 4 + 2 * n]
             cb -= branch_gain[n] * states[t, 5 + 2 * n]
@@ -222,7 +226,7 @@ def sensitivities(
             elif kind == NU:
                 fja, fjb = jaa * sa + jab * sb, jab * sa + jbb * sb
                 fia, fib = ja, jb
-            elif kind == LEGS or kind == LEGS_LINK:
+            elif kind in (LEGS, LEGS_LINK):
                 if t > 0:
                     f = link_factor[held] if kind == LEGS_LINK else 1.0
                     for c in range(width):
@@ -233,7 +237,12 @@ def sensitivities(
                 fja, fjb = f * pa, f * pb
             elif kind == LEAKAGE_CURVE:
                 f = curve(leak_vectors[n], jl, wts, 1, 0)
-                fia, fib = f * sa, f * sb
+                fia, fib = f * la, f * lb
+                fwa, fwb = -over * (waa * fia + wab * fib), -over * (wab * fia + wbb * fib)
+            elif kind == LEAK_SPLIT:
+                fia, fib = -leak_ratio * (eaa * x2 + eab * x3), -leak_ratio * (eab * x2 + ebb * x3)
+                qa, qb = -over * fia - leak_ratio * ea, -over * fib - leak_ratio * eb
+                fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
             elif kind == STOP:
                 fja, fjb = stop_states[t, n, 0] / stop_radius[n], stop_states[t, n, 1] / stop_radius[n]
             elif kind == BRANCH:
@@ -257,6 +266,11 @@ def sensitivities(
                 fwa, fwb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
             elif kind == LEAKAGE_ANISOTROPY:
                 fia, fib = (gs * sa, -gs * sb) if n == 0 else (gs * sb, gs * sa)
+                qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
+                fwa, fwb = -0.5 * coupled * (waa * qa + wab * qb), -0.5 * coupled * (wab * qa + wbb * qb)
+                qa, qb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
+                fwa += coupled * qa
+                fwb += coupled * qb
             elif kind == MAGNETIZING_ANISOTROPY:
                 qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
@@ -297,19 +311,23 @@ def sensitivities(
                     fj[1, p] += f * dz[s, 1, p]
 
         # di = shrink (Ds dpsi_s + Dr dpsi_R) + push_t ;  dw = Ws dpsi_s + Wr dpsi_R + push_w
-        s_aa, s_ab, s_bb = iaa + nu * nu * jaa, iab + nu * nu * jab, ibb + nu * nu * jbb
+        s_aa, s_ab, s_bb = iaa + eaa + nu * nu * jaa, iab + eab + nu * nu * jab, ibb + ebb + nu * nu * jbb
         f = nu * (1.0 - nu)
-        r_aa, r_ab, r_bb = f * jaa - iaa, f * jab - iab, f * jbb - ibb
-        m_aa, m_ab, m_bb = nu * jaa - s_aa, nu * jab - s_ab, nu * jbb - s_bb
-        f = 1.0 - nu
-        n_aa, n_ab, n_bb = gm * (1.0 + mas) + f * jaa - r_aa, gm * mbs + f * jab - r_ab, gm * (1.0 - mas) + f * jbb - r_bb
+        r_aa, r_ab, r_bb = f * jaa - iaa - kappa * eaa, f * jab - iab - kappa * eab, f * jbb - ibb - kappa * ebb
+        m_aa = nu * jaa - s_aa - over * eaa
+        m_ab = nu * jab - s_ab - over * eab
+        m_bb = nu * jbb - s_bb - over * ebb
+        f, h = 1.0 - nu, over * kappa
+        n_aa = gm * (1.0 + mas) + f * jaa - r_aa + h * eaa
+        n_ab = gm * mbs + f * jab - r_ab + h * eab
+        n_bb = gm * (1.0 - mas) + f * jbb - r_bb + h * ebb
         # rotor branches at the end of the period: w' = K (... - W (S0 + beta w))
         kaa, kab, kba, kbb = waa, wab, wab, wbb
         if has_branches:
             d = (1.0 + beta * waa) * (1.0 + beta * wbb) - beta * beta * wab * wab
-            eaa, eab, ebb = (1.0 + beta * wbb) / d, -beta * wab / d, (1.0 + beta * waa) / d
-            kaa, kab = eaa * waa + eab * wab, eaa * wab + eab * wbb
-            kba, kbb = eab * waa + ebb * wab, eab * wab + ebb * wbb
+            baa, bab, bbb = (1.0 + beta * wbb) / d, -beta * wab / d, (1.0 + beta * waa) / d
+            kaa, kab = baa * waa + bab * wab, baa * wab + bab * wbb
+            kba, kbb = bab * waa + bbb * wab, bab * wab + bbb * wbb
         ws00, ws01 = kaa * m_aa + kab * m_ab, kaa * m_ab + kab * m_bb
         ws10, ws11 = kba * m_aa + kbb * m_ab, kba * m_ab + kbb * m_bb
         wr00, wr01 = kaa * n_aa + kab * n_ab, kaa * n_ab + kab * n_bb
@@ -323,7 +341,7 @@ def sensitivities(
             qb -= ub
             if has_branches:
                 fwa, fwb = push_w[0, p], push_w[1, p]
-                push_w[0, p], push_w[1, p] = eaa * fwa + eab * fwb, eab * fwa + ebb * fwb
+                push_w[0, p], push_w[1, p] = baa * fwa + bab * fwb, bab * fwa + bbb * fwb
                 ca, cb = beta * dw[0, p], beta * dw[1, p]
                 for n in range(branches):
                     h = half / branch_time[n]

@@ -5,16 +5,18 @@ all as (alpha, beta) pairs. With fluxes as states every nonlinearity is explicit
 
     psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
     j      = G(|psi_0|) psi_0 + sum h_k z_k / r_k   extra magnetizing current, z_k stop operator of radius r_k (2)
-    i_s    = (1/L_sigma + S(|psi_sigma|) + A_sigma) psi_sigma + nu j,     psi_sigma = psi_s - psi_R          (3)
+    i_s    = (1/L_sigma + A_sigma) psi_sigma + e + nu j,                  psi_sigma = psi_s - psi_R          (3)
+    e      = S(|phi|) phi,   phi = psi_s - kappa psi_R          extra current of the saturating leakage path (3a)
     i      = (i_s + g v) / (1 + g R_s)              iron-loss conductance g across d psi_s/dt                (4)
     d psi_s/dt = v + v_legs(i) - R_uvw i                                                                     (5)
-    w      = R_R (psi_R / L_M + j - i_s - sum g_k q_k)                                                       (6)
+    w      = R_R (psi_R / L_M + j - i_s - (kappa - 1) e - sum g_k q_k)                                       (6)
     d psi_R/dt = -w + omega J psi_R,     T_k d q_k/dt = w - q_k                                              (7)
 
 (1)-(3) and (6) follow from the T circuit with a saturating branch, rotor side scaled by L_m/L_r: an extra current j
 drawn at the magnetizing node gives psi_s = L_sigma i_s + psi_R - mu j, psi_m = psi_R + mu (i_s - j),
 i_R = psi_R/L_M - i_s + j, with mu = nu L_sigma the rotor-side share of the leakage (linear case: G. R. Slemon,
-IEEE Trans. Ind. Appl. 25(6), 1989).
+IEEE Trans. Ind. Appl. 25(6), 1989). In the same way kappa = 1 + x L_sigma/L_M carries a leakage that saturates with the
+stator current (x = 0), with the rotor current (x = 1, the Gamma circuit) or with both.
 
 Classical fourth-order Runge-Kutta with the voltage held over the sample, in steps fine enough for the leg curve; a
 model without nonlinearity, branch or modulation is stepped exactly.
@@ -47,7 +49,7 @@ def _slope(
     stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
 ):
     """Right-hand side (1)-(7) at x into k[stage]; terminal current and its slope into out[0:4], stops into out[4:]."""
-    rs, gs, gm, nu, g = base[0], base[2], base[3], base[4], base[5]
+    rs, gs, gm, nu, g, kappa = base[0], base[2], base[3], base[4], base[5], base[12]
     ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
     branches = branch_gain.shape[0]
     stops = stop_gain.shape[0]
@@ -75,17 +77,19 @@ def _slope(
     # (3)
     sa = x[0] - x[2]
     sb = x[1] - x[3]
-    big_s = slope_s = 0.0
+    ea = eb = eaa = eab = ebb = 0.0
     if leak.shape[0] > 0:
-        size = np.sqrt(sa * sa + sb * sb) + 1e-12
+        fa = x[0] - kappa * x[2]
+        fb = x[1] - kappa * x[3]
+        size = np.sqrt(fa * fa + fb * fb) + 1e-12
         j = spline_weights(size, leak_top, leak.shape[0] - 3, wts, 1)
         big_s = curve(leak, j, wts, 1, 0)
         slope_s = curve(leak, j, wts, 1, 4) / size
-    ia = (gs + big_s) * sa + gs * (las * sa + lbs * sb) + nu * ja
-    ib = (gs + big_s) * sb + gs * (lbs * sa - las * sb) + nu * jb
-    iaa = gs + big_s + slope_s * sa * sa + gs * las
-    iab = slope_s * sa * sb + gs * lbs
-    ibb = gs + big_s + slope_s * sb * sb - gs * las
+        ea, eb = big_s * fa, big_s * fb
+        eaa, eab, ebb = big_s + slope_s * fa * fa, slope_s * fa * fb, big_s + slope_s * fb * fb
+    iaa, iab, ibb = gs * (1.0 + las), gs * lbs, gs * (1.0 - las)
+    ia = iaa * sa + iab * sb + ea + nu * ja
+    ib = iab * sa + ibb * sb + eb + nu * jb
     # (4)
     shrink = 1.0 / (1.0 + g * rs)
     ta = (ia + g * va) * shrink
@@ -104,8 +108,8 @@ def _slope(
     k[stage, 0] = va - (2.0 * eu - ev - ew) / 3.0
     k[stage, 1] = vb - (ev - ew) / SQRT3
     # (6), (7)
-    ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia
-    cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib
+    ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia - (kappa - 1.0) * ea
+    cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib - (kappa - 1.0) * eb
     for n in range(branches):
         ca -= branch_gain[n] * x[4 + 2 * n]
         cb -= branch_gain[n] * x[5 + 2 * n]
@@ -132,10 +136,10 @@ def _slope(
         f = stop_gain[s] / max(length, r)
         dja += f * (qa - along * ya)
         djb += f * (qb - along * yb)
-    ea = k[0, 0] - k[0, 2]
-    eb = k[0, 1] - k[0, 3]
-    out[2] = (iaa * ea + iab * eb + nu * dja) * shrink
-    out[3] = (iab * ea + ibb * eb + nu * djb) * shrink
+    ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
+    fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
+    out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja) * shrink
+    out[3] = (iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb) * shrink
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)

@@ -105,12 +105,16 @@ def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="DC staircase with a small high tone on top",
 )
 def leakage_saturation(setting: Setting) -> tuple[Term, ...]:
-    """Extra inverse leakage S(|psi_sigma|) >= 0 [1/H], a rising cubic spline with S(0) = 0 over the leakage flux reached."""
+    """Extra inverse leakage S(|phi|) >= 0 [1/H], a rising cubic spline with S(0) = 0 over the leakage flux reached.
+
+    `split` moves it between the leakage of the stator current (-0.5) and of the rotor current (+0.5).
+    """
     count = setting.layout.leak_vectors.shape[0]
     step = 0.01 * setting.facts.current_peak_a / setting.layout.leak_top_wb
-    return tuple(
+    curve = tuple(
         Term("leakage_saturation", f"curve_{k}", "1/H", kinds.LEAKAGE_CURVE, k, step, 0.0, np.inf) for k in range(count)
     )
+    return (*curve, Term("leakage_saturation", "split", "1", kinds.LEAK_SPLIT, 0, 0.1, -0.7, 0.7))
 
 
 def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -222,7 +226,10 @@ def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="three or more axes",
 )
 def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
-    """1/L_sigma times (1 + [c s; s -c]), and the same for 1/L_M; needs at least two axes."""
+    """1/L_sigma times (1 + [c s; s -c]), and the same for 1/L_M; needs at least two axes.
+
+    A leakage tensor, half of it on the rotor side, also turns R_R and 1/L_M a little: that part is tied to it.
+    """
     if setting.axes < 2:
         return ()
     parts = (("leakage", kinds.LEAKAGE_ANISOTROPY), ("magnetizing", kinds.MAGNETIZING_ANISOTROPY))
