@@ -10,6 +10,7 @@ import time
 import pytest
 
 from commissioner.recordings.table import read_table, to_standstill
+from tests.campaigns.combinations import CASES, run_case
 from tests.support.command_line import COMMAND, at_flux, call, truth
 from tests.support.sim_process import SimProcess
 
@@ -296,6 +297,17 @@ def test_a_motor_that_would_pass_the_flux_limit_is_held_back_in_truth(tmp_path):
     limit = answer.json["flux_guard"]["limit_wb"]
     assert answer.code in (0, 3, 4)
     assert peak <= 1.02 * limit
+
+
+@pytest.mark.parametrize("name", ["large_motor", "0k18_small_inverter", "15k_hard"])
+def test_another_motor_behind_another_inverter_is_commissioned_as_well(name, tmp_path):
+    """A short version, one axis, of `python -m tests.campaigns.combinations`."""
+    case = next(case for case in CASES if case.name == name)
+    outcome = run_case(case, tmp_path, arguments=("--axes", "0"))
+    assert outcome.ended == "commissioned", outcome.reason
+    for parameter, percent in outcome.errors_percent.items():
+        assert abs(percent) < 3.0, parameter
+    assert 0.6 < outcome.peak <= 1.02
 
 
 def _wait_for(condition, seconds: float = 60.0) -> None:
