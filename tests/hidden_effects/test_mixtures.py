@@ -1,0 +1,43 @@
+"""Nothing, two causes, a cause that is in no catalogue, and a tie, blind: the key is opened after the verdict."""
+
+import pytest
+
+from tests.hidden_effects.blind import diagnosed, hidden_names
+from tests.hidden_effects.cases import NULL_NOISES, Case, class_of
+
+
+@pytest.mark.parametrize("noise", NULL_NOISES)
+@pytest.mark.parametrize("excitation", ["rich", "poor"])
+def test_nothing_is_found_where_nothing_is_hidden(noise, excitation):
+    seen, scenario = diagnosed(Case("null", 50, "", excitation, noise))
+    assert hidden_names(scenario) == set()
+    assert seen.causes == (), seen.reason
+    assert seen.verdict.value == "nothing_significant"
+
+
+@pytest.mark.parametrize("seed", [50, 51, 52, 53])
+def test_two_causes_are_both_named_and_nothing_else_is(seed):
+    seen, scenario = diagnosed(Case("two", seed, noise="white"))
+    hidden = hidden_names(scenario)
+    named = [{c.name, *c.equivalent} for c in seen.causes]
+    assert all(any(class_of(name) & names for names in named) for name in hidden), (hidden, named)
+    assert all(any(class_of(name) & names for name in hidden) for names in named), (hidden, named)
+
+
+@pytest.mark.parametrize("seed", [60, 62])
+def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
+    seen, scenario = diagnosed(Case("absent", seed, noise="white"))
+    assert hidden_names(scenario) == set() and scenario.document["unlisted"]
+    assert seen.verdict.value == "unexplained", seen.reason
+
+
+def test_a_forbidden_cause_is_not_replaced_by_a_wrong_name_that_explains_everything():
+    case = Case("absent", 61, "sensor_gain_mismatch", noise="white", excluded=("sensor_gain_mismatch",))
+    assert diagnosed(case)[0].verdict.value == "unexplained"
+
+
+def test_a_loss_of_leg_voltage_is_a_tie_with_the_experiment_that_splits_it():
+    seen, _ = diagnosed(Case("one", 70, "device_drop", noise="white"))
+    assert seen.verdict.value == "not_distinguishable"
+    assert {"dead_time", "device_drop"} == {seen.causes[0].name, *seen.causes[0].equivalent}
+    assert "switching frequency" in seen.next_experiment["do"] and seen.next_experiment["predicted_sigma"] >= 10.0
