@@ -29,6 +29,8 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
     screen.out.print(
         "[green]snapshot restored, read back and stored[/]" if rows else "the drive held the snapshot's values already"
     )
+    if done.wear_fraction is not None:
+        screen.out.print(f"{done.store_count} writes of the drive's memory so far, {done.wear_fraction:.3%} of its life")
 
 
 def replay_run(runs: Path, run: str, *, as_json: bool) -> None:

@@ -74,8 +74,10 @@ class LiveView:
                 )
             case told.VerdictReached():
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")
-            case told.ParametersWritten(written=written):
+            case told.ParametersWritten(written=written, store_count=count, wear_fraction=wear):
                 self._line(f"    {len(written)} parameters written, read back and stored")
+                if wear is not None:
+                    self._line(f"    {count} writes of the drive's memory so far, {wear:.3%} of its life")
             case told.StepProgress():
                 self._show(f"axis {record.axis_deg:g}°", record.fraction, record.numbers)
 

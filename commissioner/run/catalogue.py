@@ -93,12 +93,19 @@ def _written(records: list[dict[str, Any]]) -> str:
     said = "as before"
     for line in records:
         if line["kind"] == "parameters_written":
-            said = "new, read back and stored"
+            said = "new, read back and stored" + _wear(line["record"])
         elif line["kind"] == "snapshot_restored":
-            said = "as before (restored)"
+            said = "as before (restored)" + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
             said = "old or new: read the drive, or `commissioner restore` this run"
     return said
+
+
+def _wear(report: Any) -> str:
+    """How much of the drive's non-volatile memory is used up, where the drive counts its writes."""
+    facts = report if isinstance(report, dict) else {}
+    used, endurance = facts.get("store_count_after"), facts.get("endurance_writes")
+    return f"; {used} of {endurance} writes of the drive's memory used" if used and endurance else ""
 
 
 def _touches_parameters(intent: Any) -> bool:
