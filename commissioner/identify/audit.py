@@ -18,6 +18,11 @@ from commissioner.records import Signal, StandstillRecording
 STEP = "audit the recording"
 SHORTEST_S = 0.5
 LARGEST_CROSS_CURRENT = 0.25
+LARGEST_ROTATION = 0.7
+LEAST_POWER_FACTOR = 0.01
+MOST_STRETCHES = 200
+OWN_LINK_SAMPLE = 0.2
+"""Part of the samples at which the link must differ from the one before, or it was not read sample by sample."""
 REST_S = 20.0
 """After a pause this long no rotor holds flux any more; after a shorter one the cage may still carry what the current
 left behind."""
@@ -58,6 +63,7 @@ class Audit:
 def audit(recording: StandstillRecording) -> Audit:
     """The recording's stretches; DataRefused where it is too short, not finite, clipped, unevenly sampled, off its
     axis or without excitation."""
+    _require_standstill(recording)
     _require_finite(recording)
     _require_even_steps(recording)
     stretches = _cut(recording)
@@ -74,9 +80,17 @@ def audit(recording: StandstillRecording) -> Audit:
         raise _refuse(
             "the recording is too short", f"{seconds:.3g} s excited", f"{SHORTEST_S} s", "record several seconds"
         )
+    if len(excited) > MOST_STRETCHES:
+        raise _refuse(
+            "the recording is in too many pieces",
+            f"{len(excited)} stretches without a hole",
+            f"at most {MOST_STRETCHES}",
+            "record without losing samples, and number the segments by when the drive was energised",
+        )
     for stretch in excited:
         _require_current(stretch)
         _require_on_axis(stretch)
+        _require_power(stretch)
     _require_unclipped(recording)
     remarks = tuple(
         f"segment {s.segment} holds no excitation and was used for noise and offset only"
@@ -195,7 +209,8 @@ def _link_ratio(dc_link_v: Signal | None, a: int, b: int) -> Signal | None:
     if dc_link_v is None or not np.all(np.isfinite(dc_link_v)):
         return None
     median = float(np.median(dc_link_v))
-    if median <= 0.0 or np.ptp(dc_link_v[a:b]) <= 0.0:
+    changes = np.diff(dc_link_v[a:b]) != 0.0
+    if median <= 0.0 or not changes.size or np.mean(changes) < OWN_LINK_SAMPLE:
         return None
     return np.asarray(dc_link_v[a:b] / median)
 
@@ -218,6 +233,17 @@ def _kind(voltage: Signal, everything: Signal) -> str:
 
 
 # -- refusals -----------------------------------------------------------------------------------------------------
+
+
+def _require_standstill(recording: StandstillRecording) -> None:
+    kind = recording.metadata.get("kind", "standstill")
+    if kind != "standstill":
+        raise _refuse(
+            "this is not a standstill recording",
+            f"kind: {kind}",
+            "kind: standstill",
+            "give a recording of a motor at rest, or use `commissioner monitor` for one that runs",
+        )
 
 
 def _require_finite(recording: StandstillRecording) -> None:
@@ -249,6 +275,14 @@ def _require_even_steps(recording: StandstillRecording) -> None:
     steps = np.diff(recording.time_s)[inside] / recording.sample_period_s
     if steps.size == 0:
         raise _refuse("no segment holds two samples", steps.size, "consecutive samples", "number the segments")
+    usual = float(np.median(steps))
+    if abs(usual - 1.0) > 0.05:
+        raise _refuse(
+            "the time steps are not those of the named sample period",
+            f"most are {usual * recording.sample_period_s:.6g} s",
+            f"sample_period_s {recording.sample_period_s:.6g} s",
+            "give time_s and sample_period_s in seconds",
+        )
     off = np.abs(steps - np.maximum(np.round(steps), 1.0))
     if np.max(off) > 0.05:
         worst = int(np.argmax(off))
@@ -276,6 +310,13 @@ def _require_on_axis(stretch: Stretch) -> None:
     along = float(np.sqrt(np.mean(stretch.current_a**2)))
     across = float(np.sqrt(np.mean((stretch.cross_a - np.mean(stretch.cross_a)) ** 2)))
     matched = abs(float(np.mean(stretch.cross_a * stretch.current_a))) / max(along, 1e-12)
+    if stretch.kind != "staircase" and across > LARGEST_ROTATION * along and matched < LARGEST_CROSS_CURRENT * along:
+        raise _refuse(
+            f"segment {stretch.segment}: the current rotates",
+            f"{across:.3g} A rms across the axis, {along:.3g} A along it, unrelated",
+            f"at most {LARGEST_ROTATION:.0%} of the current across the axis",
+            "record with the motor at rest and one axis excited; a running motor is for `commissioner monitor`",
+        )
     if (stretch.kind != "staircase" and max(matched, 0.0) > LARGEST_CROSS_CURRENT * along) or across > 2.0 * along:
         moment = np.mean((stretch.current_a + 1j * stretch.cross_a) ** 2)
         seen = (stretch.axis_deg + math.degrees(0.5 * float(np.angle(moment)))) % 180.0
@@ -284,6 +325,19 @@ def _require_on_axis(stretch: Stretch) -> None:
             f"axis_deg {stretch.axis_deg:g}, current along {seen:.1f} deg (modulo 180)",
             f"at most {LARGEST_CROSS_CURRENT:.0%} of the current across the axis",
             "correct axis_deg, or the order of the phases",
+        )
+
+
+def _require_power(stretch: Stretch) -> None:
+    """A machine at standstill only takes power in."""
+    rms = float(np.sqrt(np.mean(stretch.voltage_v**2) * np.mean(stretch.current_a**2)))
+    power = float(np.mean(stretch.voltage_v * stretch.current_a))
+    if power < LEAST_POWER_FACTOR * rms:
+        raise _refuse(
+            f"segment {stretch.segment}: the current does not follow the voltage",
+            f"power factor {power / rms:.2f}",
+            f"above {LEAST_POWER_FACTOR}",
+            "check the sign of the current sensors, the order of the phases, axis_deg and the alignment in time",
         )
 
 

@@ -110,13 +110,15 @@ def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterat
     white = sigma2 * inverse
     scores = np.vstack(at.block_scores)[:, free]
     sandwich = inverse @ (scores.T @ scores) @ inverse
-    ratio = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(white), 1e-300), 1.0))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        ratio = np.sqrt(np.maximum(np.nan_to_num(np.diag(sandwich) / np.diag(white), nan=1.0), 1.0))
     # With few blocks the sandwich itself scatters: only what a white residual would not show counts.
     blocks = max(int(np.sum(np.any(scores != 0.0, axis=1))), 1)
     doubt = 1.0 + 2.0 / math.sqrt(2.0 * blocks)
     widen = np.where(ratio > doubt, ratio, 1.0)
     covariance = np.zeros((problem.total, problem.total))
-    covariance[np.ix_(free, free)] = white * np.outer(widen, widen)
+    with np.errstate(over="ignore", invalid="ignore"):
+        covariance[np.ix_(free, free)] = white * np.outer(widen, widen)
     shared = problem.model.size
     fit = BatchFit(
         model=problem.model,

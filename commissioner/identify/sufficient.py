@@ -9,9 +9,26 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.identify.audit import Audit, tones_in
 from commissioner.identify.batch import BatchFit
+from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.standstill import admittance_s
 
 WORST_RELATIVE_STD = 0.25
+PLAUSIBLE_CURRENT = (1e-3, 10.0)
+"""Largest current of a test, of the rated peak."""
+
+
+def require_amperes(examined: Audit, plate: Nameplate) -> None:
+    """Currents of the size a test on this motor can have: other units, or another motor's plate, show here."""
+    peak = max(float(np.max(np.abs(s.current_a))) for s in examined.stretches if s.is_excited)
+    share = peak / plate.rated_current_peak_a
+    if not PLAUSIBLE_CURRENT[0] < share < PLAUSIBLE_CURRENT[1]:
+        raise DataRefused(
+            "the currents do not fit the nameplate",
+            step="check the excitation",
+            value=f"largest current along the axis {peak:.3g} A",
+            limit=f"{PLAUSIBLE_CURRENT[0]:g} to {PLAUSIBLE_CURRENT[1]:g} times {plate.rated_current_peak_a:.3g} A",
+            remedy="give currents in ampere, and the nameplate of the motor that was recorded",
+        )
 
 
 def require_tones(examined: Audit, period_s: float) -> None:

@@ -183,6 +183,33 @@ def test_short_nan_uneven_and_unexcited_recordings_are_refused_by_name():
     assert "excited" in str(refused(changed(voltage_axis_v=np.zeros_like(good.time_s))))
 
 
+def test_a_current_against_the_voltage_or_in_other_units_is_refused():
+    good = recording()
+    names = ("current_u_a", "current_v_a", "current_w_a")
+    assert "does not follow" in str(refused(changed(**{n: -getattr(good, n) for n in names})))
+    assert "nameplate" in str(refused(changed(**{n: 1e3 * getattr(good, n) for n in names})))
+
+
+def test_a_running_motor_is_refused():
+    time = np.arange(15000) * PERIOD_S
+    phases = {f"current_{k}_a": 7.0 * np.cos(314.0 * time - 2.094 * j - 0.6) for j, k in enumerate("uvw")}
+    rows = {"time_s": time, "segment": np.zeros(15000, dtype=np.int64), "axis_deg": np.zeros(15000)}
+    assert "rotates" in str(refused(changed(**rows, **phases, voltage_axis_v=300.0 * np.cos(314.0 * time))))
+    assert "standstill" in str(refused(changed(metadata=PLATE | {"kind": "running"})))
+
+
+def test_time_in_other_units_and_a_recording_in_shreds_are_refused():
+    good = recording()
+    assert "sample period" in str(refused(changed(time_s=1e3 * good.time_s)))
+    keep = np.arange(good.time_s.size) % 50 != 0
+    columns = {
+        f.name: getattr(good, f.name)[keep]
+        for f in dataclasses.fields(good)
+        if isinstance(getattr(good, f.name), np.ndarray)
+    }
+    assert "pieces" in str(refused(dataclasses.replace(good, **columns)))
+
+
 def test_clipped_currents_are_refused_and_the_channel_named():
     good = recording(axis_deg=0.0)
     top = 0.8 * np.max(good.current_u_a)
