@@ -127,7 +127,7 @@ def client_context(url: TlsUrl) -> ssl.SSLContext:
             context.load_cert_chain(url.cert, url.key, password=_refuse_password)
     except (ssl.SSLError, OSError) as error:
         raise UsageError(
-            f"the TLS files for {url} cannot be used", step="read TLS files", value=str(error),
+            f"the TLS files for {url} cannot be used", step="read TLS files", value=error.strerror or str(error),
             limit="PEM files: CA certificates, our certificate and its key", remedy="check ca=, cert= and key=",
         ) from error
     return context

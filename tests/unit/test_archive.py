@@ -127,6 +127,10 @@ def intent(action):
         ([("about_to", intent("store")), ("snapshot_restored", {})], "as before (restored)"),
         ([("about_to", intent("store")), ("parameters_written", {}), ("about_to", intent("stage"))], "old or new"),
         ([("parameters_written", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
+        (
+            [("parameters_written", {"store_count_after": 18, "endurance_writes": 100000})],
+            "new, read back and stored; 18 of 100000 writes",
+        ),
     ],
 )
 def test_the_last_word_of_the_journal_says_which_parameters_the_drive_holds(folder, lines, says):
