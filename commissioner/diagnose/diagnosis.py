@@ -107,10 +107,12 @@ def diagnose(
         return Diagnosis(Verdict.REFUSED, audit.refusal, (), (), audit)
     noise = measure_noise(record)
     report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
-    found = search(record, noise, excluded=excluded, report=report)
-    mixed = _mixed_motors(found)
-    if mixed:
-        return Diagnosis(Verdict.REFUSED, mixed, (), (), audit, noise)
+    excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
+    try:
+        found = search(record, noise, excluded=excluded, report=report, check=_one_motor)
+        _one_state(found.fit, found.record)
+    except _MixedMotors as mixed:
+        return Diagnosis(Verdict.REFUSED, str(mixed), (), (), audit, noise)
     return _conclude(found, audit, noise, report)
 
 
@@ -231,26 +233,45 @@ def _limits(found: Found) -> dict[str, float]:
     return out
 
 
-def _mixed_motors(found: Found) -> str | None:
-    """Files whose own four-parameter fits differ by more than a tenth and a thousand standard deviations' worth."""
-    files = sorted({s.file for s in found.record.segments})
+class _MixedMotors(Exception):
+    """The files are not of one motor in one state."""
+
+
+def _one_motor(nominal: Fit, record: Record) -> None:
+    """Before the search: a leakage that differs by half between files is no effect of level."""
+    _compare_files(nominal, record, slice(2, 3), 0.4)
+
+
+def _one_state(fitted: Fit, record: Record) -> None:
+    _compare_files(fitted, record, slice(0, 3), 0.2)
+
+
+def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> None:
+    """Raises when the files' own four-parameter fits (one step from the common one) differ by more than `most`."""
+    files = sorted({s.file for s in record.segments})
     if len(files) < 2:
-        return None
-    normal, model = found.fit.normal, found.fit.model
+        return
     estimates = []
     for file in files:
-        rows = [k for k, s in enumerate(found.record.segments) if s.file == file]
-        gram, slope = normal.gram[rows].sum(axis=0)[:4, :4], normal.slope[rows].sum(axis=0)[:4]
+        rows = [k for k, s in enumerate(record.segments) if s.file == file]
+        gram, slope = fitted.normal.gram[rows].sum(axis=0)[:4, :4], fitted.normal.slope[rows].sum(axis=0)[:4]
         estimates.append(np.linalg.solve(gram, slope))
     spread = np.ptp(np.array(estimates), axis=0)
     names = ("R_s", "R_R", "L_sigma", "L_M")
-    worst = int(np.argmax(spread[:3]))
-    if spread[worst] > 0.2:
-        return (
+    worst = which.start + int(np.argmax(spread[which]))
+    if spread[worst] > most:
+        raise _MixedMotors(
             f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
-            f"(fitted together: {model.nominal[worst]:.4g}); diagnose them one by one"
+            f"(fitted together: {fitted.model.nominal[worst]:.4g}); diagnose them one by one"
         )
-    return None
+
+
+def _not_told_apart(lines: int) -> tuple[str, ...]:
+    """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then."""
+    if lines > 2:
+        return ()
+    linear = tuple(name for name, entry in CATALOGUE.items() if entry.family == "linear")
+    return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")
 
 
 def _remarks(noise: Noise, record: Record) -> tuple[str, ...]:
