@@ -109,7 +109,6 @@ def design(
     Energised time: `DEFAULT_SECONDS` up to a rotor time constant of 0.5 s, in proportion beyond. The inverter's lost
     voltage is added to the command so that the motor sees about what was designed.
     """
-    limits = _beside_bias(limits, estimate, inverter, dc_bias_v)
     time_s = seconds or DEFAULT_SECONDS * max(1.0, estimate.rotor_time_constant_s / 0.5)
     frequencies, shares = _minimax(estimate, limits, time_s, sample_period_s)
     grid_hz = 10.0 ** math.floor(math.log10(min(frequencies) / 3.0))
@@ -129,23 +128,6 @@ def design(
     peak_flux, peak_current = predicted_peaks(estimate, replace_tones(excitation, amplitudes), sample_period_s)
     r = [float(v) for v in relative]
     return DesignedExcitation(excitation, peak_flux, peak_current, (r[0], r[1], r[2], r[3]), time_s, limits.noise_a)
-
-
-def _beside_bias(
-    limits: ExcitationLimits, machine: InverseGamma, inverter: InverterError, bias_v: float
-) -> ExcitationLimits:
-    """What a DC bias leaves of the limits for the tones."""
-    if not bias_v:
-        return limits
-    lost_v = max(float(inverter.on_axis(np.array([limits.current_a]), 0.0)[0]), 0.0)
-    current_a = max(abs(bias_v) - lost_v, 0.0) / machine.stator_resistance_ohm
-    flux_wb = (machine.leakage_inductance_h + machine.magnetizing_inductance_h) * current_a
-    return replace(
-        limits,
-        current_a=max(limits.current_a - current_a, 0.1 * limits.current_a),
-        flux_wb=max(limits.flux_wb - flux_wb, 0.1 * limits.flux_wb),
-        voltage_v=max(limits.voltage_v - abs(bias_v), 0.1 * limits.voltage_v),
-    )
 
 
 def replace_tones(excitation: Excitation, amplitudes: Sequence[float] | NDArray[np.float64]) -> Excitation:

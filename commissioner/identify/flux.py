@@ -77,7 +77,6 @@ class FluxGuard:
     began_s: float = 0.0
     """Time between the excitation's start and the first sample."""
     _integral: tuple[float, float] = field(default=(0.0, 0.0), init=False)
-    _slow: tuple[float, float] = field(default=(0.0, 0.0), init=False)
     _samples: int = field(default=0, init=False)
     _scale_since_s: float = field(default=0.0, init=False)
     _last_scale: float = field(default=0.0, init=False)
@@ -88,6 +87,8 @@ class FluxGuard:
     _recent: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
+        if self.excitation.dc_bias_v:
+            raise ValueError("the guard limits the amplitude of tones; what a DC bias does is out of its reach")
         self._span_a = max(self.inverter.current_a[-1], 1e-9)
         self._lost_v = self.inverter.on_axis(np.linspace(0.0, self._span_a, LOSS_ROWS), self.axis_deg)
 
@@ -98,10 +99,9 @@ class FluxGuard:
         Either flux stays below it even without resistance and inverter, or the whole command stays inside the measured
         dead band (`SURE_LOSS` of it), where no current flows. The two do not add up: fast tones carry slow ones across.
         """
-        bias = 1.0 if self.excitation.dc_bias_v == 0.0 else 0.5
         command_v = sum(t.amplitude_v for t in self.excitation.tones)
         in_dead_band = SURE_LOSS * self._plateau_v / max(command_v, 1e-12)
-        return min(1.0, max(bias * self.limit_wb / max(self._bound_wb(), 1e-12), in_dead_band))
+        return min(1.0, max(self.limit_wb / max(self._bound_wb(), 1e-12), in_dead_band))
 
     @property
     def _plateau_v(self) -> float:
@@ -113,7 +113,7 @@ class FluxGuard:
         """Take in the block the observer has just taken in; `current_a` is along the axis, `(n,)`."""
         self._samples += lost_before + voltage_v.shape[0]
         time_s = self._samples * self.sample_period_s
-        model_free = self._integrate(voltage_v, current_a, estimate.parameters)
+        model_free = self._integrate(voltage_v, current_a)
         observer = np.abs(estimate.stator_flux_wb)
         observer_wb, model_free_wb = float(np.max(observer)), float(np.max(np.abs(model_free)))
         predicted_wb = self._predict(estimate, float(model_free[-1]), time_s, present_scale)
@@ -139,7 +139,7 @@ class FluxGuard:
     def _window_s(self) -> float:
         return max(0.25 / self._lowest_hz, 0.2)
 
-    def _integrate(self, voltage_v: Signal, current_a: Signal, machine: InverseGamma) -> Signal:
+    def _integrate(self, voltage_v: Signal, current_a: Signal) -> Signal:
         """psi' = u - R_s i - F(i) - 2 zeta w psi - w^2 integral(psi); mean current over the period by trapezoid."""
         from scipy.signal import lfilter
 
@@ -154,30 +154,7 @@ class FluxGuard:
         b = [self.sample_period_s, -self.sample_period_s]
         flux, final = lfilter(b, a, emf, zi=np.array(self._integral))
         self._integral = (float(final[0]), float(final[1]))
-        if self.excitation.dc_bias_v:
-            flux = flux + self._standing(current_a, machine)
         return np.asarray(flux)
-
-    def _standing(self, current_a: Signal, machine: InverseGamma) -> Signal:
-        """What the high-pass has taken from the integral, of the flux L_s i that a lasting current keeps up."""
-        from scipy.signal import lfilter
-
-        corner = 2.0 * math.pi * 0.08 * self._lowest_hz * self.sample_period_s
-        a = [1.0, -2.0 + 1.4 * corner, 1.0 - 1.4 * corner + corner * corner]
-        b = [0.0, 1.4 * corner, corner * corner - 1.4 * corner]
-        inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
-        flux, final = lfilter(b, a, inductance_h * current_a, zi=np.array(self._slow))
-        self._slow = (float(final[0]), float(final[1]))
-        return np.asarray(flux)
-
-    def _standing_peak_wb(self, machine: InverseGamma) -> float:
-        """Flux of the bias alone once it has settled."""
-        bias_v = abs(self.excitation.dc_bias_v)
-        if not bias_v:
-            return 0.0
-        inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
-        drop_v = max(bias_v - SURE_LOSS * self._plateau_v, 0.0)
-        return inductance_h * drop_v / machine.stator_resistance_ohm
 
     def _predict(self, estimate: BlockEstimate, model_free_wb: float, time_s: float, scale: float) -> float:
         """Largest |stator flux| over the horizon, from the observer's state and from the model-free flux."""
@@ -266,8 +243,7 @@ class FluxGuard:
             stator_resistance_ohm=max(r_s - 3.0 * s[0], 0.5 * r_s),
             magnetizing_inductance_h=l_m + min(3.0 * s[3], l_m),
         )
-        room_wb = max(TARGET * self.limit_wb - self._standing_peak_wb(worst), 0.0)
-        by_model = room_wb / max(self._peak_at_full_scale(worst), 1e-12)
+        by_model = TARGET * self.limit_wb / max(self._peak_at_full_scale(worst), 1e-12)
         self._granted = max(safe, min(1.0, by_model, MAX_RAISE * max(scale, safe)))
         return self._granted
 

@@ -14,8 +14,6 @@ from commissioner.run.replay import replay
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.sim_process import SimProcess
 
-pytestmark = pytest.mark.campaign  # the golden run was recorded before the last change of the batch fit: record it anew
-
 ROUNDING = 1e-6
 """Other processors add up in another order; a decision that depends on that would be a defect of its own."""
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from commissioner.identify.excitation import Excitation, ExcitationLimits, Tone, design
+from commissioner.identify.excitation import Excitation, Tone
 from commissioner.identify.flux import FluxGuard
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate
 from tests.campaigns.flux_guard import run_case
 
 CASES = range(20_000, 20_024)
@@ -69,9 +68,6 @@ def test_the_amplitude_for_a_known_machine_keeps_its_flux_below_the_limit_and_us
     assert true_peak_wb(off, excitation, scale, 5.0) < 0.9
 
 
-def test_tones_beside_a_dc_bias_leave_room_for_its_flux():
-    plate = Nameplate(7500.0, 400.0, 50.0, 14.2, 1454.0, 0.858, 2, "star")
-    limits = ExcitationLimits(0.9, 18.0, 98.0)
-    bias_v = 0.4 * 0.9 / 0.2007 * 0.62  # four tenths of the limit
-    chosen = design(plate, MACHINE, limits, 2e-4, seconds=4.6, dc_bias_v=bias_v)
-    assert 0.7 * 0.9 < true_peak_wb(MACHINE, chosen.excitation, 1.0, 5.0) <= 1.02 * 0.9
+def test_a_dc_bias_is_refused_because_no_amplitude_of_tones_could_limit_it():
+    with pytest.raises(ValueError, match="DC bias"):
+        FluxGuard(0.9, 0.02, Excitation(TONES, 5.0, 4.6), 2e-4, 0.62)
