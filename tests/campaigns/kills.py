@@ -344,27 +344,27 @@ def counts_of_a_whole_run(stage: Scene) -> dict[str, float]:
     return json.loads(line.removeprefix("counts ")) | {"time": ended - began}
 
 
-def moments(count: int, counts: dict[str, float], rng: np.random.Generator) -> list[Moment]:
-    """Behind every journal record first; the rest half around random requests (half of them late), half at any time."""
-    chosen = [Moment("journal", n) for n in range(1, int(counts["journal"]) + 1)]
-    if count < len(chosen):
-        return [chosen[k] for k in sorted(rng.choice(len(chosen), count, replace=False))]
-    while len(chosen) < count:
+def moments(count: int, counts: dict[str, float], rng: np.random.Generator) -> Iterator[Moment]:
+    """Behind every journal record first, or `count` of them; then without end, half around random requests (half of
+    them late), half at any time."""
+    records = np.arange(1, int(counts["journal"]) + 1)
+    for n in sorted(rng.choice(records, min(count, len(records)), replace=False)):
+        yield Moment("journal", int(n))
+    last = int(counts["asking"])
+    while True:
         if rng.random() < 0.5:
-            last = int(counts["asking"])
             first = last - 40 if rng.random() < 0.5 else 1
-            chosen.append(Moment(str(rng.choice(["asking", "answered"])), int(rng.integers(first, last + 1))))
+            yield Moment(str(rng.choice(["asking", "answered"])), int(rng.integers(first, last + 1)))
         else:
-            chosen.append(Moment("time", float(rng.uniform(0.0, counts["time"]))))
-    return chosen
+            yield Moment("time", float(rng.uniform(0.0, counts["time"])))
 
 
 def campaign(kills: int, seed: int, wire: str, minutes: float = 1e9) -> list[Killed]:
-    """All kills; each broken promise is printed at once."""
+    """So many kills, and the runs that ended by themselves before theirs; each broken promise is printed at once."""
     rng, end, done = np.random.default_rng(seed), time.monotonic() + 60 * minutes, []
     with scene(wire, seed) as stage:
         for moment in moments(kills, counts_of_a_whole_run(stage), rng):
-            if time.monotonic() > end:
+            if time.monotonic() > end or sum(killed.was_killed for killed in done) >= kills:
                 break
             killed = stage.kill(moment)
             done.append(killed)

@@ -2,7 +2,8 @@
 
 Every mutant of safety/ and procedure/states.py must fail the safety core's own tests. Operators: comparisons moved by
 one step or turned round, `and`/`or` exchanged, `not` dropped, numbers and booleans changed, min/max exchanged, a signed
-value for its magnitude, a condition fixed to true or false, a table's target replaced, an `or` chain losing a member.
+value for its magnitude, a condition fixed to true or false, a table's target replaced, an `or` chain losing a member, an
+answer lost.
 Survivors are compared with EXPLAINED. Mutants are compiled in memory: nothing on the disk changes.
 """
 
@@ -93,6 +94,7 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
             yield ast.Constant(not value)
         case ast.Constant(value=int() | float() as value):
             yield ast.Constant(value + 1)
+            yield ast.UnaryOp(ast.USub(), ast.Constant(1 - value)) if value < 1 else ast.Constant(value - 1)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=keywords) if name in CALLS:
             yield ast.Call(ast.Name(CALLS[name], ast.Load()), arguments, keywords)
         case ast.Call(func=ast.Name(id="abs"), args=[argument]):
@@ -102,6 +104,8 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
         case ast.If(body=body, orelse=otherwise):
             yield ast.If(ast.Constant(True), body, otherwise)
             yield ast.If(ast.Constant(False), body, otherwise)
+        case ast.Return(value=ast.expr() as value) if not isinstance(value, ast.Constant):
+            yield ast.Return(ast.Constant(None))
         case ast.IfExp(body=body, orelse=otherwise):
             yield body
             yield otherwise
