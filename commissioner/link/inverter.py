@@ -11,17 +11,18 @@ from collections.abc import Callable, Mapping, Sequence
 
 from commissioner.errors import (
     CheckFailed,
-    CommissionerError,
     DriveFault,
     ReplyMismatch,
     ReplyTimeout,
     RequestRefused,
     UsageError,
 )
-from commissioner.link.facts import Action, Attempt, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
+from commissioner.link.disarming import DISABLE_VOLTAGE, SHUTDOWN, de_energise
+from commissioner.link.facts import Action, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
 from commissioner.link.items import Items, number
 from commissioner.link.port import Port
-from commissioner.link.reading import read_identity, read_nameplate, read_state, read_status
+from commissioner.link.readiness import check_ready, not_ready
+from commissioner.link.reading import read_identity, read_nameplate, read_status
 from commissioner.link.write_back import WriteBack
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
@@ -40,12 +41,11 @@ from commissioner.registers.window import (
     encode_request,
 )
 
-DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE, RESET_FAULT = 0x00, 0x02, 0x06, 0x07, 0x0F, 0x80
-NO_MODE, SINGLE_AXIS_TEST = 0, 1
+SWITCH_ON, ENABLE, RESET_FAULT = 0x07, 0x0F, 0x80
+SINGLE_AXIS_TEST = 1
 STATE_DEADLINE_S = 1.0
 POLL_S = 0.002
 FETCH_ATTEMPTS = 2
-AFTER_WATCHDOG_S = 0.1
 
 
 class Inverter:
@@ -160,7 +160,8 @@ class Inverter:
         CheckFailed: a condition does not hold and nothing was energised. DriveFault: the drive does not follow.
         """
         self.profile.require("excite")
-        before = self._check_ready()
+        self._check_set_up()
+        before = check_ready(self._items, self._supervision, self._watchdog_ms / 1000)
         self._prepare({"mode": SINGLE_AXIS_TEST}, "choose the single-axis test")
         stream = self._stream_format()
         self.port.read_retries = 0
@@ -208,23 +209,10 @@ class Inverter:
     def disarm(self) -> DisarmReport:
         """De-energise by every path until the drive's status confirms it, else by its watchdog. Never raises a
         CommissionerError; idempotent; legal in every state."""
-        if "control_word" not in self.profile.items:
-            return DisarmReport(True, "this service cannot energise this drive", (), False)
-        attempts: list[Attempt] = []
-        paths: tuple[tuple[str, dict[str, Value]], ...] = (
-            ("disable voltage", {"control_word": DISABLE_VOLTAGE}),
-            ("quick stop", {"control_word": QUICK_STOP}),
-            ("shut down", {"control_word": SHUTDOWN}),
-            ("leave the test mode", {"mode": NO_MODE}),
-        )
-        for path, values in paths:
-            attempts.append(self._attempt(path, values))
-            state = self._blocked_state(attempts)
-            if state is not None:
-                attempts.append(self._attempt("leave the test mode", {"mode": NO_MODE}))
-                return self._disarmed(state, attempts, waited=False)
-        self._sleep(self._watchdog_ms / 1000 + AFTER_WATCHDOG_S)
-        return self._disarmed(self._blocked_state(attempts), attempts, waited=True)
+        report = de_energise(self._items, self._watchdog_ms / 1000, self._sleep)
+        if report.is_confirmed:
+            self.port.read_retries = self._read_retries
+        return report
 
     # --- parameters ---------------------------------------------------------------------------------------------
     def write_parameters(
@@ -264,31 +252,9 @@ class Inverter:
         self.journal(Intent(Action.STEER, values))
         self._items.exchange_verified(values, "steer the excitation")
 
-    def _check_ready(self) -> DriveStatus:
-        """The status before enabling. CheckFailed where energising would not be supervised or not be obeyed."""
-        self._check_supervision()
-        status = self.read_status()
-        if status.is_energised:
-            raise _not_ready("the drive is energised already", status.state, "a blocked output", "disarm it first")
-        if status.fault_code or status.state == DriveState.FAULT.value:
-            raise _not_ready(f"the drive reports: {status.fault_text}", status.fault_code, "no fault", "remove it")
-        for name, holds in status.interlocks.items():
-            if not holds:
-                raise _not_ready(f"interlock {name} is open", name, "all interlocks closed", "see the drive's manual")
-        return status
-
-    def _check_supervision(self) -> None:
+    def _check_set_up(self) -> None:
         if not (self._watchdog_ms and self._signal and "current_limit_a" in self._supervision):
-            raise _not_ready("the drive was not set up", None, "watchdog, limits and excitation set", "set them first")
-        if self.port.reply_timeout_s >= self._watchdog_ms / 1000:
-            raise _not_ready(
-                "a lost answer would outlast the watchdog", self.port.reply_timeout_s,
-                f"less than the watchdog's {self._watchdog_ms / 1000:g} s", "use a faster link or a longer watchdog",
-            )
-        held = self._items.read(self._supervision)
-        for name, wanted in self._supervision.items():
-            if not self._items.same_words(name, held[name], wanted):
-                raise _not_ready(f"{name} has changed since it was set", held[name], wanted, "keep other masters off")
+            raise not_ready("the drive was not set up", None, "watchdog, limits and excitation set", "set them first")
 
     def _stream_format(self) -> Callable[[int], StreamFormat]:
         scales = self._items.read(
@@ -341,29 +307,6 @@ class Inverter:
             )
         return decoded
 
-    def _attempt(self, path: str, values: Mapping[str, Value]) -> Attempt:
-        try:
-            self._items.write(values)
-        except CommissionerError as error:
-            return Attempt(path, error.what)
-        return Attempt(path, "acknowledged")
-
-    def _blocked_state(self, attempts: list[Attempt]) -> DriveState | None:
-        """The state, where the drive's own status says that the output is blocked."""
-        try:
-            state = read_state(self._items)
-        except CommissionerError as error:
-            attempts.append(Attempt("read the status", error.what))
-            return None
-        attempts.append(Attempt("read the status", state.value))
-        return None if state.may_be_energised else state
-
-    def _disarmed(self, state: DriveState | None, attempts: list[Attempt], *, waited: bool) -> DisarmReport:
-        if state is not None:
-            self.port.read_retries = self._read_retries
-        described = state.value if state else "not confirmed by the drive"
-        return DisarmReport(state is not None, described, tuple(attempts), waited)
-
     def _window(self) -> WindowLayout:
         self.profile.require("stream")
         assert self.profile.window is not None
@@ -382,8 +325,3 @@ def _check_scale(scale: float) -> None:
             "the amplitude scale is not a fraction", step="steer the excitation", value=scale, limit="0 ... 1",
             remedy="ask for a scale between 0 and 1",
         )
-
-
-def _not_ready(what: str, value: object, limit: object, remedy: str) -> CheckFailed:
-    return CheckFailed(what, step="check before energising", value=value, limit=limit, remedy=remedy)
-
