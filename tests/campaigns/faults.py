@@ -124,6 +124,7 @@ def report(outcomes: list[Outcome]) -> dict[str, Any]:
         "energised sessions": sum(o.sessions for o in outcomes),
         "harmed requests": sum(o.harmed for o in outcomes),
         "repeated because the machine stalled": sum(bool(o.repeats) for o in outcomes),
+        "disturbed to the last repetition": sum(o.was_disturbed for o in outcomes),
         "with a broken invariant": sum(bool(o.broken) for o in outcomes),
         "worst time energised after a loss, s": round(worst.dead_after_s, 3),
         "watchdog + grace, s": PLAN.supervision.watchdog_s + truth.GRACE_S,

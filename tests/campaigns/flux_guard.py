@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.identify.compensation import NOTHING, Compensation
+from commissioner.identify.coordinates import PRIOR_LOG_STD
 from commissioner.identify.excitation import ExcitationLimits, design
 from commissioner.identify.flux import FluxAdvice, FluxGuard
-from commissioner.identify.observer import PRIOR_LOG_STD, ParallelObserver
+from commissioner.identify.observer import ParallelObserver
 from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior, rated_flux

@@ -17,6 +17,7 @@ SCENARIO = short_scenario()
 SEQUENCES, FIRST_SEED = 200, 100_000
 
 
+@pytest.mark.timeout(1800)
 def test_random_faults_break_no_invariant():
     print(f"repeat: python -m tests.campaigns.faults --sequences {SEQUENCES} --seed {FIRST_SEED}")
     outcomes = campaign(SEQUENCES, FIRST_SEED, "both", processes=4)
