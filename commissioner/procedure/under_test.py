@@ -9,9 +9,10 @@ import numpy as np
 from commissioner.errors import Aborted
 from commissioner.identify.compensation import Compensation
 from commissioner.identify.convergence import Settling, settled
+from commissioner.identify.coordinates import PRIOR_LOG_STD
 from commissioner.identify.excitation import DesignedExcitation, Excitation, Tone
 from commissioner.identify.flux import FluxAdvice, FluxGuard, FluxReading
-from commissioner.identify.observer import PRIOR_LOG_STD, BlockEstimate, ParallelObserver
+from commissioner.identify.observer import BlockEstimate, ParallelObserver
 from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior

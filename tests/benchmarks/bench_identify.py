@@ -78,8 +78,8 @@ def rls_series_parallel(u, y, f1, f2):
 
 
 def rls(u, y):
+    from commissioner.identify.coordinates import filter_poles
     from commissioner.identify.kernels import machine_from_theta
-    from commissioner.identify.observer import filter_poles
 
     f = filter_poles(prior(MOTOR.plate), PERIOD_S)
     out = np.full(4, np.nan)

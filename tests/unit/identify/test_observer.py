@@ -7,7 +7,8 @@ import pytest
 
 from commissioner.errors import UsageError
 from commissioner.identify.compensation import Compensation
-from commissioner.identify.observer import ParallelObserver, filter_poles, positive_real_margin
+from commissioner.identify.coordinates import filter_poles, positive_real_margin
+from commissioner.identify.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from tests.support.standstill import linear_response, multitone, usable_motors

@@ -1,0 +1,113 @@
+"""The observer's coordinates: theta of a machine behind given filters, its derivative, its prior, its passivity.
+
+theta are the partial fractions of the machine's pulse transfer over the filters (see `kernels`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.errors import UsageError
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import ParameterBox
+from commissioner.motor.standstill import poles_per_s, to_pulse_transfer
+from commissioner.records import Signal
+
+Matrix = NDArray[np.float64]
+
+PRIOR_LOG_STD = 0.5
+"""Spread of the prior around its typical member: a factor 1.65 either way is one standard deviation."""
+
+
+def filter_poles(prior: ParameterBox, period_s: float) -> Matrix:
+    """Discrete poles (f1, f2) of the filters: left of the typical machine's by 2 (slow) and 1.5 (fast)."""
+    slow, fast = poles_per_s(prior.typical)
+    return np.exp(np.array([2.0 * slow, 1.5 * fast]) * period_s)
+
+
+def positive_real_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> float:
+    """The smallest Re(Lambda/A) over |z| = 1 and the machines of the box's corners and middles, with Lambda/A = 1 at
+    z = infinity. The gradient law converges where it is positive (observer error passive), the least-squares law above
+    1/2."""
+    omega = np.concatenate([[0.0], np.geomspace(1e-3, math.pi / period_s, 400)])
+    z = np.exp(1j * omega * period_s)
+    top = (z - filter_z[0]) * (z - filter_z[1])
+    levels = zip(prior.lower.as_tuple(), prior.typical.as_tuple(), prior.upper.as_tuple(), strict=True)
+    worst = math.inf
+    for values in itertools.product(*levels):
+        slow, fast = poles_per_s(InverseGamma(*values))
+        bottom = (z - math.exp(slow * period_s)) * (z - math.exp(fast * period_s))
+        worst = min(worst, float(np.min((top / bottom).real)))
+    return worst
+
+
+def require_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> None:
+    margin = positive_real_margin(prior, filter_z, period_s)
+    if not margin > 0.0:
+        raise UsageError(
+            "the Lyapunov law has no positive-real margin over the machines this nameplate allows",
+            step="choose observer gains",
+            value=f"margin {margin:.3g}",
+            limit="above 0",
+            remedy="use the fast law, or correct the nameplate: rated slip and current set the box",
+        )
+
+
+def to_theta(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
+    """(theta_1, theta_2), `(4,)`: partial fractions of (Lambda - A)/Lambda and B/Lambda at f1 and f2."""
+    t = to_pulse_transfer(machine, period_s)
+    f1, f2 = filter_z
+    g1, g2 = 1.0 - f1, 1.0 - f2
+    spread = f1 - f2
+    return np.array(
+        [
+            -(f1 * f1 + t.a1 * f1 + t.a0) / (g1 * spread),
+            (f2 * f2 + t.a1 * f2 + t.a0) / (g2 * spread),
+            (t.b1 * f1 + t.b0) / (g1 * spread),
+            -(t.b1 * f2 + t.b0) / (g2 * spread),
+        ]
+    )
+
+
+def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
+    """(U, d) with U unit upper triangular and U diag(d) U^T the covariance."""
+    reversed_root = np.linalg.cholesky(covariance[::-1, ::-1])
+    upper = reversed_root[::-1, ::-1]
+    scale = np.diag(upper)
+    return upper / scale, scale**2
+
+
+def theta_jacobian(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
+    """d theta / d(R_s, R_R, L_sigma, L_M), (4, 4), by central differences."""
+    columns = []
+    for j, value in enumerate(machine.as_tuple()):
+        step = 1e-4 * value
+        pair = []
+        for sign in (1.0, -1.0):
+            moved = list(machine.as_tuple())
+            moved[j] += sign * step
+            pair.append(to_theta(InverseGamma(*moved), filter_z, period_s))
+        columns.append((pair[0] - pair[1]) / (2.0 * step))
+    return np.column_stack(columns)
+
+
+def prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) -> Matrix:
+    """Covariance of theta over log-normal machines around the typical one (a fixed quasi-random set)."""
+    log_typical = np.log(prior.typical.as_tuple())
+    draws = np.random.default_rng(1).standard_normal((400, 4))
+    thetas = [to_theta(InverseGamma(*np.exp(log_typical + PRIOR_LOG_STD * d)), filter_z, period_s) for d in draws]
+    return np.cov(np.array(thetas).T)
+
+
+def regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage_v: Signal) -> Matrix:
+    """w = (zeta_y, zeta_u) of the machine under the voltage, `(n, 4)`."""
+    from scipy.signal import lfilter
+
+    t = to_pulse_transfer(machine, period_s)
+    current = lfilter([0.0, t.b1, t.b0], [1.0, t.a1, t.a0], voltage_v)
+    columns = [lfilter([0.0, 1.0 - f], [1.0, -f], x) for x in (current, voltage_v) for f in filter_z]
+    return np.column_stack(columns)
