@@ -1,0 +1,94 @@
+"""`commissioner diagnose` and `simulate` as users call them: there and back, and data that carry no answer."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from sim.hidden import draw
+from sim.recording import record, write_table
+from tests.support.command_line import call, truth
+
+TYPE_TEST = "tests/data/siemens_200kw_type_test/{}.csv"
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    columns, metadata, _ = record(draw(5, "one", only="dead_time", noise="white", seconds=1.0), 5)
+    del metadata["scenario"]
+    return columns, metadata
+
+
+@pytest.fixture(scope="module")
+def files(hidden, tmp_path_factory):
+    """Good and spoilt versions of one recording."""
+    folder = tmp_path_factory.mktemp("recordings")
+    columns, metadata = hidden
+
+    def write(name, change=lambda c: c, **keys):
+        write_table(folder / f"{name}.csv", change(dict(columns)), metadata | keys)
+
+    write("good", lambda c: c | {"banana": c["time_s"]})
+    write("short", lambda c: {k: v[:150] for k, v in c.items()})
+    write("silent", lambda c: {k: 0.0 * v if k.startswith("current") else v for k, v in c.items()})
+    write("one_sensor", lambda c: {k: v for k, v in c.items() if k != "current_v_a"})
+    write("another_motor", rated_power_w=55000.0)
+    running = ("time_s", "current_u_a", "current_v_a", "current_w_a")
+    write("running", lambda c: {k: c[k] for k in running} | {f"voltage_{p}_v": c["voltage_axis_v"] for p in "uvw"})
+    (folder / "text.csv").write_text("hello\nworld\n")
+    return folder
+
+
+def table(path):
+    with path.open() as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return {k: np.array([float(r[k]) for r in rows]) for k in rows[0]}
+
+
+def test_a_recording_is_diagnosed_and_its_model_plays_what_was_measured(files, tmp_path):
+    answer = call("diagnose", str(files / "good.csv"), "--out", str(tmp_path), "--json")
+    document = answer.json
+    assert answer.code == 0
+    assert [c["name"] for c in document["causes"]] == ["dead_time"]
+    assert document["verdict"] == "not_distinguishable" and document["causes"][0]["equivalent"] == ["device_drop"]
+    assert any("banana" in sentence for sentence in document["audit"])
+    page = (tmp_path / "report.html").read_text()
+    assert "dead time or device drop" in page and "http" not in page.split("</style>")[1].replace("http://www.w3.org", "")
+    again = tmp_path / "again.csv"
+    assert call("simulate", document["model_file"], "--out", str(again), "--like", str(files / "good.csv"), "--json").code == 0
+    measured, played = table(files / "good.csv"), table(again)
+    error = np.sqrt(np.mean([(measured[f"current_{p}_a"] - played[f"current_{p}_a"]) ** 2 for p in "uvw"]))
+    assert error == pytest.approx(document["gain"]["noise_floor_a"], rel=0.05)
+    assert error < 0.5 * document["gain"]["rmse_before_a"]
+    key = truth(document["model_file"])
+    assert [e["name"] for e in key["effects"]] == ["dead_time"]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["short"], "long enough"), (["silent"], "zero"), (["one_sensor"], "current_v_a"), (["running"], "commissioner monitor"),
+        (["text"], "time_s"), (["good", "another_motor"], "rated_power_w"),
+    ],
+)  # fmt: skip
+def test_data_that_carry_no_answer_end_with_code_3_and_the_reason(files, names, said):
+    answer = call("diagnose", *(str(files / f"{name}.csv") for name in names), "--json")
+    assert answer.code == 3
+    assert said in answer.stdout + answer.stderr
+
+
+def test_both_tables_of_a_type_test_are_one_document(tmp_path):
+    answer = call("diagnose", TYPE_TEST.format("locked_rotor"), TYPE_TEST.format("no_load"), "--out", str(tmp_path), "--json")
+    named = {c["name"] for c in answer.json["causes"]}
+    assert answer.code == 0
+    assert named == {"leakage_saturation", "rotor_skin_effect", "magnetizing_saturation", "iron_loss"}
+    assert sorted(p.name for p in tmp_path.glob("*.html")) == ["report_locked_rotor.html", "report_no_load.html"]
+    assert json.loads((tmp_path / "diagnosis.json").read_text())["verdict"] == "explained"
+
+
+def test_a_file_that_is_no_model_is_refused_as_configuration(tmp_path):
+    (tmp_path / "model.json").write_text('{"kind": "something"}')
+    answer = call("simulate", str(tmp_path / "model.json"), "--out", str(tmp_path / "out.csv"))
+    assert answer.code == 2
+    assert "model.json" in answer.stderr
