@@ -1,4 +1,4 @@
-"""Weights of the confidence: logistic regression on blind cases, written by `python -m tests.hidden_effects.protocol`.
+"""Weights of the confidence: logistic regression on blind cases, printed by `python -m tests.hidden_effects.calibrate`.
 
 Features in the order of `evidence.claim_features`; the first weight is the constant.
 """
