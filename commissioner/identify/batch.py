@@ -15,8 +15,9 @@ from commissioner.motor.circuit import Gamma, InverseGamma, Quantity
 from commissioner.records import Signal
 
 TABLE_ROWS = 2049
-LEG_DOUBT = 0.0015
-"""What the drawn leg error may be off from the real one, of its plateau: it goes into R_s, over the largest current."""
+LEG_DOUBT, LEG_DOUBT_PER_KNEE = 0.0015, 0.15
+"""What the drawn leg error may be off from the real one, of its plateau, at least and per knee over largest current: the
+nearer the knee is to the currents of the test, the less the tail is told from a resistance. It goes into R_s."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,10 @@ class BatchFit:
         """What the form of the leg error leaves open in R_s."""
         if self.model.leg is None:
             return 0.0
-        return LEG_DOUBT * float(np.max(np.abs(self.theta[self.model.leg_slice]))) / self.model.leg.largest_a
+        values, largest = self.theta[self.model.leg_slice], self.model.leg.largest_a
+        knee = self.model.leg.table(values, np.zeros((values.size, values.size))).knee_a
+        share = max(LEG_DOUBT, LEG_DOUBT_PER_KNEE * min(knee / largest, 1.0))
+        return share * float(np.max(np.abs(values))) / largest
 
     def inverter_covariance_at(self, flux_wb: float) -> Matrix:
         """(4, 4): the part of the secant machine's covariance that comes from the inverter and is common to all axes."""
@@ -135,6 +139,7 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
     """A start for another model from a finished fit: what both have is kept, what is new starts at zero."""
     theta = np.zeros(model.size)
     theta[:SHARED] = fit.theta[:SHARED]
+    theta[DELAY] *= float(model.with_delay)
     old, new = fit.model.extra_powers, model.extra_powers
     common = min(old, new)
     ratio = model.flux_scale_wb / fit.model.flux_scale_wb

@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.identify.batch import BatchFit, Segment, extended
 from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_law import LegLaw
-from commissioner.identify.model import Matrix, ModelChoice, start_theta
+from commissioner.identify.model import CIRCUIT, Matrix, ModelChoice, start_theta
 from commissioner.identify.resistance import InverterError, knee_shape
 from commissioner.motor.circuit import InverseGamma
 
@@ -46,8 +46,22 @@ def select_model(
         tried.update(toggled)
         better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
         if not better:
-            return fit_segments(segments, period_s, start, best.model, best.theta)
+            return _from_every_start(segments, period_s, starts, best)
         best = min(better, key=lambda t: t.criterion())
+
+
+def _from_every_start(
+    segments: Sequence[Segment], period_s: float, starts: Sequence[InverseGamma], best: BatchFit
+) -> BatchFit:
+    """The chosen model once more from the other machines: a way through simpler models may have led into a wrong
+    minimum."""
+    finalists = [best]
+    for start in starts:
+        theta = best.theta.copy()
+        theta[:CIRCUIT] = start_theta(start, best.model)[:CIRCUIT]
+        finalists.append(_coarse(segments, period_s, start, best.model, theta))
+    chosen = min(finalists, key=lambda f: f.criterion())
+    return fit_segments(segments, period_s, chosen.gamma.as_inverse_gamma(), chosen.model, chosen.theta)
 
 
 def _begin(
