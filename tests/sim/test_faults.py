@@ -292,7 +292,14 @@ def test_refused_item_is_an_exception(with_faults):
     assert refused.value.code == 3
 
 
-@pytest.mark.parametrize("text", ["nonsense", "late:x", "lost@", "lost@soon", "stray_before:zz", "Late", "late:1@2x"])
+def test_a_fault_among_writes_counts_only_requests_that_write():
+    second, from_there, plain = parse("lost@w2"), parse("lost@w2+"), parse("lost@2")
+    assert [second.hits(request, write) for request, write in ((2, None), (3, 1), (9, 2), (10, 3))] == [0, 0, 1, 0]
+    assert [from_there.hits(request, write) for request, write in ((2, None), (9, 2), (10, 3))] == [0, 1, 1]
+    assert [plain.hits(request, write) for request, write in ((2, None), (2, 1), (9, 2))] == [1, 1, 0]
+
+
+@pytest.mark.parametrize("text", ["nonsense", "late:x", "lost@", "lost@soon", "lost@w", "lost@w2s", "stray_before:zz", "Late", "late:1@2x"])
 def test_unclear_fault_texts_are_refused(text):
     with pytest.raises(FaultError):
         parse(text)
@@ -300,5 +307,5 @@ def test_unclear_fault_texts_are_refused(text):
 
 @pytest.mark.parametrize("name", [*WIRE, *SERVER, *DRIVE])
 def test_every_knob_has_a_default_and_takes_every_time(name):
-    for when in ("", "@3", "@3+", "@3x2", "@1.5s", "@e0.5s", "@commit"):
+    for when in ("", "@3", "@3+", "@3x2", "@w3", "@w3+", "@w3x2", "@1.5s", "@e0.5s", "@commit"):
         assert parse(name + when).name == name
