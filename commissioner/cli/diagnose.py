@@ -180,11 +180,17 @@ def _finish(document: Mapping[str, Any], out: Path | None, as_json: bool) -> Non
         raise typer.Exit(3)
 
 
+def _first_size(sizes: Mapping[str, Any]) -> str:
+    from commissioner.report.diagnose_page import quantity
+
+    return next((quantity(value, key) for key, value in sizes.items()), "")
+
+
 def _show(document: Mapping[str, Any], out: Path | None) -> None:
     """The short human view: sentence, causes, gain, what next."""
     from commissioner.cli.screen import out as screen
     from commissioner.cli.screen import table
-    from commissioner.report.diagnose_page import headline, quantity
+    from commissioner.report.diagnose_page import headline
 
     colour = {"explained": "green", "nothing_significant": "green", "not_distinguishable": "yellow"}.get(document["verdict"], "red")
     screen.print(f"[bold {colour}]{document['verdict']}[/]  {headline(document)}")
@@ -192,7 +198,7 @@ def _show(document: Mapping[str, Any], out: Path | None) -> None:
         screen.print(document["reason"])
     if document["causes"]:
         screen.print(table("", ("cause", "size", "share", "sure", "or"), [
-            (c["name"], quantity(next(iter(c["parameters"].values()))) if c["parameters"] else "", f"{c['gain_share']:.1%}",
+            (c["name"], _first_size(c["parameters"]), f"{c['gain_share']:.1%}",
              f"{c['confidence']:.0%}", ", ".join(c["equivalent"]))
             for c in document["causes"]
         ], right=(2, 3)))

@@ -110,7 +110,7 @@ def _causes(document: Mapping[str, Any]) -> Section:
         return Section("Causes", ["No cause passed the rules. The last table lists what would have been seen."])
     rows, tones = [], []
     for cause in document["causes"]:
-        sizes = "; ".join(f"{_quantity_name(k)} {quantity(v)}" for k, v in cause["parameters"].items())
+        sizes = "; ".join(f"{_quantity_name(k)} {quantity(v, k)}" for k, v in cause["parameters"].items())
         also = " or ".join(_spoken(n) for n in cause["equivalent"]) or "-"
         rows.append((
             _spoken(cause["name"]), sizes, f"{cause['gain_share']:.1%}", f"{cause['strength_over_noise']:.3g}",
@@ -127,8 +127,13 @@ def _causes(document: Mapping[str, Any]) -> Section:
     ])
 
 
-def quantity(entry: Mapping[str, Any]) -> str:
-    """`1.69 ± 0.02 us`."""
+PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})
+
+
+def quantity(entry: Mapping[str, Any], key: str = "") -> str:
+    """`1.69 ± 0.02 us`; shares as `11.6 ± 0.4 %`."""
+    if entry["unit"] == "1" and key not in PLAIN_NUMBERS:
+        entry = {"value": 100.0 * entry["value"], "std": 100.0 * (entry["std"] or 0.0), "unit": "%"}
     spread = f" ± {entry['std']:.2g}" if entry["std"] else ""
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
     return f"{entry['value']:.4g}{spread}{unit}"
@@ -194,7 +199,7 @@ def _limits(document: Mapping[str, Any], units: Mapping[str, str]) -> Section:
 def points_page(document: Mapping[str, Any], name: str) -> Page:
     """The page of a points table."""
     rows = [
-        (_spoken(c["name"]), "; ".join(f"{_quantity_name(k)} {quantity(v)}" for k, v in c["parameters"].items()),
+        (_spoken(c["name"]), "; ".join(f"{_quantity_name(k)} {quantity(v, k)}" for k, v in c["parameters"].items()),
          f"{c['gain_share']:.1%}", f"{c['p_value']:.1e}")
         for c in document["causes"]
     ]
