@@ -15,7 +15,6 @@ import numpy as np
 
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
-from commissioner.records import Signal
 
 Entry = tuple[str, str, str, float | str | None, float | str | None, str]
 Order = tuple[int, int, int]
@@ -54,37 +53,6 @@ class Triple:
     sign: Sign
     sequence: int
     deviation_deg: float
-
-
-def sort_by_kind(
-    currents: list[Signal], voltages: list[Signal], plate: Nameplate
-) -> tuple[list[Signal], list[Signal], list[Entry]]:
-    """Currents and voltages by their size where a column of one kind holds the other; as given where that is not clear.
-
-    Clear: exactly three channels between 0.2 and 2.5 times the rated voltage of a phase, the rest at most twice the rated
-    current, and these two ranges apart by a factor of two.
-    """
-    rms = np.array([float(np.std(signal)) for signal in (*currents, *voltages)])
-    phase_v = plate.rated_voltage_v / np.sqrt(3.0)
-    largest_current, least_voltage = 2.0 * plate.rated_current_a, 0.2 * phase_v
-    is_voltage = (rms > least_voltage) & (rms < 2.5 * phase_v)
-    clear = least_voltage > 2 * largest_current and is_voltage.sum() == 3 and np.all(rms[~is_voltage] < largest_current)
-    wrong_i, wrong_v = np.flatnonzero(is_voltage[:3]), np.flatnonzero(~is_voltage[3:])
-    if not clear or wrong_i.size == 0:
-        return currents, voltages, []
-    new_i, new_v = list(currents), list(voltages)
-    for i, v in zip(wrong_i, wrong_v, strict=True):
-        new_i[i], new_v[v] = voltages[v], currents[i]
-    names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
-    entry: Entry = (
-        "crossed_channels",
-        "corrected",
-        f"columns of currents and voltages are exchanged: {names}",
-        names,
-        "currents and voltages in their own columns",
-        "correct the column names",
-    )
-    return new_i, new_v, [entry]
 
 
 def pair(

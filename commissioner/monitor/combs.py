@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor import periods
+from commissioner.monitor import periods, tracking
 from commissioner.monitor.averaging import Comb, free_orders, residual_current
 from commissioner.monitor.periods import PairSpectrum, Periodicity, ShaftSearch
 from commissioner.monitor.supply import TurningFrame, Vector
@@ -86,12 +86,12 @@ def _refined(
     tries = []
     for follows in ("mains",) if name == "shaft" else ("clock", "mains"):
         phase = comb_phase(frame, part, frequency_hz, follows)
-        demodulated = periods.demodulate(residual, time, phase, strongest)
-        shift, std, power = periods.refine(demodulated, 0.8 / np.ptp(time))
+        demodulated = tracking.demodulate(residual, time, phase, strongest)
+        shift, std, power = tracking.refine(demodulated, 0.8 / np.ptp(time))
         tries.append((power, frequency_hz + shift, std, follows))
     power, frequency, std, follows = max(tries)
     phase = comb_phase(frame, part, frequency, follows)
-    drift = periods.track(periods.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
+    drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
     return Periodicity(name, frequency, std, follows, power, seen, drift)
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commissioner.monitor.audit import Fundamental
 from commissioner.monitor.chain import Observation
+from commissioner.monitor.findings import Fundamental
 from commissioner.monitor.inversion import SpeedLines, basis_of, torque_of
 from commissioner.monitor.periods import PairSpectrum
 from commissioner.monitor.supply import Vector

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commissioner.monitor.audit import Audited
 from commissioner.monitor.averaging import Comb
+from commissioner.monitor.findings import Audited
 from commissioner.monitor.fit import Problem
 from commissioner.monitor.inversion import basis_of
 from commissioner.monitor.supply import TurningFrame, Vector

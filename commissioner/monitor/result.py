@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from commissioner.monitor.audit import Audited, Finding
 from commissioner.monitor.chain import Observation, Refused
+from commissioner.monitor.findings import Audited, Finding
 from commissioner.monitor.fit import NAMES, Fitted, circuit_at, steps
 from commissioner.monitor.indicators import Indicator, Pulses, rotor_side_bands
 from commissioner.monitor.trend import Entry, Verdict

@@ -240,14 +240,14 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
 
 
 def _missing(kept: Mapping[str, Signal]) -> list[str]:
-    """What of time, currents and voltages is not there, in words."""
+    """What of time, currents and voltages is not there, in words; a third current or line-to-line voltage follows from two."""
     out = [] if "time_s" in kept else ["time (a time column or a sample rate)"]
     phases = [phase for phase in "uvw" if f"current_{phase}_a" not in kept]
-    if phases:
+    if len(phases) > 1:
         out.append("the current" + ("s" if len(phases) > 1 else "") + " of phase " + ", ".join(phases))
     star = all(f"voltage_{phase}_v" in kept for phase in "uvw")
-    if not star and not all(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu")):
-        out.append("three voltages")
+    if not star and sum(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu")) < 2:
+        out.append("three phase voltages or two line-to-line voltages")
     return out
 
 

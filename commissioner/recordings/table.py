@@ -116,25 +116,39 @@ def to_standstill(table: Table) -> StandstillRecording:
 
 
 def to_running(table: Table) -> RunningRecording:
-    """The table as a running-motor recording. NaN, gaps and jitter are left for the audit, which names them."""
+    """The table as a running-motor recording. NaN, gaps and jitter are left for the audit, which names them.
+
+    One current, or one line-to-line voltage, may be absent (NaN throughout): without a neutral it follows from the others.
+    """
     columns = table.columns
     phase = ("voltage_u_v", "voltage_v_v", "voltage_w_v")
     line = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
     is_line = phase[0] not in columns
     voltages = line if is_line else phase
-    _require(table, ("time_s", "current_u_a", "current_v_a", "current_w_a", *voltages), "a running-motor recording")
+    currents = ("current_u_a", "current_v_a", "current_w_a")
+    _require(table, _all_but_one(currents, columns), "a running-motor recording")
+    _require(table, ("time_s", *(_all_but_one(line, columns) if is_line else phase)), "a running-motor recording")
+    empty = np.full(columns["time_s"].size, np.nan)
     time = columns["time_s"]
     period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    i = [columns.get(name, empty) for name in currents]
+    v = [columns.get(name, empty) for name in voltages]
     return RunningRecording(
         time_s=time,
-        currents_a=(columns["current_u_a"], columns["current_v_a"], columns["current_w_a"]),
-        voltages_v=(columns[voltages[0]], columns[voltages[1]], columns[voltages[2]]),
+        currents_a=(i[0], i[1], i[2]),
+        voltages_v=(v[0], v[1], v[2]),
         voltages_are_line_to_line=is_line,
         speed_rad_per_s=columns.get("speed_rad_per_s"),
         sample_period_s=period,
         metadata=table.metadata,
         source=table.source,
     )
+
+
+def _all_but_one(names: tuple[str, str, str], columns: Mapping[str, Signal]) -> tuple[str, ...]:
+    """The names, without the one absent column where the other two are there."""
+    present = tuple(name for name in names if name in columns)
+    return present if len(present) == 2 else names
 
 
 def sample_period(table: Table, segment: Signal) -> float:

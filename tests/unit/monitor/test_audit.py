@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.monitor.audit import clipped_share, inspect
+from commissioner.monitor.audit import inspect
+from commissioner.monitor.levels import clipped_share
 from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording
 from tests.support.running import refused_in, rewired, seen_in, taken, taken_with, without
@@ -71,11 +72,49 @@ def test_one_phase_measured_twice_is_refused() -> None:
 
 def test_a_dead_channel_is_refused_by_name() -> None:
     recording, plate, _ = taken("running_compressor", 1, SHORT)
-    flat = replace(
-        recording, currents_a=(recording.currents_a[0], np.zeros(recording.time_s.size), recording.currents_a[2])
-    )
-    reason = refused_in(flat, plate).reason
-    assert reason.code == "dead_channel" and "current channel v" in reason.what
+    v = recording.voltages_v
+    reason = refused_in(replace(recording, voltages_v=(v[0], np.zeros(v[0].size), v[2])), plate).reason
+    assert reason.code == "dead_channel" and "voltage channel v" in reason.what
+
+
+def test_a_third_current_follows_from_two() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    i = recording.currents_a
+    seen = inspect(replace(recording, currents_a=(i[0], np.full(i[0].size, np.nan), i[2])), plate, from_nameplate(plate))
+    whole = inspect(recording, plate, from_nameplate(plate))
+    assert [f.code for f in seen.findings if f.kind == "corrected"] == ["third_current"]
+    assert abs(seen.fundamental.current_a / whole.fundamental.current_a - 1) < 1e-3
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.05])
+def test_currents_that_this_motor_cannot_draw_are_refused(factor: float) -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    i = recording.currents_a
+    scaled = replace(recording, currents_a=(factor * i[0], factor * i[1], factor * i[2]))
+    assert refused_in(scaled, plate).reason.code == "current_level"
+
+
+def test_phase_voltages_under_line_to_line_names_are_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    assert refused_in(replace(recording, voltages_are_line_to_line=True), plate).reason.code == "voltage_level"
+
+
+def test_milliseconds_read_as_seconds_are_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    slow = replace(recording, time_s=1000 * recording.time_s, sample_period_s=0.125)
+    assert refused_in(slow, plate).reason.code == "sample_rate"
+
+
+@pytest.mark.parametrize("rows", [0, 1, 20])
+def test_a_handful_of_rows_is_refused(rows: int) -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    few = without(recording, np.arange(recording.time_s.size) < rows)
+    assert refused_in(few, plate).reason.code == "too_short"
+
+
+def test_time_that_stands_still_is_refused() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    assert refused_in(replace(recording, time_s=0 * recording.time_s), plate).reason.code == "time_order"
 
 
 @pytest.mark.parametrize("group", ["currents_a", "voltages_v"])

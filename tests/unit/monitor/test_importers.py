@@ -117,7 +117,7 @@ def test_the_contract_s_own_csv_passes_through(tmp_path: Path) -> None:
 
 
 def test_a_single_channel_is_refused_with_what_is_missing() -> None:
-    with pytest.raises(DataRefused, match=r"lacks time .* phase u, v, w, three voltages"):
+    with pytest.raises(DataRefused, match=r"lacks time .* phase u, v, w, three phase voltages"):
         read_running(DATA / "acs712_motor" / "healthy_motor_data.csv")
 
 

@@ -1,0 +1,41 @@
+"""The mean shaft speed over everything recorded, not only over the segment that was inverted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commissioner.monitor import tracking
+from commissioner.monitor.averaging import Lines
+from commissioner.monitor.combs import Found, mean_supply
+from commissioner.monitor.supply import TurningFrame
+
+UNSEEN = 0.01
+"""Share of a recording cut at its end: the mean frequency of the rest differs by that share of its wander."""
+
+
+def whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: Lines) -> tuple[float, float]:
+    """Mean shaft speed over the whole stretch: the comb followed beyond the segment, (rad/s, standard error).
+
+    Where the comb is lost outside the segment the segment's ratio to the mains stands, with the slip's spread as error.
+    """
+    shaft = found.shaft
+    assert shaft is not None
+    everything = slice(0, frame.time_s.size)
+    supply = mean_supply(frame, everything)
+    ratio = 2 * np.pi * shaft.frequency_hz / mean_supply(frame, part)
+    speed, std = ratio * supply, 2 * np.pi * shaft.frequency_std_hz
+    std = float(np.hypot(std, UNSEEN * ratio * np.ptp(frame.supply_rad_per_s)))
+    if part.start == 0 and part.stop >= frame.time_s.size:
+        return speed, std
+    time = frame.time_s
+    phase = ratio * (frame.supply_angle_rad + frame.slip_phase_rad)
+    blocks = int(np.clip(np.ptp(time) / 0.8, 16, 256))
+    orders = sorted(set(shaft.harmonics_seen) | {1, 2}, key=lambda h: -_power(lines, h))[:3]
+    demodulated = tracking.demodulate(frame.current_a - frame.current_a.mean(), time, phase, orders, blocks)
+    drift = tracking.track(demodulated, int(np.clip(np.ptp(time) / 4, 2, 16)))
+    turned = float(drift(time[-1:])[0] - drift(time[:1])[0]) / float(np.ptp(time))
+    return speed + turned, float(np.hypot(std, 0.02 * abs(turned)))
+
+
+def _power(lines: Lines, order: int) -> float:
+    return float(np.sum(np.abs(lines.current_a[(lines.comb == 0) & (np.abs(lines.order) == order)]) ** 2)) * order**2
