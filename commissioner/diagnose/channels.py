@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
 from commissioner.diagnose.plant import Layout, Model, predict
@@ -14,7 +15,8 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.001, 0.01, 0.1)
 HEAT_LEAK_S = 20.0
-HATS = 5
+SPEED_KNOTS_S, MOST_SPEED_KNOTS = 0.4, 40
+"""A shaft held by its load swings below about 1 Hz: cubic splines of this spacing follow it to a per cent."""
 RIPPLE_HZ = (100.0, 120.0, 300.0, 360.0)
 MAINS_HZ = (50.0, 60.0)
 SEARCH = 0.008
@@ -112,9 +114,13 @@ def _sag(record: Record) -> Named:
 def _hats(record: Record) -> Named:
     out = []
     for segment in record.segments:
-        at = np.linspace(0.0, HATS - 1.0, segment.count)
-        out.append(np.stack([np.clip(1.0 - np.abs(at - k), 0.0, None) for k in range(HATS)], axis=1))
-    return tuple(f"hat_{k}" for k in range(HATS)), out
+        seconds = segment.count * record.facts.sample_period_s
+        intervals = int(np.clip(round(seconds / SPEED_KNOTS_S), 2, MOST_SPEED_KNOTS))
+        knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, intervals + 1), np.ones(3)]
+        out.append(BSpline.design_matrix(np.linspace(0.0, 1.0, segment.count), knots, 3).toarray())
+    most = max(o.shape[1] for o in out)
+    padded = [np.hstack([o, np.zeros((o.shape[0], most - o.shape[1]))]) for o in out]
+    return tuple(f"hat_{k}" for k in range(most)), padded
 
 
 def _mains_drive(record: Record, residuals: Sequence[Array], model: Model) -> list[Array]:

@@ -37,7 +37,7 @@ from commissioner.records import StandstillRecording
 MOSTLY_EXPLAINED_SIGMA, UNEXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.3, 0.95
 COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.7
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
-IRON_CORNER_HZ = 300.0
+IRON_CORNER_HZ = 400.0
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -106,6 +106,8 @@ def diagnose(
     if audit.refusal:
         return Diagnosis(Verdict.REFUSED, audit.refusal, (), (), audit)
     noise = measure_noise(record)
+    if audit.step_a:
+        noise = noise.with_converter_step(np.array(audit.step_a))
     report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:

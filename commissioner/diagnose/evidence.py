@@ -80,7 +80,7 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     for k, segment in enumerate(record.segments):
         row = []
         for one in (before, after):
-            model = _without_segment(one, k) if many else one.model
+            model = _without_segment(one, k, layout) if many else one.model
             residual = segment.currents_a - predict(model, record, k, layout).currents_a
             row.append(float((residual[:, segment.is_good] ** 2).sum()))
         powers.append((*row, int(segment.is_good.sum()) * record.facts.phases))
@@ -96,14 +96,14 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     )
 
 
-def _without_segment(one: Fit, k: int) -> Model:
+def _without_segment(one: Fit, k: int, layout: Layout) -> Model:
     """The estimate without segment k, from the normal equations (one Gauss-Newton step at the optimum)."""
     gram = one.normal.total_gram - one.normal.gram[k]
     slope = one.normal.total_slope - one.normal.slope[k]
     free = np.array([t.segment < 0 for t in one.model.terms], dtype=bool)
     keep = np.r_[np.ones(4, dtype=bool), free]
     theta = one.model.theta
-    low, high = limits(one.model)
+    low, high = limits(one.model, layout)
     step = np.zeros(theta.shape[0])
     inside = np.ix_(keep, keep)
     step[keep] = bounded_step(gram[inside], slope[keep], (low - theta)[keep], (high - theta)[keep], 1e-9)

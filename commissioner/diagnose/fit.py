@@ -165,10 +165,12 @@ def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping:
     return np.asarray(solution / scale)
 
 
-def limits(model: Model) -> tuple[Array, Array]:
-    """Bounds of theta: the four within a factor 3 per step, the terms as physics says."""
-    low = np.array([*np.log(np.array(model.nominal) / 3.0), *(t.lower / t.step for t in model.terms)])
-    high = np.array([*np.log(np.array(model.nominal) * 3.0), *(t.upper / t.step for t in model.terms)])
+def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
+    """Bounds of theta: the four within a factor 3 per step and within their box, the terms as physics says."""
+    box = np.log(np.maximum(np.array(layout.nominal_box), 1e-12))
+    four = np.log(np.array(model.nominal))
+    low = np.array([*np.maximum(four - np.log(3.0), np.minimum(box[:, 0], four)), *(t.lower / t.step for t in model.terms)])
+    high = np.array([*np.minimum(four + np.log(3.0), np.maximum(box[:, 1], four)), *(t.upper / t.step for t in model.terms)])
     return low, high
 
 
@@ -180,7 +182,7 @@ def fit(
     damping = 1e-9
     normal = normal_equations(model, record, layout, model.terms, noise)
     for done in range(rounds):
-        low, high = limits(model)
+        low, high = limits(model, layout)
         theta = model.theta
         improved = False
         for _ in range(8):

@@ -8,7 +8,7 @@ and sensitivities alike (P. Whittle, 1953).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ SLOW_BINS = 6.0
 """Below so many bins of the shortest noise record the window smears the spectrum; the power law takes over."""
 SLOW_MARGIN = 1.6
 """Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
+COARSE_ROUNDING = 0.7
 WHITE_WITHIN = 0.12
 """A spectrum flat within this fraction everywhere is taken as white (whitening then costs nothing)."""
 
@@ -50,6 +51,19 @@ class Noise:
     def floor_a(self) -> float:
         """Root mean square over the phases."""
         return float(np.sqrt(np.mean(self.sigma_a**2)))
+
+    def with_converter_step(self, step_a: Array) -> Noise:
+        """Repeats of one test hit the same coarse steps and hide them: then step / sqrt(12) is added to what they show.
+
+        Where the noise itself moves the signal over the steps, the measured noise has them already (B. Widrow,
+        I. Kollar, Quantization Noise, 2008, ch. 4).
+        """
+        rounding = step_a / np.sqrt(12.0)
+        is_coarse = rounding > COARSE_ROUNDING * self.sigma_a
+        if not is_coarse.any():
+            return self
+        total = np.where(is_coarse, np.hypot(self.sigma_a, rounding), self.sigma_a)
+        return replace(self, sigma_a=total, uncertainty=max(self.uncertainty, 0.1))
 
     def weights(self, samples: int, period_s: float) -> Array:
         """(phases, samples//2 + 1): what a Fourier coefficient is divided by, white level included."""

@@ -61,6 +61,8 @@ class Layout:
     substeps: int = 1
     crossing_substeps: int = 12
     legs_slack_v: float = 1.0
+    nominal_box: tuple[tuple[float, float], ...] = ((0.0, np.inf),) * 4
+    """Where R_s, R_R, L_sigma and L_M may be, from the impedance the recording shows: no effect moves them beyond."""
     leak_ratio: float = 0.0
     """L_sigma / L_M, fixed: how far the rotor current is from the stator current in (3a) of `trajectory`."""
 

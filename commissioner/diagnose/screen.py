@@ -20,8 +20,19 @@ from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]
 STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER = 40.0, 10.0
+FULL_PRICE = 10
+"""Numbers beyond so many cost chi-square's own mean plus two standard deviations each, not ten."""
 VISIBLE = 1e-7
 """Share of a direction's power that must be left after projection for it to count as visible."""
+
+
+def price(numbers: int) -> float:
+    """What `numbers` parameters must gain to be worth having: p near 1e-10 for few, the same for many."""
+    return STATISTICAL_PER_NUMBER * min(numbers, FULL_PRICE) + 3.0 * max(numbers - FULL_PRICE, 0)
+
+
+def required_chi2(numbers: int) -> float:
+    return STATISTICAL_FLOOR + price(numbers)
 
 
 @dataclass(frozen=True)
@@ -39,11 +50,11 @@ class Score:
 
     @property
     def threshold(self) -> float:
-        return STATISTICAL_FLOOR + STATISTICAL_PER_NUMBER * self.numbers
+        return required_chi2(self.numbers)
 
     @property
     def net(self) -> float:
-        return self.delta_chi2 - STATISTICAL_PER_NUMBER * self.numbers
+        return self.delta_chi2 - price(self.numbers)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import Layout, Model, Term, even_vectors, odd_vectors, predict
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.screen import STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER, Screening, screen
+from commissioner.diagnose.screen import Screening, price, required_chi2, screen
 
 MOST_CAUSES = 6
 MATERIAL_SHARE = 1e-4
@@ -31,17 +31,15 @@ RIVAL = 2.5
 GUARD = 1e-3
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
 CLASS_GUARD = 1e-2
-CLASS_MATES = {
-    "resistance_anisotropy": "inductance_anisotropy", "inductance_anisotropy": "resistance_anisotropy",
-    "iron_loss": "rotor_skin_effect", "rotor_skin_effect": "iron_loss",
-}
-"""Of two causes of one form (a tensor, a second rotor path) the weaker must gain this share of the stronger, else it may
-refine the other's shape."""
+"""Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
+SILENT = (1.0, 1.0, 0.01, 0.2)
+"""Where a fit begins when no current answers the command (an audit refuses such a recording)."""
+LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "magnetic_hysteresis", "leakage_saturation"})
 EXPLORED_SAMPLES = 45_000
-CORNERS_HZ = (30.0, 70.0, 150.0, 330.0, 700.0)
+CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 MOST_LEAK_RATIO = 0.15
-STOP_SHARES = (0.02, 0.06, 0.18, 0.5)
+STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6)
 
 Report = Callable[[str], None]
 
@@ -65,14 +63,15 @@ class Found:
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     """Dictionaries scaled to the currents and fluxes the model reaches on this record; and the largest iron flux."""
+    bare = _bare_layout(record)
     flux = max(
-        float(np.hypot(*predict(model, record, k, _bare_layout()).iron_flux_wb).max())
+        float(np.hypot(*predict(model, record, k, bare).iron_flux_wb).max())
         for k in range(len(record.segments))
     )
     peak = record.facts.current_peak_a
     knee = 0.004 * peak
-    layout = Layout(
-        legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
+    layout = replace(
+        bare, legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
         iron_top_wb=1.08 * flux, iron_vectors=even_vectors(10),
         leak_top_wb=1.2 * peak * model.nominal[2], leak_vectors=even_vectors(6),
         stop_radius_wb=np.array(STOP_SHARES) * flux,
@@ -83,20 +82,29 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     return layout, flux
 
 
-def _bare_layout() -> Layout:
+def _bare_layout(record: Record) -> Layout:
+    """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says."""
+    stator, rotor, leakage, _ = _starts(record)[0]
+    total = stator + rotor
     return Layout(
-        1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0
+        1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0,
+        nominal_box=((0.02 * total, 2.0 * total), (0.02 * total, 4.0 * total), (0.2 * leakage, 4.0 * leakage),
+                     (1.0 * leakage, 1e3 * leakage)),
     )
 
 
 def nominal_fit(record: Record, noise: Noise) -> Fit:
     """The four-parameter output-error fit, from the best of three starts."""
-    fits = [fit(Model(start), record, _bare_layout(), noise, rounds=15, tolerance=1.0) for start in _starts(record)]
+    bare = _bare_layout(record)
+    fits = [fit(Model(start), record, bare, noise, rounds=15, tolerance=1.0) for start in _starts(record)]
     return min(fits, key=lambda f: f.chi2)
 
 
-def _starts(record: Record) -> list[tuple[float, float, float, float]]:
-    """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M."""
+def _starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:
+    """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M.
+
+    `delay_s` of the current is taken out of the phases first.
+    """
     segment = max(record.segments, key=lambda s: float(np.std(s.voltage_axis_v)))
     n = segment.count
     window = np.hanning(n)
@@ -104,8 +112,10 @@ def _starts(record: Record) -> list[tuple[float, float, float, float]]:
     amps = np.fft.rfft(np.where(segment.is_good, segment.axis_current_a, 0.0) * window)
     frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
     strong = np.flatnonzero(np.abs(volts) > 0.02 * np.abs(volts[1:]).max())
-    strong = strong[strong > 0]
-    impedance = volts[strong] / amps[strong]
+    strong = strong[(strong > 0) & (np.abs(amps[strong]) > 0.0)]
+    if strong.size == 0:
+        return [SILENT] * 2
+    impedance = volts[strong] / amps[strong] * np.exp(-2j * np.pi * frequency[strong] * delay_s)
     high, low = impedance[-1], impedance[0]
     w_high, w_low = 2 * np.pi * frequency[strong[-1]], 2 * np.pi * frequency[strong[0]]
     leakage = max(abs(high.imag) / w_high, 1e-5)
@@ -162,43 +172,43 @@ def search(
 
     `check` sees the nominal fit first and may raise to spare the search.
     """
-    part = explored(record)
+    part, bare = explored(record), _bare_layout(record)
     quick = nominal_fit(part, noise)
-    nominal = fit(quick.model, record, _bare_layout(), noise, rounds=6, tolerance=1.0)
+    nominal = fit(quick.model, record, bare, noise, rounds=6, tolerance=1.0)
     unknown_starts = starts_of(record)
     if unknown_starts:
-        nominal = fit(nominal.model.with_terms(unknown_starts), record, _bare_layout(), noise, rounds=8, tolerance=1.0)
+        nominal = fit(nominal.model.with_terms(unknown_starts), record, bare, noise, rounds=8, tolerance=1.0)
     losses: tuple[Loss, ...] = ()
     if "lost_samples" not in excluded:
-        record, losses = mend(record, nominal.model, _bare_layout(), noise)
+        record, losses = mend(record, nominal.model, bare, noise)
     if losses:
         report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
-        nominal = fit(nominal.model, record, _bare_layout(), noise, rounds=6, tolerance=1.0)
+        nominal = fit(nominal.model, record, bare, noise, rounds=6, tolerance=1.0)
     if len(record.segments) > 1:
-        record = with_flux_before(record, nominal.model, _bare_layout())
-        nominal = fit(nominal.model.with_terms([CARRY]), record, _bare_layout(), noise, rounds=6, tolerance=1.0)
+        record = with_flux_before(record, nominal.model, bare)
+        nominal = fit(nominal.model.with_terms([CARRY]), record, bare, noise, rounds=6, tolerance=1.0)
     if check is not None:
         check(nominal, record)
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
     record, layout, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
-    model, accepted, current_setting = nominal.model, (), setting
+    model, accepted = nominal.model, ()
     first: Screening | None = None
     if part.samples < 0.7 * record.samples:
         share = max(s.count for s in part.segments)
         small = record.subset(tuple(range(len(record.segments))), share)
         small_setting = replace(setting, record=small)
         start = fit(nominal.model, small, layout, noise, rounds=6)
-        search_small = _Search(small, layout, small_setting, noise, names, report)
+        search_small = _Search(small, layout, small_setting, noise, names, report, record)
         fitted, accepted, _ = search_small.run(start, ())
-        first = search_small.first
+        first, record = search_small.first, search_small.full
         model = _without_curves(_completed(fitted.model, accepted, setting))
-    whole = _Search(record, layout, current_setting, noise, names, report)
+    whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record)
     start = whole.relayout(fit(model, record, layout, noise))
     fitted, accepted, last = whole.run(start, accepted)
     first = whole.first if first is None else first
     return Found(
-        nominal, fitted, accepted, record, whole.layout, whole.setting, last, first,
+        nominal, fitted, accepted, whole.record, whole.layout, whole.setting, last, first,
         tuple(whole.below), whole.gains(fitted, accepted), losses,
     )
 
@@ -219,13 +229,14 @@ def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model
 
 
 class _Search:
-    """One record, one dictionary; remembers what was tried."""
+    """One record (the first part of every segment of `full`, or all of it), one dictionary; remembers what was tried."""
 
     def __init__(
-        self, record: Record, layout: Layout, setting: Setting, noise: Noise, names: Sequence[str], report: Report
+        self, record: Record, layout: Layout, setting: Setting, noise: Noise, names: Sequence[str], report: Report,
+        full: Record,
     ) -> None:
         self.record, self.layout, self.setting, self.noise = record, layout, setting, noise
-        self.names, self.report = names, report
+        self.names, self.report, self.full = names, report, full
         self.below: list[str] = []
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in record.segments]) ** 2)))
@@ -237,7 +248,7 @@ class _Search:
         return float(count * (MATERIAL_SHARE * self.rms_a) ** 2 * np.mean(self.noise.sigma_a**-2.0))
 
     def threshold(self, numbers: int) -> float:
-        return max(STATISTICAL_FLOOR + STATISTICAL_PER_NUMBER * numbers, self.material_chi2)
+        return max(required_chi2(numbers), self.material_chi2)
 
     def run(self, start: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...], Screening]:
         current = start
@@ -246,23 +257,22 @@ class _Search:
             absent = [n for n in self.names if n not in accepted]
             screening = screen(current.model, self.record, self.layout, self.noise, self.setting, absent)
             self.first = self.first or screening
-            if len(accepted) >= MOST_CAUSES:
-                return current, accepted, screening
-            step = self._forward(current, screening, refused)
+            step = None if len(accepted) >= MOST_CAUSES else self._forward(current, screening, refused)
             if step is None:
+                current, accepted, _ = self._backward(current, accepted, accepted)
                 return current, accepted, screening
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
-            current = self.relayout(current)
-            current, accepted, dropped = self._backward(current, accepted)
+            current = self.relayout(self._with_new_flux_before(current))
+            current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = set(dropped)
 
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
         ranked = [s for s in screening.ranked() if s.name not in refused]
         promising = [s for s in ranked if s.delta_chi2 > 0.7 * s.threshold]
-        best: tuple[float, str, Fit] | None = None
+        best = self._large_delay(current, refused)
         present = {t.effect for t in current.model.terms} & SHAPED
         guard = GUARD * max((loss_without(current, name) for name in present), default=0.0)
         for score in promising[:REFITTED]:
@@ -274,25 +284,51 @@ class _Search:
             )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            mate = CLASS_MATES.get(score.name, "")
-            own_guard = CLASS_GUARD * loss_without(current, mate) if mate in {t.effect for t in current.model.terms} else 0.0
-            if gain < max(guard, own_guard, self.threshold(score.numbers)) or not self._is_plausible(trial.model, score.name):
-                if STATISTICAL_FLOOR + STATISTICAL_PER_NUMBER * score.numbers < gain:
+            if gain < max(guard, self._class_guard(current, score.name), self.threshold(score.numbers)) or not self._is_plausible(trial.model, score.name):
+                if required_chi2(score.numbers) < gain:
                     self.below.append(score.name)
                 continue
-            net = gain - STATISTICAL_PER_NUMBER * score.numbers
+            net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
         return None if best is None else (best[1], best[2])
+
+    def _large_delay(self, current: Fit, refused: set[str]) -> tuple[float, str, Fit] | None:
+        """A delay of a sample and more turns the phases so far that no first-order promise shows it: tried outright."""
+        terms = CATALOGUE["sampling_delay"].terms(self.setting) if "sampling_delay" in self.names else ()
+        misfit = current.chi2 / float(current.normal.count.sum())
+        if any(t.effect for t in current.model.terms) or not terms or misfit < LARGE_MISFIT or "sampling_delay" in refused:
+            return None
+        nuisance = [t for t in current.model.terms if not t.effect]
+        trials = []
+        for periods in LARGE_DELAYS:
+            late = periods * self.record.facts.sample_period_s
+            delay = replace(terms[0], start=late)
+            for start in _starts(self.record, late):
+                model = Model(start).with_terms([*nuisance, delay, *terms[1:]])
+                trials.append(fit(model, self.record, self.layout, self.noise, tolerance=1.0))
+        best = min(trials, key=lambda f: f.chi2)
+        gain = current.chi2 - best.chi2
+        self.report(f"  try a large sampling_delay: gained {gain:.4g}")
+        if gain < self.threshold(len(terms)) or not self._is_plausible(best.model, "sampling_delay"):
+            return None
+        return gain - price(len(terms)), "sampling_delay", best
+
+    def _class_guard(self, current: Fit, name: str) -> float:
+        rigid = {t.effect for t in current.model.terms if t.effect} - SHAPED
+        mates = [m for m in rigid if m in CATALOGUE[name].confounders or name in CATALOGUE[m].confounders]
+        return CLASS_GUARD * max((loss_without(current, m) for m in mates), default=0.0)
 
     def _is_plausible(self, model: Model, name: str) -> bool:
         entry = CATALOGUE[name]
         return is_plausible(name, entry.sizes(self.setting, model.of(name)), self.record.facts.current_peak_a)
 
-    def _backward(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...], list[str]]:
+    def _backward(
+        self, current: Fit, accepted: tuple[str, ...], doubted: Sequence[str]
+    ) -> tuple[Fit, tuple[str, ...], list[str]]:
         """Drops accepted effects that the later ones have made idle (or turned to the wrong sign)."""
         dropped: list[str] = []
-        for name in accepted[:-1]:
+        for name in doubted:
             loss = loss_without(current, name)
             numbers = sum(1 for t in current.model.terms if t.effect == name)
             if loss < 10.0 * self.threshold(numbers) or not self._is_plausible(current.model, name):
@@ -302,6 +338,19 @@ class _Search:
                     current, accepted = trial, tuple(n for n in accepted if n != name)
                     dropped.append(name)
         return current, accepted, dropped
+
+    def _with_new_flux_before(self, current: Fit) -> Fit:
+        """The flux each segment inherits, by the improved model: a wrong one would pass for remanence."""
+        if not current.model.has_kind(kinds.CARRY):
+            return current
+        full = with_flux_before(self.full, current.model, self.layout)
+        record = full.subset(tuple(range(len(full.segments))), max(s.count for s in self.record.segments))
+        old = np.array([s.flux_before_wb for s in self.record.segments])
+        new = np.array([s.flux_before_wb for s in record.segments])
+        if np.abs(new - old).max() < 0.05 * np.abs(new).max():
+            return current
+        self.full, self.record, self.setting = full, record, replace(self.setting, record=record)
+        return fit(current.model, record, self.layout, self.noise)
 
     def relayout(self, current: Fit) -> Fit:
         """New dictionary ranges where the improved model reaches other fluxes; curves start again from zero."""

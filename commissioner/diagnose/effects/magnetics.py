@@ -179,7 +179,7 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
 @effect(
     "rotor_heating", "Rotor cage that warms during the test", sign=1, family="drifting", sizes=_heating_sizes,
     signature="rotor resistance higher in later segments; only AC content heats it",
-    confounders=("stator_heating",),
+    confounders=("stator_heating", "resistance_anisotropy", "sensor_gain_mismatch"),
     source="as stator heating, driven by the rotor current of the nominal model",
     split_by="a DC-bias segment between two AC segments",
 )
@@ -203,7 +203,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="block the shaft",
 )
 def shaft_motion(setting: Setting) -> tuple[Term, ...]:
-    """Electrical speed [rad/s] as hat functions of time, five per segment."""
+    """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment."""
     return tuple(
         Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
         for s in setting.record.segments
