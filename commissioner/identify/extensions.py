@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from commissioner.errors import DataRefused
 from commissioner.identify.batch import BatchFit, Segment, extended
 from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_law import LegLaw
@@ -59,7 +61,8 @@ def _from_every_start(
     for start in starts:
         theta = best.theta.copy()
         theta[:CIRCUIT] = start_theta(start, best.model)[:CIRCUIT]
-        finalists.append(_coarse(segments, period_s, start, best.model, theta))
+        with contextlib.suppress(DataRefused):  # the iron found so far may run away in another machine
+            finalists.append(_coarse(segments, period_s, start, best.model, theta))
     chosen = min(finalists, key=lambda f: f.criterion())
     return fit_segments(segments, period_s, chosen.gamma.as_inverse_gamma(), chosen.model, chosen.theta)
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from commissioner.errors import DataRefused
 from commissioner.identify.batch import BatchFit, Segment
 from commissioner.identify.model import CIRCUIT, DELAY, OWN, Matrix, ModelChoice, start_theta
 from commissioner.identify.problem import Evaluation, Problem
@@ -42,6 +43,11 @@ def fit_segments(
     problem.plateau_v = max(float(np.max(np.abs(theta[choice.leg_slice]), initial=0.0)), 1e-3)
     own = np.zeros((len(segments), OWN))
     present = problem.evaluate(theta, own)
+    if not np.all(np.isfinite(present.information)):
+        raise DataRefused(
+            "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
+            remedy="check that the nameplate belongs to the motor",
+        )  # fmt: skip
     damping, converged, iterations = 1e-4, False, 0
     for _ in range(max_iterations):
         iterations += 1
