@@ -184,6 +184,7 @@ def trendable(observation: Observation, made: Pulses | None) -> list[Indicator]:
 
 
 def _ripple(values: Signal, std: Signal) -> tuple[Quantity, float]:
-    """Half peak to peak, with the rms standard deviation of its points."""
+    """Amplitude of the sine with the same rms, with the rms standard deviation of its points; a peak would jump with each
+    order that one recording shows and another does not."""
     spread = float(np.sqrt(np.mean(std**2)))
-    return Quantity(float(0.5 * np.ptp(values)), spread), spread
+    return Quantity(float(np.sqrt(2.0) * np.std(values)), spread), spread
