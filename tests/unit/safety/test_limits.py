@@ -230,6 +230,16 @@ def test_each_enable_needs_its_own_excitation():
     assert permit(Enable("again"), facts, BOUNDS) is not None
 
 
+def test_a_test_of_less_than_no_time_is_refused():
+    assert permit(Enable("short"), replace(READY, loaded=replace(EXCITATION, duration_s=-0.5)), BOUNDS) is not None
+    assert permit(replace(EXCITATION, duration_s=-0.5), READY, BOUNDS) is not None
+
+
+@pytest.mark.parametrize("field", ["current_a", "voltage_v", "time_s"])
+def test_a_limit_below_zero_is_not_set_in_the_drive(field):
+    assert permit(replace(LIMITS, **{field: -0.5}), replace(READY, energised=False), BOUNDS) is not None
+
+
 def test_a_short_first_test_is_permitted():
     assert permit(Enable("short"), replace(READY, loaded=replace(EXCITATION, duration_s=0.5)), BOUNDS) is None
 
