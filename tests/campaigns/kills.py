@@ -379,7 +379,7 @@ def report(done: list[Killed]) -> dict[str, Any]:
         "ended by themselves before the moment": sum(not k.was_killed for k in done),
         "by moment": Counter(k.moment.kind for k in done),
         "while energised": sum(k.was_energised for k in done),
-        "the archive said": Counter(k.written for k in done),
+        "the archive said": Counter(k.written.split(";")[0] for k in done),
         "the drive held (in use, stored)": Counter("/".join(k.held) for k in done),
         "restored and verified": sum(k.was_restored for k in done),
         "with a broken promise": sum(bool(k.broken) for k in done),
