@@ -10,7 +10,7 @@ from tests.hidden_effects.blind import diagnosed, hidden_names
 from tests.hidden_effects.cases import Case, class_of
 
 SEED = 40
-IN_THE_SUITE = ("cable_capacitance", "dc_link_ripple", "device_drop")
+IN_THE_SUITE = ("cable_capacitance", "dc_link_ripple", "device_drop", "leakage_saturation", "lost_samples")
 LONG = sorted(set(CATALOGUE) - set(IN_THE_SUITE))
 
 
