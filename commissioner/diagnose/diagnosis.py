@@ -96,10 +96,12 @@ class Diagnosis:
 
 
 def diagnose(
-    recordings: Sequence[StandstillRecording], *, excluded: Sequence[str] = (), report: Callable[[str], None] = lambda _: None
+    recordings: Sequence[StandstillRecording], *, excluded: Sequence[str] = (),
+    report: Callable[[str], None] = lambda _: None, go_on: Callable[[], bool] = lambda: True,
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about the recordings of one motor.
 
+    `go_on` is asked between causes; once it says no, the answer is given with what was found so far, and says so.
     Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason.
     """
     record, audit = prepare(recordings)
@@ -111,7 +113,7 @@ def diagnose(
     report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
-        found = search(record, noise, excluded=excluded, report=report, check=_one_motor)
+        found = search(record, noise, excluded=excluded, report=report, check=_one_motor, go_on=go_on)
         _one_state(found.fit, found.record)
     except _MixedMotors as mixed:
         return Diagnosis(Verdict.REFUSED, str(mixed), (), (), audit, noise)
@@ -137,7 +139,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
         rest, _parameters(found.nominal), _parameters(found.fit), _limits(found), experiment,
-        model_document(found, causes), found, split_lines(record), share, _remarks(noise, record),
+        model_document(found, causes), found, split_lines(record), share, _remarks(noise, record, found.is_complete),
     )
 
 
@@ -276,8 +278,8 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
     return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")
 
 
-def _remarks(noise: Noise, record: Record) -> tuple[str, ...]:
-    out = []
+def _remarks(noise: Noise, record: Record, is_complete: bool) -> tuple[str, ...]:
+    out = [] if is_complete else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
     if not noise.is_known:
         out.append(
             "No repeated segment, no repeated period, no zero-voltage stretch and no third sensor: the noise had to be "

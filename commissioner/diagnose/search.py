@@ -28,7 +28,7 @@ MATERIAL_SHARE = 1e-4
 REFITTED = 4
 RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
-GUARD = 1e-3
+GUARD = 2e-5
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
 CLASS_GUARD = 1e-2
 """Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
@@ -59,6 +59,8 @@ class Found:
     below_materiality: tuple[str, ...] = ()
     gains: dict[str, float] = field(default_factory=dict)
     losses: tuple[Loss, ...] = ()
+    is_complete: bool = True
+    """False: the time allowed was over before nothing more passed the rules."""
 
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
@@ -166,11 +168,11 @@ def explored(record: Record) -> Record:
 
 def search(
     record: Record, noise: Noise, *, excluded: Sequence[str] = (), report: Report = lambda _: None,
-    check: Callable[[Fit, Record], None] | None = None,
+    check: Callable[[Fit, Record], None] | None = None, go_on: Callable[[], bool] = lambda: True,
 ) -> Found:
     """Accepted causes of the whole record: explored on a part, confirmed and completed on all of it.
 
-    `check` sees the nominal fit first and may raise to spare the search.
+    `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
     """
     part, bare = explored(record), _bare_layout(record)
     quick = nominal_fit(part, noise)
@@ -199,17 +201,17 @@ def search(
         small = record.subset(tuple(range(len(record.segments))), share)
         small_setting = replace(setting, record=small)
         start = fit(nominal.model, small, layout, noise, rounds=6)
-        search_small = _Search(small, layout, small_setting, noise, names, report, record)
+        search_small = _Search(small, layout, small_setting, noise, names, report, record, go_on)
         fitted, accepted, _ = search_small.run(start, ())
         first, record = search_small.first, search_small.full
         model = _without_curves(_completed(fitted.model, accepted, setting))
-    whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record)
+    whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record, go_on)
     start = whole.relayout(fit(model, record, layout, noise))
     fitted, accepted, last = whole.run(start, accepted)
     first = whole.first if first is None else first
     return Found(
         nominal, fitted, accepted, whole.record, whole.layout, whole.setting, last, first,
-        tuple(whole.below), whole.gains(fitted, accepted), losses,
+        tuple(whole.below), whole.gains(fitted, accepted), losses, go_on(),
     )
 
 
@@ -233,10 +235,10 @@ class _Search:
 
     def __init__(
         self, record: Record, layout: Layout, setting: Setting, noise: Noise, names: Sequence[str], report: Report,
-        full: Record,
+        full: Record, go_on: Callable[[], bool],
     ) -> None:
         self.record, self.layout, self.setting, self.noise = record, layout, setting, noise
-        self.names, self.report, self.full = names, report, full
+        self.names, self.report, self.full, self.go_on = names, report, full, go_on
         self.below: list[str] = []
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in record.segments]) ** 2)))
@@ -257,7 +259,8 @@ class _Search:
             absent = [n for n in self.names if n not in accepted]
             screening = screen(current.model, self.record, self.layout, self.noise, self.setting, absent)
             self.first = self.first or screening
-            step = None if len(accepted) >= MOST_CAUSES else self._forward(current, screening, refused)
+            is_over = len(accepted) >= MOST_CAUSES or not self.go_on()
+            step = None if is_over else self._forward(current, screening, refused)
             if step is None:
                 current, accepted, _ = self._backward(current, accepted, accepted)
                 return current, accepted, screening
