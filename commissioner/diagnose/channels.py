@@ -17,6 +17,8 @@ SAG_LAGS_S = (0.001, 0.01, 0.1)
 HEAT_LEAK_S = 20.0
 SPEED_KNOTS_S, MOST_SPEED_KNOTS = 0.4, 40
 """A shaft held by its load swings below about 1 Hz: cubic splines of this spacing follow it to a per cent."""
+HARMONICS = {"mains": (3, 5, 7), "ripple": (2,)}
+"""Mains hum comes distorted; a rectifier's ripple is no sine."""
 RIPPLE_HZ = (100.0, 120.0, 300.0, 360.0)
 MAINS_HZ = (50.0, 60.0)
 SEARCH = 0.008
@@ -44,6 +46,9 @@ def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[
     record = _with(record, _hats(record))
     for name, frequency in lines.items():
         record = _with(record, _line(record, name, frequency))
+        for order in HARMONICS[name.partition("_")[0]]:
+            if order * frequency * record.facts.sample_period_s < 0.45:
+                record = _with(record, _line(record, f"{name}x{order}", order * frequency))
     return record
 
 

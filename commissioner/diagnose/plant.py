@@ -295,12 +295,13 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
     r_s, r_r, l_sigma, l_m = model.nominal
     nu = 0.5 + model.total(kinds.NU)
     kappa = 1.0 + (0.5 + model.total(kinds.LEAK_SPLIT)) * layout.leak_ratio
-    # a leakage that differs between directions, half of it on the rotor side, also tilts R_R and 1/L_M (Gamma circuit)
+    # an inductance that differs between directions, leakage half on the rotor side, tilts R_R and the other one, too
     coupled = layout.leak_ratio / (1.0 + layout.leak_ratio)
     rotor, leakage, magnetizing = aniso
     base = np.array([
         r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS),
-        *(rotor + coupled * leakage), *leakage, *(magnetizing - 0.5 * coupled * leakage), kappa, layout.leak_ratio, coupled,
+        *(rotor + coupled * (leakage - magnetizing)), *(leakage + 0.5 * coupled * magnetizing),
+        *(magnetizing - 0.5 * coupled * leakage), kappa, layout.leak_ratio, coupled,
     ])
     stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros(0)
     branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
@@ -324,8 +325,10 @@ def _if(is_used: bool, vectors: Array) -> Array:
 def _initial_state(model: Model, segment: Segment) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
-    share = model.total(kinds.CARRY)
-    state[:] = [share * f for f in (*segment.flux_before_wb, *segment.flux_before_wb)]
+    along, across = model.total(kinds.CARRY), model.total(kinds.CARRY, 1)
+    alpha, beta = segment.flux_before_wb
+    left = (along * alpha - across * beta, along * beta + across * alpha)
+    state[:] = [*left, *left]
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
             if term.index < 2:
@@ -390,9 +393,9 @@ def _sense(
         for row in rows:
             jacobian[row] *= slope_of_sensor
     reported = distorted + model.sum_kind(OFFSET, 3)[:phases, None]
-    middle = record.segments[0].time_s[0]
-    age = (segment.time_s - middle) / 60.0
-    reported = reported + model.sum_kind(DRIFT, 3)[:phases, None] * age
+    ages = _ages(record, segment)
+    drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
+    reported = reported + sum(d[:, None] * age for d, age in zip(drift, ages, strict=True))
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == TONE and value and term.segment in (-1, segment.uid):
             reported[term.index % 3] += value * channels[:, term.index // 3]
@@ -407,7 +410,7 @@ def _sense(
         elif term.kind == OFFSET:
             row[term.index] = 1.0
         elif term.kind == DRIFT:
-            row[term.index] = age
+            row[term.index % 3] = ages[term.index // 3]
         elif term.kind == GAIN:
             row[term.index] = current[term.index]
         elif term.kind == EVEN:
@@ -423,6 +426,14 @@ def _sense(
         if term.kind >= kinds.FIRST_OF_SENSING:
             row *= term.step
     return reported
+
+
+def _ages(record: Record, segment: Segment) -> list[Array]:
+    """Minutes since the first sample, and the same settling within a quarter and a sixteenth of the recording."""
+    first, last = record.segments[0].time_s[0], record.segments[-1].time_s[-1]
+    age = (segment.time_s - first) / 60.0
+    settling = [max(float(last - first), 1e-3) / 60.0 / share for share in (4.0, 16.0)]
+    return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
 
 
 def _edges(voltage_per_period: Array) -> list[Array]:

@@ -117,8 +117,9 @@ def sensitivities(
         n = indices[p]
         if kinds[p] == CARRY:
             for c in range(2):
-                dx[c, p] = flux_before[c]
-                dx[2 + c, p] = flux_before[c]
+                left = flux_before[c] if n == 0 else (flux_before[0] if c == 1 else -flux_before[1])
+                dx[c, p] = left
+                dx[2 + c, p] = left
         elif kinds[p] == INITIAL_FLUX:
             if n < 2:
                 dx[n, p] = 1.0
@@ -274,6 +275,11 @@ def sensitivities(
             elif kind == MAGNETIZING_ANISOTROPY:
                 qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
+                qa, qb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
+                fwa -= coupled * qa
+                fwb -= coupled * qb
+                qa, qb = (gs * sa, -gs * sb) if n == 0 else (gs * sb, gs * sa)
+                fia, fib = 0.5 * coupled * qa, 0.5 * coupled * qb
             fj[0, p], fj[1, p] = fja, fjb
             push_t[0, p], push_t[1, p] = fia, fib
             push_w[0, p], push_w[1, p] = fwa, fwb

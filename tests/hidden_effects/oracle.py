@@ -39,7 +39,7 @@ def strength_sigma(scenario: Scenario, seed: int, names: list[str], noise: Noise
     first = nominal_fit(audited, noise)
     if len(audited.segments) > 1:
         audited = with_flux_before(audited, first.model, _bare_layout(audited))
-        first = fit(first.model.with_terms([CARRY]), audited, _bare_layout(audited), noise, rounds=6, tolerance=1.0)
+        first = fit(first.model.with_terms(CARRY), audited, _bare_layout(audited), noise, rounds=6, tolerance=1.0)
     return float(np.sqrt(first.chi2 / first.normal.count.sum()))
 
 

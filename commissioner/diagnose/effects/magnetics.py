@@ -73,7 +73,7 @@ def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 @effect(
     "remanence", "Flux left in the iron before the test", sign=1, family="start", sizes=_remanence_sizes,
     signature="a transient at the start of a segment that decays with the rotor time constant",
-    confounders=("sensor_offset", "magnetic_hysteresis"),
+    confounders=("sensor_offset", "magnetic_hysteresis", "shaft_motion"),
     source="initial state of the flux equation; P. Vas, Sensorless Vector and Direct Torque Control, 1998",
     split_by="wait longer before the segment, or start it with the opposite polarity",
 )
@@ -198,7 +198,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 @effect(
     "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes,
     signature="current in the axis that gets no voltage, proportional to the rotor flux",
-    confounders=("sensor_offset", "inductance_anisotropy"),
+    confounders=("sensor_offset", "sensor_drift", "inductance_anisotropy"),
     source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
     split_by="block the shaft",
 )
