@@ -21,7 +21,7 @@ FORMAT = 1
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
     """A JSON/TOML-ready document of the fitted model."""
     r_s, r_r, l_sigma, l_m = found.fit.model.nominal
-    kept = [(t, v) for t, v in zip(found.fit.model.terms, found.fit.model.values, strict=True) if t.effect and v]
+    kept = [(t, v) for t, v in zip(found.fit.model.terms, found.fit.model.values, strict=True) if v]
     return {
         "kind": "extended_model",
         "format": FORMAT,

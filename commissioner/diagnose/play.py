@@ -71,7 +71,7 @@ def play(
     for _ in range(2):
         rotor = [predict(plain, record, k, used).rotor_current_a for k in range(len(record.segments))]
         known = with_known(replace(record, channel_names=(), channels=()), rotor, lines_hz)
-        record = _filled(known, model, used)
+        record = _filled(with_flux_before(known, model, used), model, used)
     noise = np.random.default_rng(seed + 1)
     parts = [
         {
