@@ -28,6 +28,9 @@ runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, sh
 app.add_typer(runs_app, name="runs")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
+Diagnosed = Annotated[
+    bool, typer.Option("--diagnosis/--no-diagnosis", help="End with a diagnosis of the run's own samples.")
+]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
 Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
 Drive = Annotated[
@@ -55,11 +58,15 @@ def demo(
     seed: Annotated[int, typer.Option(help="Seed of the simulated noise.")] = 1,
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
+    diagnosis: Diagnosed = True,
 ) -> None:
     """The whole job against the simulated inverter, started as its own process on loopback."""
     from commissioner.cli.demo import demo as verb
 
-    verb(scenario=scenario, speed=speed, seed=seed, axes=axes, write_back=write_back, runs=runs, as_json=json)
+    verb(
+        scenario=scenario, speed=speed, seed=seed, axes=axes, write_back=write_back, runs=runs, as_json=json,
+        diagnosis=diagnosis,
+    )
 
 
 @app.command()
@@ -86,6 +93,7 @@ def run(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
     procedure: Procedure = None,
     runs: Runs = RUNS,
+    diagnosis: Diagnosed = True,
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
@@ -101,6 +109,7 @@ def run(
         procedure=procedure,
         runs=runs,
         as_json=json,
+        diagnosis=diagnosis,
     )
 
 

@@ -20,7 +20,7 @@ START_S = 120.0
 
 
 def demo(
-    *, scenario: str, speed: str, seed: int, axes: str | None, write_back: bool, runs: Path, as_json: bool
+    *, scenario: str, speed: str, seed: int, axes: str | None, write_back: bool, runs: Path, as_json: bool, diagnosis: bool
 ) -> None:
     """Commission the simulated inverter; exits with the code of the outcome."""
     from commissioner.cli import screen
@@ -38,6 +38,7 @@ def demo(
             procedure=None,
             runs=runs,
             as_json=as_json,
+            diagnosis=diagnosis,
         )
 
 

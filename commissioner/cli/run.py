@@ -10,6 +10,7 @@ from commissioner.errors import UsageError
 from commissioner.run.commission import Commissioned, commission
 from commissioner.settings import load_motor, load_procedure
 
+DIAGNOSIS_S = 20.0
 EXIT_CODES = {"commissioned": 0, "rejected": 3, "aborted": 4, "faulted": 5}
 
 
@@ -24,6 +25,7 @@ def run(
     procedure: Path | None,
     runs: Path,
     as_json: bool,
+    diagnosis: bool,
 ) -> None:
     """Commission the drive; exits with the code of the outcome."""
     commission_and_show(
@@ -36,6 +38,7 @@ def run(
         procedure=procedure,
         runs=runs,
         as_json=as_json,
+        diagnosis=diagnosis,
     )
 
 
@@ -50,6 +53,7 @@ def commission_and_show(
     procedure: Path | None,
     runs: Path,
     as_json: bool,
+    diagnosis: bool,
 ) -> None:
     """The part that `run` and `demo` share."""
     nameplate = load_motor(motor)
@@ -57,7 +61,10 @@ def commission_and_show(
     if not yes:
         _ask(url, plan.total_seconds, write_back, as_json=as_json)
     with LiveView(screen.err if as_json else screen.out) as view:
-        done = commission(url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view)
+        done = commission(
+            url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view,
+            diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
+        )
     _show(done, as_json=as_json)
     code = EXIT_CODES[done.ended.outcome]
     if code:

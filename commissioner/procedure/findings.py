@@ -15,6 +15,13 @@ class WarmingUp:
 
 
 @dataclass(frozen=True)
+class Diagnosing:
+    """The run is over and saved; its samples are looked through for what a simulation would get wrong."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
 class StateEntered:
     state: str
     because: str

@@ -27,6 +27,7 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "objections": findings.verdict.objections if findings.verdict else (),
         "parameters": {},
         "remarks": (),
+        "diagnosis": None,
     }
     if identification is not None:
         document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
@@ -38,6 +39,22 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "limit_wb": findings.flux_limit_wb,
     }
     return document
+
+
+def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
+    """What the diagnosis of the run's samples means for the run's `parameters`, a sentence each."""
+    names = [" or ".join((c["name"], *c["equivalent"])).replace("_", " ") for c in diagnosis["causes"]]
+    if not names:
+        return []
+    out = [f"a simulation with the four parameters alone misses, in these samples: {', '.join(names)}"]
+    for moved in diagnosis["moved"]:
+        unit, factor = ("ohm", 1.0) if moved["parameter"].endswith("_ohm") else ("mH", 1e3)
+        name = moved["parameter"].rpartition("_")[0].replace("_", " ")
+        out.append(
+            f"{name} would have come out as {factor * moved['four_parameters']:.4g} {unit} instead of "
+            f"{factor * parameters[moved['parameter']]['value']:.4g} {unit}, mostly for {moved['cause'].replace('_', ' ')}"
+        )
+    return out
 
 
 def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:

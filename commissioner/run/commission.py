@@ -20,15 +20,16 @@ from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.excite import warm_up
-from commissioner.procedure.findings import RunEnded, WarmingUp
+from commissioner.procedure.findings import Diagnosing, RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.verdict import PARAMETERS
 from commissioner.records import DriveIdentity
 from commissioner.registers.convention import INDUCTANCES, RESISTANCES, is_our_own
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run_page import run_page
-from commissioner.report.summary import summarise
+from commissioner.report.summary import diagnosis_sentences, summarise
 from commissioner.run.archive import RunFolder, plain, read_journal, write_recording
+from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.runner import Present, Runner
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
@@ -96,8 +97,12 @@ def commission(
     write_back: bool,
     runs: Path,
     present: Present,
+    diagnosis_s: float = 0.0,
 ) -> Commissioned:
-    """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder."""
+    """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
+
+    `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for about so long.
+    """
     profile = load_profile(profile_name)
     parse_url(url)
     present(WarmingUp())
@@ -117,6 +122,9 @@ def commission(
         )
         ended = _carry_out(url, profile, nameplate, plan, write_back, folder, findings, present)
         result = _close(folder, nameplate, findings, ended, _parameter_names(profile))
+        if diagnosis_s > 0.0 and findings.identification is not None:
+            present(Diagnosing(diagnosis_s))
+            result = _with_diagnosis(folder, result, findings, diagnosis_s)
     finally:
         folder.close()
     return Commissioned(ended, folder.path, result)
@@ -170,6 +178,18 @@ def _close(
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
     return result
+
+
+def _with_diagnosis(
+    folder: RunFolder, result: Mapping[str, Any], findings: Findings, seconds: float
+) -> Mapping[str, Any]:
+    """Result and report once more, with what a four-parameter simulation would have got wrong."""
+    diagnosis = diagnose_run(folder, seconds)
+    remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
+    completed: dict[str, Any] = {**result, "diagnosis": diagnosis, "remarks": remarks}
+    folder.save("result.json", completed)
+    folder.save_text("report.html", run_page(completed, read_journal(folder.path / "journal.jsonl"), findings))
+    return completed
 
 
 @contextmanager

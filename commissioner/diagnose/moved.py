@@ -1,0 +1,55 @@
+"""Which machine parameter an error of the simulation had moved, from where to where, and by which cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.fit import Fit
+
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+LEAST_SHARE, LEAST_SIGMAS = 0.01, 3.0
+"""A move below a per cent, or within three standard errors of the better value, is not worth a sentence."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One parameter fitted by four numbers alone, and with the accepted causes; `cause` had most of the move."""
+
+    parameter: str
+    four_parameters: float
+    with_causes: float
+    cause: str
+
+    @property
+    def relative(self) -> float:
+        """How far the four-parameter value is off, as a fraction of the better one."""
+        return self.four_parameters / self.with_causes - 1.0
+
+
+def moved_parameters(nominal: Fit, extended: Fit) -> tuple[Moved, ...]:
+    """Parameters that the accepted causes moved, largest first."""
+    before, after = np.array(nominal.model.nominal), np.array(extended.model.nominal)
+    covariance = np.linalg.pinv(extended.normal.total_gram, rcond=1e-12, hermitian=True)
+    error = np.sqrt(np.maximum(np.diag(covariance)[:4], 0.0))
+    apart = np.abs(np.log(before / after))
+    causes = list(dict.fromkeys(t.effect for t in extended.model.terms if t.effect))
+    if not causes:
+        return ()
+    shifts = np.array([np.abs(_shift_without(extended, name)) for name in causes])
+    order = [k for k in np.argsort(-apart) if apart[k] > max(LEAST_SHARE, LEAST_SIGMAS * error[k])]
+    return tuple(
+        Moved(PARAMETERS[k], float(before[k]), float(after[k]), causes[int(np.argmax(shifts[:, k]))]) for k in order
+    )
+
+
+def _shift_without(fitted: Fit, name: str) -> NDArray[np.float64]:
+    """(4,) relative change of the parameters, to first order, when one cause is taken out and the rest re-adjusts."""
+    mine = np.array([4 + k for k, t in enumerate(fitted.model.terms) if t.effect == name])
+    others = np.array([k for k in range(4 + len(fitted.model.terms)) if k not in set(mine.tolist())])
+    gram = fitted.normal.total_gram
+    inner = np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
+    change: NDArray[np.float64] = inner @ gram[np.ix_(others, mine)] @ fitted.model.theta[mine]
+    return change[:4]

@@ -1,0 +1,44 @@
+"""The diagnosis every run ends with: what a four-parameter simulation gets wrong about the run's own samples."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from commissioner.diagnose.diagnosis import Diagnosis, diagnose
+from commissioner.diagnose.document import as_document
+from commissioner.diagnose.moved import moved_parameters
+from commissioner.errors import CommissionerError
+from commissioner.recordings.table import read_table, to_standstill
+from commissioner.run.archive import RunFolder, plain
+
+FILE, RECORDING = "diagnosis.json", "recording.parquet"
+
+
+def diagnose_run(folder: RunFolder, seconds: float) -> dict[str, Any]:
+    """Short form for the result; the whole document goes to `diagnosis.json`. A recording that cannot be read is said."""
+    end = time.monotonic() + seconds
+    try:
+        recording = to_standstill(read_table(folder.path / RECORDING))
+    except CommissionerError as error:
+        return {"verdict": "refused", "reason": error.what, "causes": [], "moved": [], "file": None}
+    seen = diagnose([recording], go_on=lambda: time.monotonic() < end)
+    document = plain(as_document(seen, None))
+    folder.save(FILE, document)
+    return {
+        "verdict": document["verdict"],
+        "reason": document["reason"],
+        "causes": [{key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]],
+        "moved": _moved(seen),
+        "remarks": document["remarks"],
+        "file": FILE,
+    }
+
+
+def _moved(seen: Diagnosis) -> list[dict[str, Any]]:
+    if seen.found is None:
+        return []
+    return [
+        {"parameter": m.parameter, "four_parameters": m.four_parameters, "with_causes": m.with_causes, "cause": m.cause}
+        for m in moved_parameters(seen.found.nominal, seen.found.fit)
+    ]
