@@ -73,10 +73,9 @@ def fit_axis(
     """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with."""
     stairs = _staircase(stretches)
     first_leg = leg or (stairs.inverter if stairs else None)
-    if like is not None:
-        chosen = with_link(stretches, like.batch.inverter()) if like.follows_link else list(stretches)
-        batch = like.batch
-        fit = fit_segments(_segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta)
+    begun = _begun_like(like, stretches, period_s) if like is not None else None
+    if begun is not None:
+        chosen, fit = begun
     else:
         chosen = list(stretches)
         starts = _starts(chosen, plate, period_s, guess, first_leg)
@@ -84,6 +83,16 @@ def fit_axis(
         chosen, fit = _better_with_link(chosen, period_s, fit)
     require_conditioned(fit)
     return AxisFit(tuple(chosen), stairs, fit, follows_link=chosen[0] is not stretches[0])
+
+
+def _begun_like(like: AxisFit, stretches: Sequence[Stretch], period_s: float) -> tuple[list[Stretch], BatchFit] | None:
+    """The earlier axis' model fitted to this one; None where it runs away here (iron bent beyond what it was fitted for)."""
+    chosen = with_link(stretches, like.batch.inverter()) if like.follows_link else list(stretches)
+    batch = like.batch
+    try:
+        return chosen, fit_segments(_segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta)
+    except DataRefused:
+        return None
 
 
 def with_link(stretches: Sequence[Stretch], leg: InverterError | None) -> list[Stretch]:
@@ -105,7 +114,10 @@ def _better_with_link(stretches: list[Stretch], period_s: float, fit: BatchFit) 
     if any(s.link_ratio is None for s in stretches):
         return stretches, fit
     follows = with_link(stretches, fit.inverter())
-    other = fit_segments(_segments(follows), period_s, fit.gamma.as_inverse_gamma(), fit.model, fit.theta)
+    try:
+        other = fit_segments(_segments(follows), period_s, fit.gamma.as_inverse_gamma(), fit.model, fit.theta)
+    except DataRefused:
+        return stretches, fit
     return (follows, other) if other.criterion() < fit.criterion() - 10.0 else (stretches, fit)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +32,12 @@ def select_model(
     law = LegLaw(max(float(np.max(np.abs(s.current_a))) for s in segments))
     rms_v = max(float(np.std(s.voltage_v)) for s in segments)
     legs = [leg] if leg else [None, *(knee_shape(share * rms_v, law.corner_a, 2.0) for share in BLIND_LOSSES)]
-    begun = [_begin(segments, period_s, start, each, law) for start in starts for each in legs]
+    begun = _those_simulated([partial(_begin, segments, period_s, start, each, law) for start in starts for each in legs])
+    if not begun:
+        raise DataRefused(
+            "the model cannot be simulated from any start", step="identify", value=f"{len(starts)} starts", limit="one",
+            remedy="check that the nameplate belongs to the motor",
+        )  # fmt: skip
     best = min(begun, key=lambda f: f.criterion())
     start = best.gamma.as_inverse_gamma()
     model = replace(best.model, flux_scale_wb=best.peak_flux_wb)
@@ -44,7 +50,8 @@ def select_model(
             replace(m, with_drift=not m.with_drift),
             replace(m, leg=None if m.leg and not _loses_voltage(best) else law),
         )
-        trials = [_coarse(segments, period_s, start, t, extended(best, t)) for t in toggled if t not in tried]
+        untried = [t for t in toggled if t not in tried]
+        trials = _those_simulated([partial(_coarse, segments, period_s, start, t, extended(best, t)) for t in untried])
         tried.update(toggled)
         better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
         if not better:
@@ -57,14 +64,25 @@ def _from_every_start(
 ) -> BatchFit:
     """The chosen model once more from the other machines: a way through simpler models may have led into a wrong
     minimum."""
-    finalists = [best]
+    attempts = []
     for start in starts:
         theta = best.theta.copy()
         theta[:CIRCUIT] = start_theta(start, best.model)[:CIRCUIT]
-        with contextlib.suppress(DataRefused):  # the iron found so far may run away in another machine
-            finalists.append(_coarse(segments, period_s, start, best.model, theta))
+        attempts.append(partial(_coarse, segments, period_s, start, best.model, theta))
+    finalists = [best, *_those_simulated(attempts)]
     chosen = min(finalists, key=lambda f: f.criterion())
-    return fit_segments(segments, period_s, chosen.gamma.as_inverse_gamma(), chosen.model, chosen.theta)
+    gamma = chosen.gamma.as_inverse_gamma()
+    finished = _those_simulated([partial(fit_segments, segments, period_s, gamma, chosen.model, chosen.theta)])
+    return finished[0] if finished else chosen
+
+
+def _those_simulated(attempts: Sequence[Callable[[], BatchFit]]) -> list[BatchFit]:
+    """Fits that could begin: iron or inverter found so far may run away in another machine."""
+    fits = []
+    for attempt in attempts:
+        with contextlib.suppress(DataRefused):
+            fits.append(attempt())
+    return fits
 
 
 def _begin(

@@ -54,7 +54,8 @@ def fit_segments(
         step = _step(problem, present, theta, damping)
         new_theta, new_own = _apply(problem, theta, own, step)
         trial = problem.evaluate(new_theta, new_own)
-        if trial.squares <= present.squares * (1.0 + 1e-13):
+        can_be_judged = bool(np.isfinite(trial.squares) and np.all(np.isfinite(trial.information)))
+        if can_be_judged and trial.squares <= present.squares * (1.0 + 1e-13):
             small = _is_small(problem, step, present, theta, tolerance)
             flat = present.squares - trial.squares <= 1e-12 * present.squares
             theta, own, present = new_theta, new_own, trial
