@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from commissioner.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
-    from commissioner.diagnose.plant import Layout, Model
+    from commissioner.diagnose.model import Layout, Model
 
 MAX_BYTES = 5_000_000
 SAMPLE_PERIOD_S = 2e-4
@@ -54,7 +54,7 @@ def _model(name: str, plain: bool) -> tuple[Model, Layout | None, dict[str, floa
         return _extended(path, plain)
     from dataclasses import asdict
 
-    from commissioner.diagnose.plant import Model
+    from commissioner.diagnose.model import Model
     from commissioner.motor.nameplate import prior
     from commissioner.settings import load_motor
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
-from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, whiten
+from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import screen
 from commissioner.diagnose.search import is_plausible, loss_without

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.plant import Layout, Model, Term
+from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
 FORMAT = 1

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, Term, predict
+from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]

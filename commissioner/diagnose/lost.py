@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.fit import whiten
+from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, predict
+from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, Segment
 
 Array = NDArray[np.float64]

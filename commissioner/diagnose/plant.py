@@ -1,164 +1,23 @@
-"""The extended model in engineering terms: which numbers it has, and the currents and sensitivities it predicts.
-
-A model is the four inverse-Gamma numbers plus `Term`s. Every term is zero in the nominal model and enters linearly
-where physics puts it (legs, iron, leakage, rotor, sensor), so shapes are dictionaries: spline coefficients, stop
-operators of fixed radius, rotor branches of fixed corner frequency.
-"""
+"""Currents and sensitivities the extended model predicts for a segment: trajectory, tangent, then the sensors."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.signal import lfilter
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, FIFTH, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
-from commissioner.diagnose.resample import resample, resample_hermite
 from commissioner.diagnose.tangent import sensitivities
+from commissioner.diagnose.terminals import sense
 from commissioner.diagnose.trajectory import propagate, propagate_linear
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Term:
-    """One number of the extended model: `value = theta * step`, in `unit`, zero in the nominal model."""
-
-    effect: str
-    symbol: str
-    unit: str
-    kind: int
-    index: int
-    step: float
-    lower: float = -np.inf
-    upper: float = np.inf
-    start: float = 0.0
-    segment: int = -1
-    """Position of the only segment it acts in; -1: everywhere."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The fixed dictionaries: spline ranges and vectors, stop radii, branch corner frequencies."""
-
-    legs_top: float
-    legs_knee_a: float
-    legs_vectors: Array
-    iron_top_wb: float
-    iron_vectors: Array
-    leak_top_wb: float
-    leak_vectors: Array
-    stop_radius_wb: Array
-    branch_time_s: Array
-    nonlinearity_scale_a: float
-    substeps: int = 1
-    crossing_substeps: int = 12
-    legs_slack_v: float = 1.0
-    nominal_box: tuple[tuple[float, float], ...] = ((0.0, np.inf),) * 4
-    """Where R_s, R_R, L_sigma and L_M may be, from the impedance the recording shows: no effect moves them beyond."""
-    leak_ratio: float = 0.0
-    """L_sigma / L_M, fixed: how far the rotor current is from the stator current in (3a) of `trajectory`."""
-
-    def penalty(self, terms: Sequence[Term]) -> Array:
-        """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
-
-        tell apart): each rise beyond 0.15 of the range's end is about `legs_slack_v` or less.
-        """
-        size = 4 + len(terms)
-        out = np.zeros((size, size))
-        count = self.legs_vectors.shape[0]
-        knots = (np.arange(count) + 0.5) * self.legs_top / count
-        tail = np.sinh(self.legs_top) * 0.15
-        for k, term in enumerate(terms):
-            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
-                out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
-        return out
-
-    def finer(self) -> Layout:
-        """Half the step length, for the solver-error check."""
-        return replace(self, substeps=2 * self.substeps, crossing_substeps=2 * self.crossing_substeps)
-
-
-def odd_vectors(intervals: int) -> Array:
-    """Rises of odd saturating functions, (intervals, intervals+3): row k climbs from 0 to 1 around knot k and stays.
-
-    Cumulative sums of the spline vectors with F(0) = F''(0) = 0 and a flat end, so that weights >= 0 give a curve that
-    never falls: a leg with falling voltage loss would be an oscillator.
-    """
-    vectors = np.zeros((intervals, intervals + 3))
-    vectors[0, 2], vectors[0, 0] = 1.0, -1.0
-    for k in range(1, intervals):
-        vectors[k, k + 2] = 1.0
-    # flat end: c[K+2] = c[K]
-    vectors[:, intervals + 2] = vectors[:, intervals]
-    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
-
-
-def even_vectors(intervals: int) -> Array:
-    """Rises of even functions with G(0) = G'(0) = 0, (intervals+1, intervals+3): row k climbs from knot k on.
-
-    Weights >= 0 give a slope that never falls with size, as saturation does.
-    """
-    vectors = np.zeros((intervals + 1, intervals + 3))
-    vectors[0, 0], vectors[0, 1], vectors[0, 2] = 1.0, -0.5, 1.0
-    for k in range(1, intervals + 1):
-        vectors[k, k + 2] = 1.0
-    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
-
-
-@dataclass(frozen=True)
-class Model:
-    """`nominal` = (R_s, R_R, L_sigma, L_M); `values[k]` belongs to `terms[k]`, in the term's unit."""
-
-    nominal: tuple[float, float, float, float]
-    terms: tuple[Term, ...] = ()
-    values: tuple[float, ...] = ()
-
-    @cached_property
-    def theta(self) -> Array:
-        """Scaled parameters: logarithms of the four, then value / step."""
-        scaled = [v / t.step for v, t in zip(self.values, self.terms, strict=True)]
-        return np.array([*np.log(self.nominal), *scaled])
-
-    def moved(self, theta: Array) -> Model:
-        nominal = np.exp(theta[:4])
-        values = tuple(float(x) * t.step for x, t in zip(theta[4:], self.terms, strict=True))
-        return Model((float(nominal[0]), float(nominal[1]), float(nominal[2]), float(nominal[3])), self.terms, values)
-
-    def with_terms(self, terms: Sequence[Term]) -> Model:
-        return Model(self.nominal, self.terms + tuple(terms), self.values + tuple(t.start for t in terms))
-
-    def without(self, effect: str) -> Model:
-        keep = [k for k, t in enumerate(self.terms) if t.effect != effect]
-        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
-
-    def only(self, effects: Sequence[str]) -> Model:
-        keep = [k for k, t in enumerate(self.terms) if t.effect in effects]
-        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
-
-    def of(self, effect: str) -> dict[str, float]:
-        return {t.symbol: v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect}
-
-    def total(self, kind: int, index: int = 0) -> float:
-        pairs = zip(self.terms, self.values, strict=True)
-        return sum(v for t, v in pairs if t.kind == kind and t.index == index)
-
-    def sum_kind(self, kind: int, size: int) -> Array:
-        out = np.zeros(size)
-        for term, value in zip(self.terms, self.values, strict=True):
-            if term.kind == kind:
-                out[term.index] += value
-        return out
-
-    def has_kind(self, *kinds: int) -> bool:
-        return any(t.kind in kinds for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -193,7 +52,7 @@ def predict(
         ])
         tangent = _tangent(path, segment, channels, layout, at_work, indices)
         _to_phases(tangent, scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
-    measured = _sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
+    measured = sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
     nu = path.machine[0][4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
     last = path.states[-1, 2:4]
@@ -349,121 +208,3 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
         rate *= 1.3
     period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
     return int(layout.substeps * np.clip(np.ceil(rate * period / 0.25), 1, 40))
-
-
-def _sense(
-    model: Model, record: Record, segment: Segment, channels: Array, layout: Layout,
-    trajectory: tuple[Array, Array, Array], jacobian: Array, listed: Sequence[Term],
-) -> Array:
-    """From terminal currents to what the sensors report: cable, delay, lag, nonlinearity, gain, offset, pickup."""
-    phases = record.facts.phases
-    to_phases = TO_PHASES[:phases]
-    current, after, before = (to_phases @ x for x in trajectory)
-    period = record.facts.sample_period_s
-    capacitance = model.sum_kind(CABLE, 3)
-    if capacitance.any() or any(t.kind == CABLE for t in listed):
-        edges = _edges(to_phases @ segment.voltage_ab_v / period)
-        current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
-    elapsed = segment.time_s - segment.time_s[0]
-    late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
-    late = np.broadcast_to(late, elapsed.shape)
-    is_late = bool(np.any(late))
-    filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
-    rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
-    if is_late:
-        current, slope = resample_hermite(current, after, before, late / period, period)
-        for row in rows:
-            jacobian[row] = resample(jacobian[row], late / period)
-    else:
-        slope = before
-    lag = model.total(LAG)
-    lag_slope = slope
-    if lag > 0.0:
-        current, lag_slope = _lagged(current, slope, lag, period)
-        slope = _lagged(slope, np.gradient(slope, period, axis=1), lag, period)[0]
-        for row in rows:
-            jacobian[row] = _low_pass(jacobian[row], lag, period)
-    scale = layout.nonlinearity_scale_a
-    gain, even = model.sum_kind(GAIN, 3)[:phases, None], model.sum_kind(EVEN, 3)[:phases, None]
-    odd, fifth = model.sum_kind(ODD, 3)[:phases, None], model.sum_kind(FIFTH, 3)[:phases, None]
-    s = current / scale
-    distorted = current * (1.0 + gain + even * s + odd * s * s + fifth * s**4)
-    if rows and (gain.any() or even.any() or odd.any() or fifth.any()):
-        slope_of_sensor = 1.0 + gain + 2.0 * even * s + 3.0 * odd * s * s + 5.0 * fifth * s**4
-        for row in rows:
-            jacobian[row] *= slope_of_sensor
-    reported = distorted + model.sum_kind(OFFSET, 3)[:phases, None]
-    ages = _ages(record, segment)
-    drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
-    reported = reported + sum(d[:, None] * age for d, age in zip(drift, ages, strict=True))
-    for term, value in zip(model.terms, model.values, strict=True):
-        if term.kind == TONE and value and term.segment in (-1, segment.uid):
-            reported[term.index % 3] += value * channels[:, term.index // 3]
-    for k, term in enumerate(listed):
-        row = jacobian[4 + k]
-        if term.kind == DELAY:
-            row[:] = -slope
-        elif term.kind == LAG:
-            row[:] = -lag_slope
-        elif term.kind == CLOCK:
-            row[:] = -slope * elapsed * 1e-6
-        elif term.kind == OFFSET:
-            row[term.index] = 1.0
-        elif term.kind == DRIFT:
-            row[term.index % 3] = ages[term.index // 3]
-        elif term.kind == GAIN:
-            row[term.index] = current[term.index]
-        elif term.kind == EVEN:
-            row[term.index] = current[term.index] * s[term.index]
-        elif term.kind == ODD:
-            row[term.index] = current[term.index] * s[term.index] ** 2
-        elif term.kind == FIFTH:
-            row[term.index] = current[term.index] * s[term.index] ** 4
-        elif term.kind == TONE:
-            row[term.index % 3] = channels[:, term.index // 3]
-        elif term.kind == CABLE:
-            row[:] = edges[term.index]
-        if term.kind >= kinds.FIRST_OF_SENSING:
-            row *= term.step
-    return reported
-
-
-def _ages(record: Record, segment: Segment) -> list[Array]:
-    """Minutes since the first sample, and the same settling within a quarter and a sixteenth of the recording."""
-    first, last = record.segments[0].time_s[0], record.segments[-1].time_s[-1]
-    age = (segment.time_s - first) / 60.0
-    settling = [max(float(last - first), 1e-3) / 60.0 / share for share in (4.0, 16.0)]
-    return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
-
-
-def _edges(voltage_per_period: Array) -> list[Array]:
-    """Step of the command at, before and after each sample, over the period."""
-    edge = np.diff(voltage_per_period, axis=1, prepend=0.0)
-    none = np.zeros((edge.shape[0], 1))
-    return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
-
-
-def _low_pass(signal: Array, lag_s: float, period_s: float) -> Array:
-    """First-order lag of a signal linear between samples (first-order hold, exact for it)."""
-    x = period_s / lag_s
-    decay = np.exp(-x)
-    late = 1.0 - (1.0 - decay) / x
-    filtered: Array = lfilter([late, 1.0 - decay - late], [1.0, -decay], signal, axis=-1)
-    return filtered
-
-
-def _lagged(current: Array, slope: Array, lag_s: float, period_s: float) -> tuple[Array, Array]:
-    """First-order lag and minus its derivative with respect to the lag (central difference of the same filter).
-
-    Below a twentieth of a sample the lag is expanded: i - tau i' (its second-order term is then below 1e-3 of the
-    first at the excited frequencies).
-    """
-    if lag_s < 0.05 * period_s:
-        return current - lag_s * slope, slope
-    h = 1e-3 * lag_s
-    high, low = _low_pass_smooth(current, lag_s + h, period_s), _low_pass_smooth(current, lag_s - h, period_s)
-    return _low_pass_smooth(current, lag_s, period_s), -(high - low) / (2.0 * h)
-
-
-def _low_pass_smooth(signal: Array, lag_s: float, period_s: float) -> Array:
-    return _low_pass(signal, lag_s, period_s)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.channels import with_known
-from commissioner.diagnose.plant import Layout, Model, even_vectors, odd_vectors, predict
+from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors
+from commissioner.diagnose.nominal import with_flux_before
+from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Facts, Record, Segment
-from commissioner.diagnose.search import with_flux_before
 
 Array = NDArray[np.float64]
 TONES_HZ = (0.5, 2.3, 9.7, 41.9, 113.3, 331.7)

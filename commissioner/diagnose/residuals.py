@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, Prediction, predict
+from commissioner.diagnose.plant import Prediction, predict
 from commissioner.diagnose.record import Record, Segment
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Normal, bounded_step, normal_equations
+from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import Layout, Model, Term
 from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.effects.effect import listed, spline_value
-from commissioner.diagnose.plant import Model
+from commissioner.diagnose.model import Model
 
 PLATE = (
     "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",

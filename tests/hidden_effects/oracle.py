@@ -13,7 +13,7 @@ from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.fit import fit
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.search import CARRY, _bare_layout, nominal_fit, with_flux_before
+from commissioner.diagnose.nominal import CARRY, bare_layout, nominal_fit, with_flux_before
 from sim.recording import record
 from sim.scenario import Scenario
 from tests.hidden_effects.cases import class_of, other_excitation, recording_of, without_noise
@@ -38,8 +38,8 @@ def strength_sigma(scenario: Scenario, seed: int, names: list[str], noise: Noise
     audited, _ = prepare([recording_of(without_noise(scenario, names), seed)])
     first = nominal_fit(audited, noise)
     if len(audited.segments) > 1:
-        audited = with_flux_before(audited, first.model, _bare_layout(audited))
-        first = fit(first.model.with_terms(CARRY), audited, _bare_layout(audited), noise, rounds=6, tolerance=1.0)
+        audited = with_flux_before(audited, first.model, bare_layout(audited))
+        first = fit(first.model.with_terms(CARRY), audited, bare_layout(audited), noise, rounds=6, tolerance=1.0)
     return float(np.sqrt(first.chi2 / first.normal.count.sum()))
 
 

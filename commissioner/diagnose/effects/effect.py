@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.plant import Layout, Term
+from commissioner.diagnose.model import Layout, Term
 from commissioner.diagnose.record import Facts, Record
 
 Array = NDArray[np.float64]

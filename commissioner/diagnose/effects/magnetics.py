@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
-from commissioner.diagnose.plant import Term
+from commissioner.diagnose.model import Term
 
 
 def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:

@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect
 from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE
-from commissioner.diagnose.plant import Term
+from commissioner.diagnose.model import Term
 
 PHASES = ("u", "v", "w")
 

@@ -6,8 +6,9 @@ import pytest
 from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
-from commissioner.diagnose.plant import Model, predict
-from commissioner.diagnose.search import layout_for
+from commissioner.diagnose.model import Model
+from commissioner.diagnose.nominal import layout_for
+from commissioner.diagnose.plant import predict
 from commissioner.records import StandstillRecording
 
 NOMINAL = (3.7, 2.2, 0.021, 0.3)

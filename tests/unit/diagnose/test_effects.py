@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.plant import Model, predict
+from commissioner.diagnose.model import Model
+from commissioner.diagnose.plant import predict
 
 NAMES = [
     "dead_time",

@@ -8,7 +8,7 @@ import pytest
 
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.extended import model_document, model_from, plain
-from commissioner.diagnose.plant import Model
+from commissioner.diagnose.model import Model
 from commissioner.diagnose.play import PAUSE_S, play
 from sim.recording import record
 from sim.scenario import build, load

@@ -1,0 +1,153 @@
+"""The extended model in engineering terms: which numbers it has and what each of them is.
+
+A model is the four inverse-Gamma numbers plus `Term`s. Every term is zero in the nominal model and enters linearly
+where physics puts it (legs, iron, leakage, rotor, sensor), so shapes are dictionaries: spline coefficients, stop
+operators of fixed radius, rotor branches of fixed corner frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose import kinds
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Term:
+    """One number of the extended model: `value = theta * step`, in `unit`, zero in the nominal model."""
+
+    effect: str
+    symbol: str
+    unit: str
+    kind: int
+    index: int
+    step: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    start: float = 0.0
+    segment: int = -1
+    """Position of the only segment it acts in; -1: everywhere."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The fixed dictionaries: spline ranges and vectors, stop radii, branch corner frequencies."""
+
+    legs_top: float
+    legs_knee_a: float
+    legs_vectors: Array
+    iron_top_wb: float
+    iron_vectors: Array
+    leak_top_wb: float
+    leak_vectors: Array
+    stop_radius_wb: Array
+    branch_time_s: Array
+    nonlinearity_scale_a: float
+    substeps: int = 1
+    crossing_substeps: int = 12
+    legs_slack_v: float = 1.0
+    nominal_box: tuple[tuple[float, float], ...] = ((0.0, np.inf),) * 4
+    """Where R_s, R_R, L_sigma and L_M may be, from the impedance the recording shows: no effect moves them beyond."""
+    leak_ratio: float = 0.0
+    """L_sigma / L_M, fixed: how far the rotor current is from the stator current in (3a) of `trajectory`."""
+
+    def penalty(self, terms: Sequence[Term]) -> Array:
+        """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
+
+        tell apart): each rise beyond 0.15 of the range's end is about `legs_slack_v` or less.
+        """
+        size = 4 + len(terms)
+        out = np.zeros((size, size))
+        count = self.legs_vectors.shape[0]
+        knots = (np.arange(count) + 0.5) * self.legs_top / count
+        tail = np.sinh(self.legs_top) * 0.15
+        for k, term in enumerate(terms):
+            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
+                out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
+        return out
+
+    def finer(self) -> Layout:
+        """Half the step length, for the solver-error check."""
+        return replace(self, substeps=2 * self.substeps, crossing_substeps=2 * self.crossing_substeps)
+
+
+def odd_vectors(intervals: int) -> Array:
+    """Rises of odd saturating functions, (intervals, intervals+3): row k climbs from 0 to 1 around knot k and stays.
+
+    Cumulative sums of the spline vectors with F(0) = F''(0) = 0 and a flat end, so that weights >= 0 give a curve that
+    never falls: a leg with falling voltage loss would be an oscillator.
+    """
+    vectors = np.zeros((intervals, intervals + 3))
+    vectors[0, 2], vectors[0, 0] = 1.0, -1.0
+    for k in range(1, intervals):
+        vectors[k, k + 2] = 1.0
+    # flat end: c[K+2] = c[K]
+    vectors[:, intervals + 2] = vectors[:, intervals]
+    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
+
+
+def even_vectors(intervals: int) -> Array:
+    """Rises of even functions with G(0) = G'(0) = 0, (intervals+1, intervals+3): row k climbs from knot k on.
+
+    Weights >= 0 give a slope that never falls with size, as saturation does.
+    """
+    vectors = np.zeros((intervals + 1, intervals + 3))
+    vectors[0, 0], vectors[0, 1], vectors[0, 2] = 1.0, -0.5, 1.0
+    for k in range(1, intervals + 1):
+        vectors[k, k + 2] = 1.0
+    return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
+
+
+@dataclass(frozen=True)
+class Model:
+    """`nominal` = (R_s, R_R, L_sigma, L_M); `values[k]` belongs to `terms[k]`, in the term's unit."""
+
+    nominal: tuple[float, float, float, float]
+    terms: tuple[Term, ...] = ()
+    values: tuple[float, ...] = ()
+
+    @cached_property
+    def theta(self) -> Array:
+        """Scaled parameters: logarithms of the four, then value / step."""
+        scaled = [v / t.step for v, t in zip(self.values, self.terms, strict=True)]
+        return np.array([*np.log(self.nominal), *scaled])
+
+    def moved(self, theta: Array) -> Model:
+        nominal = np.exp(theta[:4])
+        values = tuple(float(x) * t.step for x, t in zip(theta[4:], self.terms, strict=True))
+        return Model((float(nominal[0]), float(nominal[1]), float(nominal[2]), float(nominal[3])), self.terms, values)
+
+    def with_terms(self, terms: Sequence[Term]) -> Model:
+        return Model(self.nominal, self.terms + tuple(terms), self.values + tuple(t.start for t in terms))
+
+    def without(self, effect: str) -> Model:
+        keep = [k for k, t in enumerate(self.terms) if t.effect != effect]
+        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+
+    def only(self, effects: Sequence[str]) -> Model:
+        keep = [k for k, t in enumerate(self.terms) if t.effect in effects]
+        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+
+    def of(self, effect: str) -> dict[str, float]:
+        return {t.symbol: v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect}
+
+    def total(self, kind: int, index: int = 0) -> float:
+        pairs = zip(self.terms, self.values, strict=True)
+        return sum(v for t, v in pairs if t.kind == kind and t.index == index)
+
+    def sum_kind(self, kind: int, size: int) -> Array:
+        out = np.zeros(size)
+        for term, value in zip(self.terms, self.values, strict=True):
+            if term.kind == kind:
+                out[term.index] += value
+        return out
+
+    def has_kind(self, *kinds: int) -> bool:
+        return any(t.kind in kinds for t in self.terms)

@@ -1,0 +1,125 @@
+"""The nominal stage: where the four parameters can be, their fit, what is left of one segment at the start of the next,
+and the dictionaries scaled to what the fitted machine reaches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from commissioner.diagnose import kinds
+from commissioner.diagnose.channels import add_channels
+from commissioner.diagnose.effects import Setting
+from commissioner.diagnose.fit import Fit, fit
+from commissioner.diagnose.model import Layout, Model, Term, even_vectors, odd_vectors
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import predict
+from commissioner.diagnose.record import Record
+
+SILENT = (1.0, 1.0, 0.01, 0.2)
+"""Where a fit begins when no current answers the command (an audit refuses such a recording)."""
+CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+MOST_LEAK_RATIO = 0.15
+STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6)
+
+
+def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
+    """Dictionaries scaled to the currents and fluxes the model reaches on this record; and the largest iron flux."""
+    bare = bare_layout(record)
+    flux = max(
+        float(np.hypot(*predict(model, record, k, bare).iron_flux_wb).max())
+        for k in range(len(record.segments))
+    )
+    peak = record.facts.current_peak_a
+    knee = 0.004 * peak
+    layout = replace(
+        bare, legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
+        iron_top_wb=1.08 * flux, iron_vectors=even_vectors(10),
+        leak_top_wb=1.2 * peak * model.nominal[2], leak_vectors=even_vectors(6),
+        stop_radius_wb=np.array(STOP_SHARES) * flux,
+        branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
+        nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
+        legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),
+    )
+    return layout, flux
+
+
+def bare_layout(record: Record) -> Layout:
+    """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says."""
+    stator, rotor, leakage, _ = impedance_starts(record)[0]
+    total = stator + rotor
+    return Layout(
+        1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0,
+        nominal_box=((0.02 * total, 2.0 * total), (0.02 * total, 4.0 * total), (0.2 * leakage, 4.0 * leakage),
+                     (1.0 * leakage, 1e3 * leakage)),
+    )
+
+
+def nominal_fit(record: Record, noise: Noise) -> Fit:
+    """The four-parameter output-error fit, from the best of three starts."""
+    bare = bare_layout(record)
+    fits = [fit(Model(start), record, bare, noise, rounds=15, tolerance=1.0) for start in impedance_starts(record)]
+    return min(fits, key=lambda f: f.chi2)
+
+
+def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:
+    """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M.
+
+    `delay_s` of the current is taken out of the phases first.
+    """
+    segment = max(record.segments, key=lambda s: float(np.std(s.voltage_axis_v)))
+    n = segment.count
+    window = np.hanning(n)
+    volts = np.fft.rfft(segment.voltage_axis_v * window)
+    amps = np.fft.rfft(np.where(segment.is_good, segment.axis_current_a, 0.0) * window)
+    frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
+    strong = np.flatnonzero(np.abs(volts) > 0.02 * np.abs(volts[1:]).max())
+    strong = strong[(strong > 0) & (np.abs(amps[strong]) > 0.0)]
+    if strong.size == 0:
+        return [SILENT] * 2
+    impedance = volts[strong] / amps[strong] * np.exp(-2j * np.pi * frequency[strong] * delay_s)
+    high, low = impedance[-1], impedance[0]
+    w_high, w_low = 2 * np.pi * frequency[strong[-1]], 2 * np.pi * frequency[strong[0]]
+    leakage = max(abs(high.imag) / w_high, 1e-5)
+    total = max(abs(high.real), 1e-3)
+    stator = float(np.clip(abs(low.real), 0.2 * total, 0.9 * total))
+    rotor = max(total - stator, 0.2 * total)
+    magnetizing = max(abs(low.imag) / w_low, 4.0 * leakage)
+    return [
+        (stator, rotor, leakage, magnetizing),
+        (0.55 * total, 0.45 * total, leakage, 12.0 * leakage),
+    ]
+
+
+CARRY = (
+    Term("", "flux_carried_over", "1", kinds.CARRY, 0, 0.01, 0.0, 1.0),
+    Term("", "flux_carried_over_turned", "1", kinds.CARRY, 1, 0.01, -1.0, 1.0),
+)
+"""Nuisances of the nominal model: how much of the rotor flux outlives the pause between two segments, and what a shaft
+that turns meanwhile makes of its direction."""
+
+
+def starts_of(record: Record) -> list[Term]:
+    """Nuisances of the nominal model: stator and rotor flux at the start of every stretch that follows a hole."""
+    return [
+        Term("", f"start_{c}_{s.uid}", "Wb", kinds.INITIAL_FLUX, 2 + c, 0.01, segment=s.uid)
+        for s in record.segments if not s.starts_at_rest for c in range(4)
+    ]
+
+
+def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
+    """Every segment told the rotor flux at which the one before it ended (same file), by the model, one after the other."""
+    before: tuple[float, float] = (0.0, 0.0)
+    file = -1
+    for k, segment in enumerate(record.segments):
+        inherits = segment.file == file and segment.starts_at_rest
+        told = replace(segment, flux_before_wb=before if inherits else (0.0, 0.0))
+        record = replace(record, segments=(*record.segments[:k], told, *record.segments[k + 1 :]))
+        before, file = predict(model, record, k, layout).last_rotor_flux_wb, segment.file
+    return record
+
+
+def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:
+    layout, flux = layout_for(record, nominal.model)
+    record, lines = add_channels(record, nominal.model, layout)
+    return record, layout, Setting(record, layout, flux, lines)

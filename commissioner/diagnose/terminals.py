@@ -1,0 +1,135 @@
+"""Between motor terminals and recording: cable, delay, lag, nonlinearity, gain, offset, drift and hum of the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from commissioner.diagnose import kinds
+from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, FIFTH, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.model import Layout, Model, Term
+from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.resample import resample, resample_hermite
+
+Array = NDArray[np.float64]
+
+
+def sense(
+    model: Model, record: Record, segment: Segment, channels: Array, layout: Layout,
+    trajectory: tuple[Array, Array, Array], jacobian: Array, listed: Sequence[Term],
+) -> Array:
+    """From terminal currents to what the sensors report: cable, delay, lag, nonlinearity, gain, offset, pickup."""
+    phases = record.facts.phases
+    to_phases = TO_PHASES[:phases]
+    current, after, before = (to_phases @ x for x in trajectory)
+    period = record.facts.sample_period_s
+    capacitance = model.sum_kind(CABLE, 3)
+    if capacitance.any() or any(t.kind == CABLE for t in listed):
+        edges = _edges(to_phases @ segment.voltage_ab_v / period)
+        current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
+    elapsed = segment.time_s - segment.time_s[0]
+    late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
+    late = np.broadcast_to(late, elapsed.shape)
+    is_late = bool(np.any(late))
+    filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
+    rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
+    if is_late:
+        current, slope = resample_hermite(current, after, before, late / period, period)
+        for row in rows:
+            jacobian[row] = resample(jacobian[row], late / period)
+    else:
+        slope = before
+    lag = model.total(LAG)
+    lag_slope = slope
+    if lag > 0.0:
+        current, lag_slope = _lagged(current, slope, lag, period)
+        slope = _lagged(slope, np.gradient(slope, period, axis=1), lag, period)[0]
+        for row in rows:
+            jacobian[row] = _low_pass(jacobian[row], lag, period)
+    scale = layout.nonlinearity_scale_a
+    gain, even = model.sum_kind(GAIN, 3)[:phases, None], model.sum_kind(EVEN, 3)[:phases, None]
+    odd, fifth = model.sum_kind(ODD, 3)[:phases, None], model.sum_kind(FIFTH, 3)[:phases, None]
+    s = current / scale
+    distorted = current * (1.0 + gain + even * s + odd * s * s + fifth * s**4)
+    if rows and (gain.any() or even.any() or odd.any() or fifth.any()):
+        slope_of_sensor = 1.0 + gain + 2.0 * even * s + 3.0 * odd * s * s + 5.0 * fifth * s**4
+        for row in rows:
+            jacobian[row] *= slope_of_sensor
+    reported = distorted + model.sum_kind(OFFSET, 3)[:phases, None]
+    ages = _ages(record, segment)
+    drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
+    reported = reported + sum(d[:, None] * age for d, age in zip(drift, ages, strict=True))
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == TONE and value and term.segment in (-1, segment.uid):
+            reported[term.index % 3] += value * channels[:, term.index // 3]
+    for k, term in enumerate(listed):
+        row = jacobian[4 + k]
+        if term.kind == DELAY:
+            row[:] = -slope
+        elif term.kind == LAG:
+            row[:] = -lag_slope
+        elif term.kind == CLOCK:
+            row[:] = -slope * elapsed * 1e-6
+        elif term.kind == OFFSET:
+            row[term.index] = 1.0
+        elif term.kind == DRIFT:
+            row[term.index % 3] = ages[term.index // 3]
+        elif term.kind == GAIN:
+            row[term.index] = current[term.index]
+        elif term.kind == EVEN:
+            row[term.index] = current[term.index] * s[term.index]
+        elif term.kind == ODD:
+            row[term.index] = current[term.index] * s[term.index] ** 2
+        elif term.kind == FIFTH:
+            row[term.index] = current[term.index] * s[term.index] ** 4
+        elif term.kind == TONE:
+            row[term.index % 3] = channels[:, term.index // 3]
+        elif term.kind == CABLE:
+            row[:] = edges[term.index]
+        if term.kind >= kinds.FIRST_OF_SENSING:
+            row *= term.step
+    return reported
+
+
+def _ages(record: Record, segment: Segment) -> list[Array]:
+    """Minutes since the first sample, and the same settling within a quarter and a sixteenth of the recording."""
+    first, last = record.segments[0].time_s[0], record.segments[-1].time_s[-1]
+    age = (segment.time_s - first) / 60.0
+    settling = [max(float(last - first), 1e-3) / 60.0 / share for share in (4.0, 16.0)]
+    return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
+
+
+def _edges(voltage_per_period: Array) -> list[Array]:
+    """Step of the command at, before and after each sample, over the period."""
+    edge = np.diff(voltage_per_period, axis=1, prepend=0.0)
+    none = np.zeros((edge.shape[0], 1))
+    return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
+
+
+def _low_pass(signal: Array, lag_s: float, period_s: float) -> Array:
+    """First-order lag of a signal linear between samples (first-order hold, exact for it)."""
+    x = period_s / lag_s
+    decay = np.exp(-x)
+    late = 1.0 - (1.0 - decay) / x
+    filtered: Array = lfilter([late, 1.0 - decay - late], [1.0, -decay], signal, axis=-1)
+    return filtered
+
+
+def _lagged(current: Array, slope: Array, lag_s: float, period_s: float) -> tuple[Array, Array]:
+    """First-order lag and minus its derivative with respect to the lag (central difference of the same filter).
+
+    Below a twentieth of a sample the lag is expanded: i - tau i' (its second-order term is then below 1e-3 of the
+    first at the excited frequencies).
+    """
+    if lag_s < 0.05 * period_s:
+        return current - lag_s * slope, slope
+    h = 1e-3 * lag_s
+    high, low = _low_pass_smooth(current, lag_s + h, period_s), _low_pass_smooth(current, lag_s - h, period_s)
+    return _low_pass_smooth(current, lag_s, period_s), -(high - low) / (2.0 * h)
+
+
+def _low_pass_smooth(signal: Array, lag_s: float, period_s: float) -> Array:
+    return _low_pass(signal, lag_s, period_s)
