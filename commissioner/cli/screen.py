@@ -96,10 +96,6 @@ def result(document: Mapping[str, Any]) -> None:
                 right=(1, 2, 3, 4),
             )
         )
-        rated, held = document["rated_flux_wb"]["stator_peak"], document["holds_for_stator_flux_wb"]
-        out.print(
-            f"  [dim]•[/] L_M holds at a peak stator flux of {held:.3g} Wb, {100 * held / rated:.0f} % of the rated"
-        )
         for remark in document.get("remarks", ()):
             out.print(f"  [dim]•[/] {escape(remark)}")
     out.print(f"  energised {document['energised_s']:.1f} s in all")

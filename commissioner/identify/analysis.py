@@ -191,10 +191,9 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) ->
                 f"axis {result.axis_deg:g} deg: the residual is not white ({result.whiteness.statistic:.0f}, limit "
                 f"{result.whiteness.limit}); standard errors are widened for it"
             )
-    if flux_wb < 0.7 * rated.stator_peak_wb:
-        remarks.append(
-            f"the flux reached {flux_wb:.3g} Wb of rated {rated.stator_peak_wb:.3g} Wb: L_M holds there and is not "
-            "extrapolated"
-        )
+    remarks.append(
+        f"L_M holds at a peak stator flux of {flux_wb:.3g} Wb, {flux_wb / rated.stator_peak_wb:.0%} of the rated"
+        + (" one, and is not extrapolated" if flux_wb < 0.7 * rated.stator_peak_wb else " one")
+    )
     remarks.append("gain errors of current and DC-link sensors scale all values and are not in the standard errors")
     return remarks
