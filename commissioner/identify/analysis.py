@@ -139,7 +139,7 @@ def _summary(
 ) -> Identification:
     rated = rated_flux(plate, float(np.mean([r.parameters.stator_resistance_ohm for r in results])))
     flux = min(rated.stator_peak_wb, *(r.peak_stator_flux_wb for r in results))
-    at_flux = [_axis_at(r, flux) for r in results]
+    at_flux = [axis_at(r, flux) for r in results]
     combined = combine(at_flux, np.mean([r.batch.inverter_covariance_at(flux) for r in results], axis=0))
     first = min(results, key=lambda r: float(np.trace(r.covariance)))
     curve: Sequence[tuple[float, float, float]] = ()
@@ -171,7 +171,8 @@ def _summary(
     )
 
 
-def _axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
+def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
+    """An axis' values at a flux all axes reached: only there can saturating iron be compared."""
     machine, covariance = result.batch.inverse_gamma_at(flux_wb)
     own = result.batch.inverse_gamma_at(result.peak_stator_flux_wb)[0]
     machine = carry_over(result.parameters, own, machine)

@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from commissioner.identify.analysis import Identification
+from commissioner.identify.analysis import Identification, axis_at
 from commissioner.motor.circuit import InverseGamma, Quantity
 from commissioner.motor.nameplate import ParameterBox
 from commissioner.procedure.plan import Acceptance
@@ -62,11 +62,13 @@ Values = Mapping[str, Quantity]
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the verdict is reached from: combined values, each test's values, and each test's batch fit beside them."""
+    """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
+    test's values at the flux all of them reached."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
     batch: tuple[tuple[float, Values], ...] = ()
+    at_one_flux: tuple[tuple[float, Values], ...] = ()
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -74,10 +76,12 @@ def evidence_of(identification: Identification) -> Evidence:
     axes = identification.axes
     std = [np.sqrt(np.diag(axis.covariance)) for axis in axes]
     batch = [axis.batch.inverse_gamma_at(axis.peak_stator_flux_wb)[0] for axis in axes]
+    alike = [axis_at(axis, identification.holds_for_flux_wb) for axis in axes]
     return Evidence(
         combined=_values(identification.parameters, np.sqrt(np.diag(identification.covariance))),
         axes=tuple((axis.axis_deg, _values(axis.parameters, s)) for axis, s in zip(axes, std, strict=True)),
         batch=tuple((axis.axis_deg, _values(b, s)) for axis, b, s in zip(axes, batch, std, strict=True)),
+        at_one_flux=tuple((e.axis_deg, _values(e.parameters, s)) for e, s in zip(alike, std, strict=True)),
     )
 
 
@@ -140,7 +144,7 @@ def _uncertain(combined: Mapping[str, Quantity], acceptance: Acceptance) -> Iter
 
 def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
     for name in PARAMETERS:
-        values = [axis[name].value for _, axis in evidence.axes]
+        values = [axis[name].value for _, axis in evidence.at_one_flux or evidence.axes]
         if len(values) < 2:
             continue
         spread = 100 * (max(values) - min(values)) / abs(evidence.combined[name].value)
