@@ -184,7 +184,7 @@ class RtuClient(Client):
             wait = quiet_s if data else deadline - time.monotonic()
             if not select.select([self.descriptor], [], [], max(wait, 0.0))[0]:
                 break
-            data += os.read(self.descriptor, 1024)
+            data += os.read(self.descriptor, min(1024, enough - len(data)))
         return data
 
     @staticmethod
