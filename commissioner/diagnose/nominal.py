@@ -50,7 +50,7 @@ def bare_layout(record: Record) -> Layout:
     total = stator + rotor
     return Layout(
         1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0,
-        nominal_box=((0.02 * total, 2.0 * total), (0.02 * total, 4.0 * total), (0.2 * leakage, 4.0 * leakage),
+        nominal_box=((0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.2 * leakage, 4.0 * leakage),
                      (1.0 * leakage, 1e3 * leakage)),
     )
 
@@ -65,7 +65,7 @@ def nominal_fit(record: Record, noise: Noise) -> Fit:
 def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:
     """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M.
 
-    `delay_s` of the current is taken out of the phases first.
+    `delay_s` of the current, and the half period by which it follows a held command, are taken out of the phases first.
     """
     segment = max(record.segments, key=lambda s: float(np.std(s.voltage_axis_v)))
     n = segment.count
@@ -77,7 +77,8 @@ def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, 
     strong = strong[(strong > 0) & (np.abs(amps[strong]) > 0.0)]
     if strong.size == 0:
         return [SILENT] * 2
-    impedance = volts[strong] / amps[strong] * np.exp(-2j * np.pi * frequency[strong] * delay_s)
+    late = delay_s + 0.5 * record.facts.sample_period_s
+    impedance = volts[strong] / amps[strong] * np.exp(-2j * np.pi * frequency[strong] * late)
     high, low = impedance[-1], impedance[0]
     w_high, w_low = 2 * np.pi * frequency[strong[-1]], 2 * np.pi * frequency[strong[0]]
     leakage = max(abs(high.imag) / w_high, 1e-5)
