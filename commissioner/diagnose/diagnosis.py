@@ -27,6 +27,7 @@ from commissioner.diagnose.evidence import (
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
 from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.search import EXPLORED_SAMPLES, Found, search
@@ -210,13 +211,12 @@ def _verdict(causes: Sequence[Cause], rest: Leftover, share: float, noise: Noise
 
 
 def _parameters(one: Fit) -> dict[str, Quantity]:
-    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
     covariance = np.linalg.pinv(one.normal.total_gram, rcond=1e-12, hermitian=True)
     out = {
         n: Quantity(float(v), float(v * np.sqrt(max(covariance[k, k], 0.0))))
-        for k, (n, v) in enumerate(zip(names, one.model.nominal, strict=True))
+        for k, (n, v) in enumerate(zip(PARAMETERS, one.model.nominal, strict=True))
     }
-    r_r, l_m = out[names[1]], out[names[3]]
+    r_r, l_m = out[PARAMETERS[1]], out[PARAMETERS[3]]
     spread = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3]
     t = l_m.value / r_r.value
     out["rotor_time_constant_s"] = Quantity(t, float(t * np.sqrt(max(spread, 0.0))))

@@ -58,6 +58,13 @@ class Fit:
     def chi2(self) -> float:
         return self.normal.total_chi2
 
+    def set_apart(self, effect: str) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+        """Information of all numbers, the rows of one effect's, the rows of the others, and the others' own inverse."""
+        is_mine = np.array([False] * 4 + [t.effect == effect for t in self.model.terms])
+        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
+        gram = self.normal.total_gram
+        return gram, mine, others, np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
+
 
 def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:
     """`(..., phases, n)` residual or sensitivities -> `(..., m)` with unit noise variance; masked samples drop out."""

@@ -105,6 +105,12 @@ def even_vectors(intervals: int) -> Array:
     return np.cumsum(vectors[::-1], axis=0)[::-1].copy()
 
 
+NO_DICTIONARY = Layout(
+    1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0
+)
+"""For a model without terms, which looks nothing up."""
+
+
 @dataclass(frozen=True)
 class Model:
     """`nominal` = (R_s, R_R, L_sigma, L_M); `values[k]` belongs to `terms[k]`, in the term's unit."""

@@ -47,9 +47,6 @@ def moved_parameters(nominal: Fit, extended: Fit) -> tuple[Moved, ...]:
 
 def _shift_without(fitted: Fit, name: str) -> NDArray[np.float64]:
     """(4,) relative change of the parameters, to first order, when one cause is taken out and the rest re-adjusts."""
-    mine = np.array([4 + k for k, t in enumerate(fitted.model.terms) if t.effect == name])
-    others = np.array([k for k in range(4 + len(fitted.model.terms)) if k not in set(mine.tolist())])
-    gram = fitted.normal.total_gram
-    inner = np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
+    gram, mine, others, inner = fitted.set_apart(name)
     change: NDArray[np.float64] = inner @ gram[np.ix_(others, mine)] @ fitted.model.theta[mine]
     return change[:4]

@@ -11,7 +11,7 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.model import Layout, Model, Term, even_vectors, odd_vectors
+from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record
@@ -26,17 +26,13 @@ STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6)
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     """Dictionaries scaled to the currents and fluxes the model reaches on this record; and the largest iron flux."""
     bare = bare_layout(record)
-    flux = max(
-        float(np.hypot(*predict(model, record, k, bare).iron_flux_wb).max())
-        for k in range(len(record.segments))
-    )
+    flux = largest_iron_flux(record, model, bare)
     peak = record.facts.current_peak_a
     knee = 0.004 * peak
     layout = replace(
-        bare, legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
-        iron_top_wb=1.08 * flux, iron_vectors=even_vectors(10),
-        leak_top_wb=1.2 * peak * model.nominal[2], leak_vectors=even_vectors(6),
-        stop_radius_wb=np.array(STOP_SHARES) * flux,
+        with_ranges(bare, flux, peak * model.nominal[2]),
+        legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
+        iron_vectors=even_vectors(10), leak_vectors=even_vectors(6),
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
         legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),
@@ -44,15 +40,27 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     return layout, flux
 
 
+def largest_iron_flux(record: Record, model: Model, layout: Layout) -> float:
+    return max(
+        float(np.hypot(*predict(model, record, k, layout).iron_flux_wb).max()) for k in range(len(record.segments))
+    )
+
+
+def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> Layout:
+    """The dictionaries of iron and leakage spread over the largest fluxes reached, with a margin."""
+    return replace(
+        layout, iron_top_wb=1.08 * iron_flux_wb, leak_top_wb=1.2 * leakage_flux_wb,
+        stop_radius_wb=np.array(STOP_SHARES) * iron_flux_wb,
+    )
+
+
 def bare_layout(record: Record) -> Layout:
     """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says."""
     stator, rotor, leakage, _ = impedance_starts(record)[0]
     total = stator + rotor
-    return Layout(
-        1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0,
-        nominal_box=((0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.2 * leakage, 4.0 * leakage),
-                     (1.0 * leakage, 1e3 * leakage)),
-    )
+    return replace(NO_DICTIONARY, nominal_box=(
+        (0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.2 * leakage, 4.0 * leakage), (leakage, 1e3 * leakage)
+    ))
 
 
 def nominal_fit(record: Record, noise: Noise) -> Fit:

@@ -85,7 +85,7 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
     drive = _drive(model, segment, channels)
     every = set(at_work.tolist()) | {t.kind for t in model.terms}
     machine = _machine(model, layout, every)
-    period = _period(segment)
+    period = segment.period_s
     start = _initial_state(model, segment)
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
@@ -117,16 +117,12 @@ def _tangent(
     wanted = set(at_work.tolist())
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
-        path.states, path.stops, *path.drive, channels, _period(segment), *path.machine, at_work, indices,
+        path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK}), layout.legs_vectors),
         _if(kinds.IRON_CURVE in wanted, layout.iron_vectors), _if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors),
         np.array(segment.flux_before_wb), out,
     )
     return out
-
-
-def _period(segment: Segment) -> float:
-    return float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
 
 
 def _drive(model: Model, segment: Segment, channels: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -206,5 +202,4 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
         rate = max(rate, 0.5 / float(layout.branch_time_s.min()))
     if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
-    period = float(np.median(np.diff(segment.time_s))) if segment.count > 1 else 1e-4
-    return int(layout.substeps * np.clip(np.ceil(rate * period / 0.25), 1, 40))
+    return int(layout.substeps * np.clip(np.ceil(rate * segment.period_s / 0.25), 1, 40))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.channels import with_known
-from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors
+from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model
 from commissioner.diagnose.nominal import with_flux_before
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Facts, Record, Segment
@@ -20,10 +20,6 @@ CURRENT_SHARES = (0.3, 0.25, 0.2, 0.2, 0.12, 0.08)
 """Tone currents over rated peak; sums to less than 1.2 with random phases."""
 BIAS_SHARE = 0.4
 PAUSE_S = 2.0
-NO_DICTIONARY = Layout(
-    1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0
-)
-"""For a model without terms, which looks nothing up."""
 
 
 @dataclass(frozen=True)

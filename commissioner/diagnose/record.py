@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -36,6 +37,10 @@ class Segment:
     uid: int = 0
     flux_before_wb: tuple[float, float] = (0.0, 0.0)
     """Rotor flux (alpha, beta) at the end of the segment before, of which a part may be left at the start."""
+
+    @cached_property
+    def period_s(self) -> float:
+        return float(np.median(np.diff(self.time_s))) if self.count > 1 else 1e-4
 
     @property
     def count(self) -> int:

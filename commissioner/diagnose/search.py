@@ -6,7 +6,7 @@ never has to mend the shape of an earlier one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,15 +20,15 @@ from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import (
     CARRY,
-    STOP_SHARES,
     bare_layout,
     impedance_starts,
+    largest_iron_flux,
     nominal_fit,
     set_up,
     starts_of,
     with_flux_before,
+    with_ranges,
 )
-from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import Screening, price, required_chi2, screen
 
@@ -115,11 +115,9 @@ def search(
     model, accepted = nominal.model, ()
     first: Screening | None = None
     if part.samples < 0.7 * record.samples:
-        share = max(s.count for s in part.segments)
-        small = record.subset(tuple(range(len(record.segments))), share)
-        small_setting = replace(setting, record=small)
+        small = explored(record)
         start = fit(nominal.model, small, layout, noise, rounds=6)
-        search_small = _Search(small, layout, small_setting, noise, names, report, record, go_on)
+        search_small = _Search(small, layout, replace(setting, record=small), noise, names, report, record, go_on)
         fitted, accepted, _ = search_small.run(start, ())
         first, record = search_small.first, search_small.full
         model = _without_curves(_completed(fitted.model, accepted, setting))
@@ -194,7 +192,7 @@ class _Search:
         ranked = [s for s in screening.ranked() if s.name not in refused]
         promising = [s for s in ranked if s.delta_chi2 > 0.7 * s.threshold]
         best = self._large_delay(current, refused)
-        guard = self._form_guard(current)
+        losses = {n: loss_without(current, n) for n in {t.effect for t in current.model.terms if t.effect}}
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
@@ -204,7 +202,8 @@ class _Search:
             )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            if gain < max(guard, self._class_guard(current, score.name), self.threshold(score.numbers)) or not self._is_plausible(trial.model, score.name):
+            wanted = max(_guard(losses, score.name), self.threshold(score.numbers))
+            if gain < wanted or not self._is_plausible(trial.model, score.name):
                 if required_chi2(score.numbers) < gain:
                     self.below.append(score.name)
                 continue
@@ -233,19 +232,6 @@ class _Search:
         if gain < self.threshold(len(terms)) or not self._is_plausible(best.model, "sampling_delay"):
             return None
         return gain - price(len(terms)), "sampling_delay", best
-
-    def _form_guard(self, current: Fit) -> float:
-        """What the forms of the accepted causes may leave behind without another cause being there."""
-        present = {t.effect for t in current.model.terms if t.effect} - EXACT
-        shares = [(GUARD if n in SHAPED else RIGID_GUARD) * loss_without(current, n) for n in present]
-        return max(shares, default=0.0)
-
-    def _class_guard(self, current: Fit, name: str) -> float:
-        rigid = {t.effect for t in current.model.terms if t.effect} - SHAPED
-        mates = [m for m in rigid if m in CATALOGUE[name].confounders or name in CATALOGUE[m].confounders]
-        twins = SAME_ORDER if name in SAME_ORDER else frozenset()
-        shares = [(SAME_ORDER_GUARD if m in twins else CLASS_GUARD) * loss_without(current, m) for m in mates]
-        return max(shares, default=0.0)
 
     def _is_plausible(self, model: Model, name: str) -> bool:
         entry = CATALOGUE[name]
@@ -282,22 +268,32 @@ class _Search:
 
     def relayout(self, current: Fit) -> Fit:
         """New dictionary ranges where the improved model reaches other fluxes; curves start again from zero."""
-        flux = max(
-            float(np.hypot(*predict(current.model, self.record, k, self.layout).iron_flux_wb).max())
-            for k in range(len(self.record.segments))
-        )
-        leak = 1.2 * self.record.facts.current_peak_a * current.model.nominal[2]
-        if 0.85 < 1.08 * flux / self.layout.iron_top_wb < 1.06 and 0.8 < leak / self.layout.leak_top_wb < 1.15:
+        flux = largest_iron_flux(self.record, current.model, self.layout)
+        fresh = with_ranges(self.layout, flux, self.record.facts.current_peak_a * current.model.nominal[2])
+        iron, leak = fresh.iron_top_wb / self.layout.iron_top_wb, fresh.leak_top_wb / self.layout.leak_top_wb
+        if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
             return current
-        self.layout = replace(
-            self.layout, iron_top_wb=1.08 * flux, leak_top_wb=leak, stop_radius_wb=np.array(STOP_SHARES) * flux
-        )
+        self.layout = fresh
         self.setting = replace(self.setting, layout=self.layout, iron_flux_wb=flux)
         return fit(_without_curves(current.model), self.record, self.layout, self.noise)
 
     def gains(self, fitted: Fit, accepted: Sequence[str]) -> dict[str, float]:
         """Delta chi2 of each accepted effect, the others free (linear, at the fit)."""
         return {name: loss_without(fitted, name) for name in accepted}
+
+
+def _guard(losses: Mapping[str, float], name: str) -> float:
+    """What the forms of the accepted causes (with what chi2 loses without them) may leave behind for a later one to take."""
+    return max((_share_left(accepted, name) * loss for accepted, loss in losses.items()), default=0.0)
+
+
+def _share_left(accepted: str, name: str) -> float:
+    if accepted in SHAPED:
+        return GUARD
+    share = 0.0 if accepted in EXACT else RIGID_GUARD
+    if accepted in CATALOGUE[name].confounders or name in CATALOGUE[accepted].confounders:
+        share = max(share, SAME_ORDER_GUARD if {accepted, name} == SAME_ORDER else CLASS_GUARD)
+    return share
 
 
 def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
@@ -310,12 +306,8 @@ def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
 
 def loss_without(current: Fit, name: str) -> float:
     """How much chi2 rises to first order when the effect's numbers go to zero and the others re-adjust."""
-    terms = current.model.terms
-    mine = np.array([4 + k for k, t in enumerate(terms) if t.effect == name])
-    others = np.array([k for k in range(4 + len(terms)) if k not in set(mine.tolist())])
-    gram = current.normal.total_gram
-    inner = gram[np.ix_(others, others)]
+    gram, mine, others, inner = current.set_apart(name)
     cross = gram[np.ix_(others, mine)]
-    schur = gram[np.ix_(mine, mine)] - cross.T @ np.linalg.pinv(inner, rcond=1e-12, hermitian=True) @ cross
+    schur = gram[np.ix_(mine, mine)] - cross.T @ inner @ cross
     value = current.model.theta[mine]
     return float(value @ schur @ value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 
@@ -39,3 +40,13 @@ def curve(coefficients, j, weights, row, offset):
         + coefficients[j + 2] * weights[row, offset + 2]
         + coefficients[j + 3] * weights[row, offset + 3]
     )
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def saturating(a, b, coefficients, top, weights, row):
+    """Current S(|f|) f of a path with flux f = (a, b): interval found, the current, and its derivative's aa, ab, bb."""
+    size = np.sqrt(a * a + b * b) + 1e-12
+    j = spline_weights(size, top, coefficients.shape[0] - 3, weights, row)
+    big = curve(coefficients, j, weights, row, 0)
+    steep = curve(coefficients, j, weights, row, 4) / size
+    return j, big * a, big * b, big + steep * a * a, steep * a * b, big + steep * b * b

@@ -40,7 +40,7 @@ from commissioner.diagnose.kinds import (
     STOP,
     VOLTAGE_MOD,
 )
-from commissioner.diagnose.spline import curve, spline_weights
+from commissioner.diagnose.spline import curve, saturating, spline_weights
 from commissioner.diagnose.trajectory import leg_loss
 
 SQRT3 = np.sqrt(3.0)
@@ -144,12 +144,7 @@ def sensitivities(
         ja = jb = jaa = jab = jbb = 0.0
         jm = 0
         if wants_iron or has_iron:
-            size = np.sqrt(pa * pa + pb * pb) + 1e-12
-            jm = spline_weights(size, iron_top, iron.shape[0] - 3, wts, 0)
-            big = curve(iron, jm, wts, 0, 0)
-            steep = curve(iron, jm, wts, 0, 4) / size
-            ja, jb = big * pa, big * pb
-            jaa, jab, jbb = big + steep * pa * pa, steep * pa * pb, big + steep * pb * pb
+            jm, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
         for s in range(stops):
             f = stop_gain[s] / stop_radius[s]
             ja += f * stop_states[t, s, 0]
@@ -162,12 +157,7 @@ def sensitivities(
         ea = eb = eaa = eab = ebb = la = lb = 0.0
         if wants_leak or has_leak:
             la, lb = x0 - kappa * x2, x1 - kappa * x3
-            size = np.sqrt(la * la + lb * lb) + 1e-12
-            jl = spline_weights(size, leak_top, leak.shape[0] - 3, wts, 1)
-            big = curve(leak, jl, wts, 1, 0)
-            steep = curve(leak, jl, wts, 1, 4) / size
-            ea, eb = big * la, big * lb
-            eaa, eab, ebb = big + steep * la * la, steep * la * lb, big + steep * lb * lb
+            jl, ea, eb, eaa, eab, ebb = saturating(la, lb, leak, leak_top, wts, 1)
             ia += ea
             ib += eb
         # (4)

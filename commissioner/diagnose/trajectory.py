@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from commissioner.diagnose.spline import curve, spline_weights
+from commissioner.diagnose.spline import curve, saturating, spline_weights
 
 SQRT3 = np.sqrt(3.0)
 
@@ -56,14 +56,9 @@ def _slope(
     # (1), (2)
     pa = (1.0 - nu) * x[2] + nu * x[0]
     pb = (1.0 - nu) * x[3] + nu * x[1]
-    big_g = slope_g = 0.0
+    ja = jb = jaa = jab = jbb = 0.0
     if iron.shape[0] > 0:
-        size = np.sqrt(pa * pa + pb * pb) + 1e-12
-        j = spline_weights(size, iron_top, iron.shape[0] - 3, wts, 0)
-        big_g = curve(iron, j, wts, 0, 0)
-        slope_g = curve(iron, j, wts, 0, 4) / size
-    ja, jb = big_g * pa, big_g * pb
-    jaa, jab, jbb = big_g + slope_g * pa * pa, slope_g * pa * pb, big_g + slope_g * pb * pb
+        _, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
     for s in range(stops):
         r = stop_radius[s]
         ya = z[s, 0] + pa - z_ref[0]
@@ -79,14 +74,8 @@ def _slope(
     sb = x[1] - x[3]
     ea = eb = eaa = eab = ebb = 0.0
     if leak.shape[0] > 0:
-        fa = x[0] - kappa * x[2]
-        fb = x[1] - kappa * x[3]
-        size = np.sqrt(fa * fa + fb * fb) + 1e-12
-        j = spline_weights(size, leak_top, leak.shape[0] - 3, wts, 1)
-        big_s = curve(leak, j, wts, 1, 0)
-        slope_s = curve(leak, j, wts, 1, 4) / size
-        ea, eb = big_s * fa, big_s * fb
-        eaa, eab, ebb = big_s + slope_s * fa * fa, slope_s * fa * fb, big_s + slope_s * fb * fb
+        fa, fb = x[0] - kappa * x[2], x[1] - kappa * x[3]
+        _, ea, eb, eaa, eab, ebb = saturating(fa, fb, leak, leak_top, wts, 1)
     iaa, iab, ibb = gs * (1.0 + las), gs * lbs, gs * (1.0 - las)
     ia = iaa * sa + iab * sb + ea + nu * ja
     ib = iab * sa + ibb * sb + eb + nu * jb
