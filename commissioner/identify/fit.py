@@ -33,8 +33,8 @@ def fit_segments(
 ) -> BatchFit:
     """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`.
 
-    Stops when a step is below `tolerance` standard errors of every shared parameter (or 1e-10 of its value);
-    `has_converged` says whether that was reached.
+    Stops when what steps shrinking as the last two did would still add is below `tolerance` standard errors of every
+    shared parameter (or the step below 1e-10 of its value); `has_converged` says whether that was reached.
     """
     choice = model or ModelChoice()
     problem = Problem(segments, sample_period_s, choice)
@@ -48,7 +48,7 @@ def fit_segments(
             "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
             remedy="check that the nameplate belongs to the motor",
         )  # fmt: skip
-    damping, converged, iterations = 1e-4, False, 0
+    damping, converged, iterations, last_size = 1e-4, False, 0, 0.0
     for _ in range(max_iterations):
         iterations += 1
         step = _step(problem, present, theta, damping)
@@ -56,7 +56,10 @@ def fit_segments(
         trial = problem.evaluate(new_theta, new_own)
         can_be_judged = bool(np.isfinite(trial.squares) and np.all(np.isfinite(trial.information)))
         if can_be_judged and trial.squares <= present.squares * (1.0 + 1e-13):
-            small = _is_small(problem, step, present, theta, tolerance)
+            size = _size_in_std(problem, step, present, theta)
+            shrinks = min(size / last_size, 1.0) if last_size > 0.0 and damping <= 1e-4 else 1.0
+            small = size * (shrinks if shrinks < 0.1 else 1.0) < tolerance
+            last_size = size
             flat = present.squares - trial.squares <= 1e-12 * present.squares
             theta, own, present = new_theta, new_own, trial
             damping = max(damping * 0.1, 1e-12)
@@ -67,7 +70,7 @@ def fit_segments(
             if damping > 1e8:
                 break
             damping = max(damping, 1e-8) * 20.0
-            if _is_small(problem, step, present, theta, tolerance):
+            if _size_in_std(problem, step, present, theta) < tolerance:
                 converged = True
                 break
     return _result(problem, theta, own, present, iterations, converged)
@@ -102,13 +105,13 @@ def _apply(problem: Problem, theta: Matrix, own: Matrix, step: Matrix) -> tuple[
     return new_theta, new_own
 
 
-def _is_small(problem: Problem, step: Matrix, at: Evaluation, theta: Matrix, tolerance: float) -> bool:
+def _size_in_std(problem: Problem, step: Matrix, at: Evaluation, theta: Matrix) -> float:
+    """The largest step of a shared parameter in its standard errors; steps below rounding count as none."""
     sigma2 = at.squares / max(problem.samples, 1)
     shared = np.flatnonzero(problem.model.free_shared)
-    information = np.diag(at.information)[shared]
     steps = np.abs(step[shared])
-    in_std = steps * np.sqrt(information / max(sigma2, 1e-300))
-    return bool(np.all((in_std < tolerance) | (steps < 1e-10 * np.abs(theta[shared]))))
+    in_std = steps * np.sqrt(np.diag(at.information)[shared] / max(sigma2, 1e-300))
+    return float(np.max(in_std[steps >= 1e-10 * np.abs(theta[shared])], initial=0.0))
 
 
 def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterations: int, converged: bool) -> BatchFit:

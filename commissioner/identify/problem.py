@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from commissioner.identify import output_error
+from commissioner.identify import modal, output_error
 from commissioner.identify.batch import TABLE_ROWS, Segment
 from commissioner.identify.model import CIRCUIT, DELAY, OWN, SHARED, Matrix, ModelChoice
 from commissioner.records import Signal
@@ -69,7 +69,8 @@ class Problem:
         return np.ascontiguousarray(self.model.leg.on_axis(np.linspace(0.0, self.current_span_a, TABLE_ROWS), axis_deg))
 
     def evaluate(self, theta: Matrix, own: Matrix) -> Evaluation:
-        held = _held_with_derivatives(theta[:CIRCUIT], self.period_s)
+        is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
+        held = () if is_linear else _held_with_derivatives(theta[:CIRCUIT], self.period_s)
         out = Evaluation(0.0, np.zeros((self.total, self.total)), np.zeros(self.total), [], [], [])
         block = max(1, round(SCORE_BLOCK_S / self.period_s))
         for k, segment in enumerate(self.segments):
@@ -79,10 +80,13 @@ class Problem:
             residual, flux = np.empty_like(segment.current_a), np.empty_like(segment.current_a)
             shared = (information, score, block, scores, residual, flux)
             with np.errstate(over="ignore", invalid="ignore"):
-                squares = self._simulate(k, held, theta, own[k], shared)
+                if is_linear:
+                    squares = self._simulate_linear(k, theta, own[k], shared)
+                else:
+                    squares = self._simulate(k, held, theta, own[k], shared)
             scale = np.ones(columns.size)
             scale[DELAY] = 1.0 / self.period_s
-            information = (information + np.tril(information, -1).T) * np.outer(scale, scale)
+            information *= np.outer(scale, scale)
             out.squares += squares if math.isfinite(squares) else math.inf
             out.information[np.ix_(columns, columns)] += information
             out.score[columns] += score * scale
@@ -109,6 +113,27 @@ class Problem:
         out.information[part, part] += self.noise_a2 * rows.T @ rows
         out.score[part] -= self.noise_a2 * rows.T @ missed
 
+    def _simulate_linear(
+        self, k: int, theta: Matrix, own: Matrix, shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix]
+    ) -> float:
+        """`_simulate` for ideal inverter, unsaturated iron and no delay: two modes, a tenth of the time."""
+        segment = self.segments[k]
+        information, score, block, scores, residual, flux = shared
+        mode, flux_per_a, jacobian = modal.modes(theta[:CIRCUIT], own[1:], self.period_s)
+        kept = np.delete(np.arange(SHARED + OWN), DELAY)
+        wanted = self.free[self.columns[k]].astype(np.float64)[kept]
+        columns = np.where(np.arange(modal.MODAL) < CIRCUIT, 1.0, wanted)
+        gathered = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
+        root = np.zeros(0) if segment.weight is None else np.sqrt(segment.weight)
+        squares = modal.modal_pass(
+            segment.voltage_v, segment.current_a, root, mode, flux_per_a, own[0], columns,
+            gathered[0], gathered[1], block, gathered[2], residual, flux,
+        )  # fmt: skip
+        chain = jacobian * wanted
+        information[np.ix_(kept, kept)] = chain.T @ gathered[0] @ chain
+        score[kept], scores[:, kept] = chain.T @ gathered[1], gathered[2] @ chain
+        return float(squares)
+
     def _simulate(
         self,
         k: int,
@@ -117,64 +142,40 @@ class Problem:
         own: Matrix,
         shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix],
     ) -> float:
-        """One segment's pass; what it finds is written into `shared`. The linear machine has a kernel of its own."""
+        """One segment's pass; what it finds is written into `shared`."""
         segment, model = self.segments[k], self.model
         wanted = self.free[self.columns[k]].astype(np.float64)
         information, score, block, scores, residual, flux = shared
-        if model.size == SHARED and not model.with_delay and theta[DELAY] == 0.0:
-            kept = np.delete(np.arange(SHARED + OWN), DELAY)
-            small = np.zeros((kept.size, kept.size)), np.zeros(kept.size), np.zeros((scores.shape[0], kept.size))
-            ad, b1, _, dad, db1, _ = held
-            squares = output_error.simulate_linear(
-                segment.voltage_v,
-                segment.current_a,
-                self.weights[k],
-                ad,
-                b1,
-                dad,
-                db1,
-                theta,
-                own,
-                wanted[kept],
-                small[0],
-                small[1],
-                block,
-                small[2],
-                residual,
-                flux,
-            )
-            information[np.ix_(kept, kept)], score[kept], scores[:, kept] = small
-            return float(squares)
         before = 0.0 if segment.starts_at_rest else float(segment.voltage_v[0])
         ad, b1, b2, dad, db1, db2 = held
-        return float(
-            output_error.simulate(
-                segment.voltage_v,
-                segment.current_a,
-                self.weights[k],
-                before,
-                ad,
-                b1,
-                b2,
-                dad,
-                db1,
-                db2,
-                theta,
-                model.extra_powers,
-                model.flux_scale_wb,
-                self.bases[k],
-                self.current_span_a,
-                own,
-                theta[DELAY] / self.period_s,
-                wanted,
-                information,
-                score,
-                block,
-                scores,
-                residual,
-                flux,
-            )
+        squares = output_error.simulate(
+            segment.voltage_v,
+            segment.current_a,
+            self.weights[k],
+            before,
+            ad,
+            b1,
+            b2,
+            dad,
+            db1,
+            db2,
+            theta,
+            model.extra_powers,
+            model.flux_scale_wb,
+            self.bases[k],
+            self.current_span_a,
+            own,
+            theta[DELAY] / self.period_s,
+            wanted,
+            information,
+            score,
+            block,
+            scores,
+            residual,
+            flux,
         )
+        information += np.tril(information, -1).T
+        return float(squares)
 
 
 def _held_with_derivatives(circuit: Matrix, period_s: float) -> tuple[Matrix, ...]:

@@ -10,7 +10,7 @@ from commissioner.identify.bound import cramer_rao
 from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_law import LegLaw
 from commissioner.identify.model import ModelChoice, start_theta
-from commissioner.identify.observer import ParallelObserver  # noqa: F401  same package, compiled together
+from commissioner.identify.problem import Problem
 from commissioner.identify.resistance import knee_shape
 from commissioner.identify.whiteness import whiteness
 from commissioner.motor.circuit import Gamma, InverseGamma
@@ -67,21 +67,22 @@ def test_a_fractional_delay_is_a_fifth_parameter():
     assert np.max(np.abs(relative(fit))) < 5e-4
 
 
-def test_sensitivities_are_the_derivatives_of_the_simulation():
+@pytest.mark.parametrize("model", [ModelChoice(2, 1.0, LegLaw(1.5), True), ModelChoice()], ids=["all", "linear"])
+def test_sensitivities_are_the_derivatives_of_the_simulation(model):
     """Information and score against finite differences of the sum of squares, saturation, knee and delay included."""
-    from commissioner.identify.problem import Problem
-
     voltage = multitone([(20.0, 0.7, 0.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)], 1.0, PERIOD_S)
     rng = np.random.default_rng(3)
     current = linear_response(TRUTH, voltage, PERIOD_S)[0] + 0.3 * rng.standard_normal(voltage.size)
-    model = ModelChoice(2, 1.0, LegLaw(1.5), True)
-    problem = Problem([Segment(voltage, current, 30.0, False)], PERIOD_S, model)
+    weight = np.ones_like(current)
+    weight[700:800] = 0.0
+    problem = Problem([Segment(voltage, current, 30.0, False, weight=weight)], PERIOD_S, model)
     theta = start_theta(START, model, knee_shape(2.0, 0.3, 2.0))
-    theta[4], theta[5:7] = 8e-5, (0.1, 0.4)
+    if model.with_delay:
+        theta[4], theta[5:7] = 8e-5, (0.1, 0.4)
     own = np.array([[0.05, 0.1, 0.08]])
     at = problem.evaluate(theta, own)
     full = np.concatenate([theta, own[0]])
-    for j in range(full.size):
+    for j in np.flatnonzero(problem.free):
         step = 1e-6 * max(abs(full[j]), 1e-3) if j != 4 else 1e-10
         pair = []
         for sign in (1, -1):
@@ -90,6 +91,22 @@ def test_sensitivities_are_the_derivatives_of_the_simulation():
             pair.append(problem.evaluate(moved[: theta.size], moved[theta.size :][None, :]).squares)
         numeric = -(pair[0] - pair[1]) / (4 * step)
         assert at.score[j] == pytest.approx(numeric, rel=2e-3, abs=1e-4 * np.sqrt(at.information[j, j] * at.squares)), j
+
+
+def test_the_linear_machine_is_the_general_one_without_extensions():
+    voltage = multitone([(20.0, 0.7, 0.0), (9.0, 60.1, 3.0)], 1.0, PERIOD_S)
+    current = linear_response(TRUTH, voltage, PERIOD_S)[0]
+    problem = Problem([Segment(voltage, current, 30.0, False)], PERIOD_S, ModelChoice())
+    theta, own = start_theta(START, problem.model), np.array([[0.05, 0.1, 0.08]])
+    modal = problem.evaluate(theta, own)
+    theta[4] = 1e-300  # a delay of nothing takes the general way
+    general = problem.evaluate(theta, own)
+    free = np.ix_(problem.free, problem.free)
+    assert modal.squares == pytest.approx(general.squares, rel=1e-10)
+    assert modal.residuals[0] == pytest.approx(general.residuals[0], abs=1e-10)
+    assert modal.flux[0] == pytest.approx(general.flux[0], abs=1e-10)
+    assert modal.information[free] == pytest.approx(general.information[free], rel=1e-7)
+    assert modal.score[problem.free] == pytest.approx(general.score[problem.free], rel=1e-7)
 
 
 def test_inverter_and_iron_are_told_from_the_machine():
