@@ -49,11 +49,12 @@ def fit_segments(
             remedy="check that the nameplate belongs to the motor",
         )  # fmt: skip
     damping, converged, iterations, last_size = 1e-4, False, 0, 0.0
+    spare: Evaluation | None = None
     for _ in range(max_iterations):
         iterations += 1
         step = _step(problem, present, theta, damping)
         new_theta, new_own = _apply(problem, theta, own, step)
-        trial = problem.evaluate(new_theta, new_own)
+        trial = problem.evaluate(new_theta, new_own, over=spare)
         can_be_judged = bool(np.isfinite(trial.squares) and np.all(np.isfinite(trial.information)))
         if can_be_judged and trial.squares <= present.squares * (1.0 + 1e-13):
             size = _size_in_std(problem, step, present, theta)
@@ -61,12 +62,13 @@ def fit_segments(
             small = size * (shrinks if shrinks < 0.1 else 1.0) < tolerance
             last_size = size
             flat = present.squares - trial.squares <= 1e-12 * present.squares
-            theta, own, present = new_theta, new_own, trial
+            theta, own, present, spare = new_theta, new_own, trial, present
             damping = max(damping * 0.1, 1e-12)
             if small or (flat and damping <= 1e-8):
                 converged = True
                 break
         else:
+            spare = trial
             if damping > 1e8:
                 break
             damping = max(damping, 1e-8) * 20.0

@@ -68,7 +68,8 @@ class Problem:
             return np.zeros((TABLE_ROWS, 0))
         return np.ascontiguousarray(self.model.leg.on_axis(np.linspace(0.0, self.current_span_a, TABLE_ROWS), axis_deg))
 
-    def evaluate(self, theta: Matrix, own: Matrix) -> Evaluation:
+    def evaluate(self, theta: Matrix, own: Matrix, over: Evaluation | None = None) -> Evaluation:
+        """All segments simulated; the signals of `over`, which is not needed any more, are written over."""
         is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
         held = () if is_linear else _held_with_derivatives(theta[:CIRCUIT], self.period_s)
         out = Evaluation(0.0, np.zeros((self.total, self.total)), np.zeros(self.total), [], [], [])
@@ -77,7 +78,8 @@ class Problem:
             columns = self.columns[k]
             information, score = np.zeros((columns.size, columns.size)), np.zeros(columns.size)
             scores = np.zeros((segment.voltage_v.size // block + 1, columns.size))
-            residual, flux = np.empty_like(segment.current_a), np.empty_like(segment.current_a)
+            residual = over.residuals[k] if over else np.empty_like(segment.current_a)
+            flux = over.flux[k] if over else np.empty_like(segment.current_a)
             shared = (information, score, block, scores, residual, flux)
             with np.errstate(over="ignore", invalid="ignore"):
                 if is_linear:
