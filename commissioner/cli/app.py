@@ -118,12 +118,27 @@ def identify(
     files: Annotated[list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz or Parquet.")],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
+    write_back: Annotated[
+        bool, typer.Option("--write-back", help="Write an accepted result into the drive at --drive.")
+    ] = False,
+    drive: Annotated[str | None, typer.Option("--drive", help="Drive URL, for --write-back.")] = None,
+    profile: Annotated[str | None, typer.Option("--profile", help="Drive file, for --write-back.")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    procedure: Procedure = None,
+    runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
-    """The same estimators on a recording, offline."""
+    """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
     from commissioner.cli.identify import identify as verb
+    from commissioner.cli.identify import identify_and_write
 
-    verb(files, motor=motor, estimator=estimator, as_json=json)
+    if not write_back:
+        verb(files, motor=motor, estimator=estimator, as_json=json)
+        return
+    identify_and_write(
+        files, motor=motor, estimator=estimator, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs,
+        as_json=json,
+    )  # fmt: skip
 
 
 @app.command()

@@ -21,16 +21,18 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
         typer.confirm("Write?", abort=True)
     done = restore(summary, drive)
     if as_json:
-        screen.emit({"outcome": "restored", "reason": "snapshot written, read back and stored"} | vars(done))
+        screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
     rows = [(w.name, f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
     if rows:
         screen.out.print(screen.table("", ("parameter", "before", "written", "read back"), rows, right=(1, 2, 3)))
     screen.out.print(
-        "[green]snapshot restored, read back and stored[/]" if rows else "the drive held the snapshot's values already"
+        f"[green]snapshot restored, {screen.kept(done.is_stored)}[/]"
+        if rows
+        else "the drive held the snapshot's values already"
     )
     if done.wear_fraction is not None:
-        screen.out.print(f"{done.store_count} writes of the drive's memory so far, {done.wear_fraction:.3%} of its life")
+        screen.out.print(screen.wear(done.store_count, done.wear_fraction))
 
 
 def replay_run(runs: Path, run: str, *, as_json: bool) -> None:

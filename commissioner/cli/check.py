@@ -7,7 +7,7 @@ from typing import Any
 
 from commissioner.cli import screen
 from commissioner.errors import CheckFailed
-from commissioner.run.commission import inspect_drive
+from commissioner.run.inspection import inspect_drive
 from commissioner.settings import load_motor, load_procedure
 
 

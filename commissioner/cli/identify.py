@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+from commissioner.cli import screen
+from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
     from commissioner.motor.nameplate import Nameplate
@@ -22,22 +24,50 @@ ROWS = (
 )
 
 
-def identify(
-    files: Annotated[list[Path], typer.Argument(help="recordings (.csv, .csv.gz, .parquet); several are joined")],
-    motor: Annotated[str | None, typer.Option(help="nameplate: a name in config/motors or a .toml file")] = None,
-    estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON document on stdout")] = False,
-) -> None:
+def identify(files: Sequence[Path], *, motor: str | None, estimator: str, as_json: bool) -> None:
     """Identify a motor from standstill recordings, with the estimators a live run uses."""
     from commissioner.identify.analysis import identify as analyse
 
-    recording = joined([_read(path) for path in files])
-    result = analyse(recording, _nameplate(motor), estimator)  # type: ignore[arg-type]
-    document = result.as_json()
+    document = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
     if as_json:
-        typer.echo(json.dumps(document, allow_nan=False))
+        screen.emit(document)
     else:
         show(document, [str(path) for path in files])
+
+
+def identify_and_write(
+    files: Sequence[Path], *, motor: str | None, estimator: str, drive: str | None, profile: str | None, yes: bool,
+    procedure: Path | None, runs: Path, as_json: bool,
+) -> None:  # fmt: skip
+    """As `identify`; then the verdict, and an accepted result into the drive. Exits with the code of the outcome."""
+    from commissioner.cli.live import LiveView
+    from commissioner.cli.run import show_and_exit
+    from commissioner.identify.analysis import identify as analyse
+    from commissioner.identify.audit import nameplate_from
+    from commissioner.run.write_recorded import write_recorded
+    from commissioner.settings import load_procedure
+
+    if drive is None or profile is None:
+        raise UsageError(
+            "--write-back needs to know the drive", step="command line", value=None, limit="--drive URL --profile NAME",
+            remedy="add both; `commissioner check` shows whether they fit",
+        )  # fmt: skip
+    screen.require_yes(yes, as_json=as_json)
+    plan, recording = load_procedure(procedure), _recording(files)
+    plate = _nameplate(motor) or nameplate_from(recording.metadata)
+    found = analyse(recording, plate, estimator)  # type: ignore[arg-type]
+    if not as_json:
+        show(found.as_json(), [str(path) for path in files])
+    if not yes:
+        screen.out.print(f"If the result is accepted it will be written into the drive at {drive} and stored.")
+        typer.confirm("Write?", abort=True)
+    with LiveView(screen.err if as_json else screen.out) as view:
+        done = write_recorded(drive, profile, plate, plan, found, files, runs=runs, present=view)
+    show_and_exit(done, as_json=as_json)
+
+
+def _recording(files: Sequence[Path]) -> StandstillRecording:
+    return joined([_read(path) for path in files])
 
 
 def _read(path: Path) -> StandstillRecording:

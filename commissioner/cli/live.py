@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from types import TracebackType
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
+from commissioner.cli import screen
 from commissioner.procedure import findings as told
 
 
@@ -43,10 +45,7 @@ class LiveView:
             case told.StateEntered(state=state, axis_deg=axis):
                 self._line(f"[bold]{state}[/]" + (f"  [dim]axis {axis:g}°[/]" if axis is not None else ""))
             case told.DriveIdentified():
-                self._line(
-                    f"    {escape(record.drive_type)} #{record.serial_number}, firmware {record.firmware_version}, "
-                    f"{record.rated_drive_current_a:g} A, {1e6 * record.control_period_s:g} µs"
-                )
+                self._drive(record)
             case told.ChecksJudged():
                 self._checks(record)
             case told.StaircaseFitted():
@@ -76,12 +75,19 @@ class LiveView:
                 )
             case told.VerdictReached():
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")
-            case told.ParametersWritten(written=written, store_count=count, wear_fraction=wear):
-                self._line(f"    {len(written)} parameters written, read back and stored")
-                if wear is not None:
-                    self._line(f"    {count} writes of the drive's memory so far, {wear:.3%} of its life")
+            case told.ParametersWritten():
+                self._line(f"    {len(record.written)} parameters written, {screen.kept(record.is_stored)}")
+                if record.wear_fraction is not None:
+                    self._line(f"    {screen.wear(record.store_count, record.wear_fraction)}")
             case told.StepProgress():
                 self._show(f"axis {record.axis_deg:g}°", record.fraction, record.numbers)
+
+    def _drive(self, drive: told.DriveIdentified) -> None:
+        """Who answered; a commercial drive's file may name neither number, firmware, current nor control period."""
+        facts = [f"#{drive.serial_number}, firmware {drive.firmware_version}"] if drive.serial_number else []
+        facts += [f"{drive.rated_drive_current_a:g} A"] if math.isfinite(drive.rated_drive_current_a) else []
+        facts += [f"{1e6 * drive.control_period_s:g} µs"] if math.isfinite(drive.control_period_s) else []
+        self._line(f"    {escape(drive.drive_type)} {', '.join(facts) or '(its file names no serial number)'}")
 
     def _checks(self, record: told.ChecksJudged) -> None:
         failed = [result for result in record.results if not result.has_passed]

@@ -58,17 +58,15 @@ def commission_and_show(
     """The part that `run` and `demo` share."""
     nameplate = load_motor(motor)
     plan = load_procedure(procedure, axes_deg=axes)
+    screen.require_yes(yes, as_json=as_json)
     if not yes:
-        _ask(url, plan.total_seconds, write_back, as_json=as_json)
+        _ask(url, plan.total_seconds, write_back)
     with LiveView(screen.err if as_json else screen.out) as view:
         done = commission(
             url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view,
             diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
         )
-    _show(done, as_json=as_json)
-    code = EXIT_CODES[done.ended.outcome]
-    if code:
-        raise SystemExit(code)
+    show_and_exit(done, as_json=as_json)
 
 
 def parse_axes(text: str | None) -> tuple[float, ...] | None:
@@ -90,18 +88,10 @@ def parse_axes(text: str | None) -> tuple[float, ...] | None:
     return axes
 
 
-def _ask(url: str, seconds: float, write_back: bool, *, as_json: bool) -> None:
+def _ask(url: str, seconds: float, write_back: bool) -> None:
     """A person says yes, or nothing is energised."""
     import typer
 
-    if as_json:
-        raise UsageError(
-            "nobody can be asked with --json",
-            step="confirm",
-            value="--json without --yes",
-            limit="--yes",
-            remedy="add --yes once you have made sure that the motor may be energised",
-        )
     screen.out.print(
         f"[bold yellow]The motor at {url} will be energised[/] at standstill on one axis at a time, for about "
         f"{seconds:.0f} s in all.\nNo torque is made on purpose, but the shaft may still move slightly. "
@@ -115,11 +105,14 @@ def _ask(url: str, seconds: float, write_back: bool, *, as_json: bool) -> None:
     typer.confirm("Energise?", abort=True)
 
 
-def _show(done: Commissioned, *, as_json: bool) -> None:
+def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
+    """The result, and the exit code of its outcome."""
     if as_json:
         screen.emit(dict(done.result) | {"folder": str(done.folder)})
-        return
-    screen.result(dict(done.result))
-    for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
-        if (done.folder / name).is_file():
-            screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
+    else:
+        screen.result(dict(done.result))
+        for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
+            if (done.folder / name).is_file():
+                screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
+    if code := EXIT_CODES[done.ended.outcome]:
+        raise SystemExit(code)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from commissioner.errors import CommissionerError
+from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive import plain
 
 out = Console(highlight=False)
@@ -23,6 +23,15 @@ def emit(document: object) -> None:
     """The one JSON document of `--json`."""
     sys.stdout.write(json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
     sys.stdout.flush()
+
+
+def require_yes(yes: bool, *, as_json: bool) -> None:
+    """UsageError where a question would have to be asked and nobody can be."""
+    if as_json and not yes:
+        raise UsageError(
+            "nobody can be asked with --json", step="confirm", value="--json without --yes", limit="--yes",
+            remedy="add --yes once you have made sure that the drive may be energised or written",
+        )  # fmt: skip
 
 
 def failure(error: CommissionerError) -> None:
@@ -56,6 +65,16 @@ def quantity(value: float, std: float, unit: str) -> str:
         return f"{value:.4g} {unit}"
     digits = max(0, 1 - math.floor(math.log10(std)))
     return f"{value:.{digits}f} ± {std:.{digits}f} {unit}"
+
+
+def kept(is_stored: bool) -> str:
+    """How lasting a write is, in words."""
+    return "read back and stored" if is_stored else "read back, not stored: save at the drive or it is lost at power-off"
+
+
+def wear(count: int, fraction: float) -> str:
+    """How much of the drive's memory is used up."""
+    return f"{count} writes of the drive's memory so far, {fraction:.3%} of its life"
 
 
 _MARKS = {

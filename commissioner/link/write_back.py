@@ -140,14 +140,15 @@ class WriteBack:
             self._put_in_memory(target)
 
     def _bring_back(self, snapshot: ParameterSnapshot) -> bool:
-        """Both sets of the snapshot; the stored one first where they differ, for a store takes what is in use."""
+        """Both sets of the snapshot; the stored one first where they differ, for a store takes what is in use. True
+        where what is in use will outlast a power-off, as far as the drive file can tell."""
         has_to_store = bool(snapshot.stored) and bool(self._differing(snapshot.stored, self._read_stored()))
         if has_to_store:
             self._check_endurance(self._store_count(), writes=1)
             self._bring(snapshot.stored, store=True)
         stores_while_writing = not self._group().is_staged and self._can_store()
         self._bring(snapshot.in_use, store=stores_while_writing)
-        return has_to_store or stores_while_writing
+        return self._group().is_staged or stores_while_writing
 
     def _put_in_use(self, target: Values, *, store: bool) -> None:
         if self._group().is_staged:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus
+from commissioner.registers.status import DriveState
 
 NAMEPLATE_TOLERANCE = 0.05
 """A drive whose own plate differs by more than this from the job's motor is set up for another motor."""
@@ -46,20 +47,7 @@ def judge_drive(
     """All checks that need no write. `statuses` are readings spread over the standstill dwell time, oldest first."""
     last = statuses[-1]
     return (
-        CheckResult(
-            "no fault",
-            last.fault_code == 0,
-            last.fault_text,
-            "none",
-            "remove the cause, then reset the fault at the drive",
-        ),
-        CheckResult(
-            "output off",
-            not last.is_energised,
-            last.state,
-            "not enabled",
-            "stop the drive: another master has enabled it",
-        ),
+        *_stopped(last),
         *_interlocks(last),
         _at_rest(statuses),
         *_dc_link(statuses, limits),
@@ -74,6 +62,22 @@ def judge_drive(
         ),
         *_same_motor(drive_nameplate, nameplate),
     )
+
+
+def judge_idle(
+    status: DriveStatus | None, drive_nameplate: Mapping[str, float], nameplate: Nameplate
+) -> tuple[CheckResult, ...]:
+    """What must hold of a drive that is read or written and never energised. None: its file describes no status."""
+    shown = () if status is None else (*_stopped(status), *_interlocks(status))
+    return (*shown, *_same_motor(drive_nameplate, nameplate))
+
+
+def _stopped(status: DriveStatus) -> Iterator[CheckResult]:
+    has_fault = status.fault_code != 0 or status.state == DriveState.FAULT.value
+    seen = status.fault_text if status.fault_code else status.state if has_fault else "none"
+    yield CheckResult("no fault", not has_fault, seen, "none", "remove the cause, then reset the fault at the drive")
+    remedy = "stop the drive: another master has enabled it"
+    yield CheckResult("output off", not status.is_energised, status.state, "not enabled", remedy)
 
 
 _INTERLOCKS = {

@@ -132,11 +132,12 @@ class RunEnded:
 
 @dataclass(frozen=True)
 class ParametersWritten:
-    """Staged, verified, committed, stored, verified."""
+    """Written, read back and, where the drive file knows how, stored."""
 
     written: tuple[WrittenParameter, ...]
     store_count: int
     wear_fraction: float | None
+    is_stored: bool
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class Event(Enum):
     IDENTIFIED = "drive identified"
     CHECKS_PASSED = "all checks passed"
     CHECK_FAILED = "a check failed"
+    MEASURED_BEFORE = "drive idle, the motor was measured before"
     RESISTANCE_KNOWN = "resistance known"
     AXIS_DONE = "axis done, another follows"
     AXES_DONE = "all axes done"
@@ -51,6 +52,7 @@ _COURSE = {
     (State.CONNECTING, Event.IDENTIFIED): State.CHECKING,
     (State.CHECKING, Event.CHECKS_PASSED): State.RESISTANCE,
     (State.CHECKING, Event.CHECK_FAILED): State.REJECTED,
+    (State.CHECKING, Event.MEASURED_BEFORE): State.JUDGING,
     (State.RESISTANCE, Event.RESISTANCE_KNOWN): State.EXCITING,
     (State.RESISTANCE, Event.REJECT): State.REJECTED,
     (State.EXCITING, Event.AXIS_DONE): State.RESISTANCE,

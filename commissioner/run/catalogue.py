@@ -93,12 +93,17 @@ def _written(records: list[dict[str, Any]]) -> str:
     said = "as before"
     for line in records:
         if line["kind"] == "parameters_written":
-            said = "new, read back and stored" + _wear(line["record"])
+            said = "new" + _kept(line["record"]) + _wear(line["record"])
         elif line["kind"] == "snapshot_restored":
             said = "as before (restored)" + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
             said = "old or new: read the drive, or `commissioner restore` this run"
     return said
+
+
+def _kept(report: Any) -> str:
+    is_stored = not isinstance(report, dict) or report.get("is_stored", True)
+    return ", read back and stored" if is_stored else ", read back; not stored, so lost at power-off"
 
 
 def _wear(report: Any) -> str:

@@ -25,6 +25,7 @@ class Restored:
     written: tuple[WrittenParameter, ...]
     store_count: int
     wear_fraction: float | None
+    is_stored: bool
 
 
 def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> Restored:
@@ -59,4 +60,4 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
         journal.journal("snapshot_restored", report, durable=True)
     finally:
         journal.close()
-    return Restored(run.run, report.written, report.store_count_after, report.wear_fraction)
+    return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)

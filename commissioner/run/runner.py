@@ -200,7 +200,8 @@ class Runner:
                 self._folder.journal("snapshot_restored", failed.as_dict(), durable=True)
             raise
         self._folder.journal("parameters_written", report, durable=True)
-        self._present(ParametersWritten(report.written, report.store_count_after, report.wear_fraction))
+        facts = (report.store_count_after, report.wear_fraction, report.is_stored)
+        self._present(ParametersWritten(report.written, *facts))
         return report.written
 
     def _enable(self) -> None:

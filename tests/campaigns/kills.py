@@ -34,7 +34,7 @@ from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock
 from commissioner.run.archive import RunFolder, read_blocks, read_journal
 from commissioner.run.catalogue import RunSummary, find_run
-from commissioner.run.commission import _bounds, _watch
+from commissioner.run.job import bounds, watch_limits
 from commissioner.run.restore import restore
 from commissioner.run.runner import Runner
 from tests.campaigns import truth
@@ -103,7 +103,7 @@ class Victim:
         port = open_port(parse_url(self.url), profile, reply_timeout_s=REPLY_TIMEOUT_S)
         self._count_requests(port)
         inverter = Inverter(port, profile, lambda intent: folder.journal("about_to", intent, durable=True))
-        runner = Runner(inverter, folder, _bounds(job, profile), _watch(job, profile), lambda record: None)
+        runner = Runner(inverter, folder, bounds(job), watch_limits(job), lambda record: None)
         runner.perform(short_course(Script(strength=1.0), job, Findings()))
         port.close()
         folder.close()

@@ -25,7 +25,7 @@ from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings, Job
 from commissioner.run.archive import RunFolder
 from commissioner.run.catalogue import RunSummary, summarise
-from commissioner.run.commission import _bounds, _drive_limits, _parameter_names, _watch
+from commissioner.run.job import bounds, drive_limits, parameter_names, watch_limits
 from commissioner.run.runner import Runner
 from sim.line import Handler
 from sim.scenario import Scenario, build, read_document
@@ -207,7 +207,7 @@ def _watch_requests(running: Running, wire: str) -> truth.Requests:
 
 def make_job(*, write_back: bool, tests: int) -> Job:
     profile = load_profile("simulated")
-    return Job(PLAN, plate(), _drive_limits(profile), _parameter_names(profile), write_back, LINK_LATENCY_S)
+    return Job(PLAN, plate(), drive_limits(profile), parameter_names(profile), write_back, LINK_LATENCY_S)
 
 
 def _run(sequence: Sequence, url: str, root: Path) -> tuple[RunEnded | None, RunSummary, int]:
@@ -223,7 +223,7 @@ def _run(sequence: Sequence, url: str, root: Path) -> tuple[RunEnded | None, Run
             return None, summarise(folder.path), 0
         with contextlib.closing(port):
             inverter = Inverter(port, profile, lambda intent: folder.journal("about_to", intent))
-            runner = Runner(inverter, folder, _bounds(job, profile), _watch(job, profile), lambda record: None)
+            runner = Runner(inverter, folder, bounds(job), watch_limits(job), lambda record: None)
             ended = runner.perform(_stopping(runner, sequence, short_course(script, job, Findings())))
     return ended, summarise(folder.path), port.stats.timeouts + port.stats.mismatches
 

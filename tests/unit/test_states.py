@@ -19,7 +19,11 @@ ORDINARY = [e for e in Event if e not in (Event.ABORT, Event.FAULT)]
 EXPECTED = {
     State.IDLE: {Event.START: State.CONNECTING},
     State.CONNECTING: {Event.IDENTIFIED: State.CHECKING},
-    State.CHECKING: {Event.CHECKS_PASSED: State.RESISTANCE, Event.CHECK_FAILED: State.REJECTED},
+    State.CHECKING: {
+        Event.CHECKS_PASSED: State.RESISTANCE,
+        Event.CHECK_FAILED: State.REJECTED,
+        Event.MEASURED_BEFORE: State.JUDGING,
+    },
     State.RESISTANCE: {Event.RESISTANCE_KNOWN: State.EXCITING, Event.REJECT: State.REJECTED},
     State.EXCITING: {
         Event.AXIS_DONE: State.RESISTANCE,

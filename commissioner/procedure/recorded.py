@@ -1,0 +1,61 @@
+"""Write-back of a motor that was measured before, offline: check, judge and write; nothing here can energise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any
+
+from commissioner.errors import CheckFailed
+from commissioner.motor.nameplate import prior
+from commissioner.procedure.checks import judge_idle
+from commissioner.procedure.findings import ChecksJudged, RunEnded, StateEntered, VerdictReached
+from commissioner.procedure.states import ENDED, Event, State, follow
+from commissioner.procedure.steps import Findings, Job, Step, connect, write
+from commissioner.procedure.verdict import Decision, decide, evidence_of
+from commissioner.records import DriveStatus
+from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, TakeSnapshot, Tell
+
+__all__ = ["recorded_course"]
+
+
+def recorded_course(job: Job, findings: Findings) -> Generator[Command, Any, RunEnded]:
+    """As `course`, for a job whose `findings.identification` came from a recording."""
+    state, because = follow(State.IDLE, Event.START), Event.START
+    while state not in ENDED:
+        yield Tell(StateEntered(state.value, because.value))
+        because = yield from _STEPS[state](job, findings)
+        state = follow(state, because)
+    return RunEnded(state.value, findings.verdict.reason if findings.verdict else because.value, 0.0)
+
+
+def _check(job: Job, findings: Findings) -> Step:
+    """The drive is idle and set up for this motor; what it holds is archived."""
+    plate = yield ReadNameplate()
+    status: DriveStatus = yield ReadStatus()
+    findings.checks = judge_idle(status, plate, job.nameplate)
+    yield Tell(ChecksJudged(findings.checks))
+    failed = next((result for result in findings.checks if not result.has_passed), None)
+    if failed is not None:
+        raise CheckFailed(
+            f"check failed: {failed.name}", step="check", value=failed.value, limit=failed.limit, remedy=failed.remedy
+        )
+    findings.snapshot = yield TakeSnapshot()
+    return Event.MEASURED_BEFORE
+
+
+def _judge(job: Job, findings: Findings) -> Step:
+    assert findings.identification is not None
+    evidence = evidence_of(findings.identification)
+    verdict = decide(evidence, prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
+    findings.verdict = verdict
+    value, limit, remedy = next(((o.value, o.limit, o.remedy) for o in verdict.objections), (None, None, ""))
+    yield Tell(VerdictReached(verdict.decision.value, verdict.reason, value, limit, remedy))
+    return Event.WRITE_BACK if verdict.decision is Decision.WRITE_BACK else Event.REJECT
+
+
+_STEPS: dict[State, Callable[[Job, Findings], Step]] = {
+    State.CONNECTING: connect,
+    State.CHECKING: _check,
+    State.JUDGING: _judge,
+    State.WRITING: write,
+}

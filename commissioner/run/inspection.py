@@ -1,0 +1,53 @@
+"""All that can be known of a drive without energising or writing: what `check` shows."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from commissioner.link.drive_file import load_profile
+from commissioner.link.inverter import Inverter
+from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.checks import CheckResult, judge_drive, judge_idle
+from commissioner.procedure.plan import ProcedurePlan
+from commissioner.records import DriveIdentity, DriveStatus
+from commissioner.registers.profile import DriveProfile
+from commissioner.run.job import make_job, open_drive
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What `check` saw."""
+
+    identity: DriveIdentity
+    nameplate: Mapping[str, float]
+    parameters: Mapping[str, float]
+    watchdog: Mapping[str, Any]
+    checks: tuple[CheckResult, ...]
+
+
+def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: ProcedurePlan) -> Inspection:
+    """Identity, plate, parameters and checks. Of a drive that cannot energise for us, what its file describes."""
+    profile = load_profile(profile_name)
+    with open_drive(url, profile, plan) as port:
+        inverter = Inverter(port, profile)
+        identity, plate = inverter.identify(), inverter.read_nameplate()
+        statuses = [inverter.read_status()]
+        time.sleep(plan.supervision.standstill_dwell_s)
+        statuses.append(inverter.read_status())
+        if "excite" in profile.capabilities:
+            job = make_job(profile, nameplate, plan, port, write_back=False)
+            checks = judge_drive(identity, statuses, plate, nameplate, job.drive_limits, job.test_current_a)
+        else:
+            checks = judge_idle(_shown(profile, statuses[-1]), plate, nameplate)
+        parameters = inverter.snapshot().in_use
+    watchdog = profile.watchdog
+    known = dataclasses.asdict(watchdog) if watchdog else {"none": "the drive file describes none"}
+    return Inspection(identity, plate, parameters, known, checks)
+
+
+def _shown(profile: DriveProfile, status: DriveStatus) -> DriveStatus | None:
+    return status if "status_word" in profile.items else None

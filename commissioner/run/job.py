@@ -1,0 +1,100 @@
+"""What a job on one drive amounts to: the link, the limits of its drive file, the bounds that no command may exceed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from commissioner.link.inverter import Inverter
+from commissioner.link.modbus import ModbusPort, open_port
+from commissioner.link.url import parse_url
+from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.plan import ProcedurePlan
+from commissioner.procedure.steps import Job
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.registers.convention import INDUCTANCES, RESISTANCES, is_our_own
+from commissioner.registers.profile import DriveProfile
+from commissioner.safety.limits import Bounds
+from commissioner.safety.watch import WatchLimits
+
+LOST_SAMPLES_S = 0.05
+"""The stream may lose this much motor time at once before the run stops."""
+FLUX_FRACTION = 1.1
+"""Of the guard's own limit: the guard acts first, the watch is the second line."""
+LATENCY_PROBES = 20
+WORST_LATENCY_FACTOR = 3.0
+"""The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
+
+
+
+@contextmanager
+def open_drive(url: str, profile: DriveProfile, plan: ProcedurePlan) -> Iterator[ModbusPort]:
+    port = open_port(parse_url(url), profile, reply_timeout_s=plan.supervision.reply_timeout_s)
+    try:
+        yield port
+    finally:
+        port.close()
+
+
+def make_job(
+    profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, port: ModbusPort, *, write_back: bool
+) -> Job:
+    """The job with the link's measured latency: what the guard predicts across."""
+    inverter = Inverter(port, profile)
+    for _ in range(LATENCY_PROBES):
+        inverter.read_status()
+    return Job(
+        plan=plan,
+        nameplate=nameplate,
+        drive_limits=drive_limits(profile),
+        parameter_names=parameter_names(profile),
+        write_back=write_back,
+        link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
+    )
+
+
+def parameter_names(profile: DriveProfile) -> dict[str, str]:
+    """The drive's name of each parameter that is one of the contract's, not another circuit's or in another form."""
+    by_quantity = dict(zip((*RESISTANCES, *INDUCTANCES[:2]), PARAMETERS, strict=True))
+    items = [profile.item(name) for name in profile.parameters.order] if profile.parameters else []
+    known = {item.name: by_quantity.get(item.quantity or item.name) for item in items if is_our_own(item)}
+    return {name: field for name, field in known.items() if field is not None}
+
+
+def drive_limits(profile: DriveProfile) -> DriveLimits:
+    """What the drive file does not claim is not judged."""
+    limits = profile.limits
+    return DriveLimits(
+        dc_link_min_v=-math.inf if limits.dc_link_min_v is None else limits.dc_link_min_v,
+        dc_link_max_v=math.inf if limits.dc_link_max_v is None else limits.dc_link_max_v,
+        heatsink_max_degc=math.inf if limits.heatsink_max_degc is None else limits.heatsink_max_degc,
+        winding_max_degc=math.inf if limits.winding_max_degc is None else limits.winding_max_degc,
+    )
+
+
+def bounds(job: Job) -> Bounds:
+    """What the last gate before the wire lets through."""
+    return Bounds(
+        max_watchdog_s=job.plan.supervision.max_watchdog_s,
+        drive_current_a=job.trip_current_a,
+        test_voltage_v=job.test_voltage_v,
+        axis_time_s=job.axis_time_s,
+        total_time_s=job.total_time_s,
+        parameters=prior(job.nameplate),
+    )
+
+
+def watch_limits(job: Job) -> WatchLimits:
+    """Where the runner stops by itself."""
+    limits = job.drive_limits
+    return WatchLimits(
+        current_a=job.trip_current_a,
+        flux_fraction=FLUX_FRACTION,
+        axis_time_s=job.axis_time_s,
+        lost_samples_s=LOST_SAMPLES_S,
+        dc_link_v=(limits.dc_link_min_v, limits.dc_link_max_v),
+        heatsink_degc=limits.heatsink_max_degc,
+        winding_degc=limits.winding_max_degc,
+    )

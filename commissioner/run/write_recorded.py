@@ -1,0 +1,47 @@
+"""A motor identified from recordings, written into its drive: for drives that have no test mode of their own."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from commissioner.identify.analysis import Identification
+from commissioner.link.drive_file import load_profile
+from commissioner.link.url import parse_url
+from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.plan import ProcedurePlan
+from commissioner.procedure.recorded import recorded_course
+from commissioner.procedure.steps import Findings
+from commissioner.run.commission import Commissioned, Order, carry_out, close_run
+from commissioner.run.runner import Present
+
+
+def write_recorded(
+    url: str,
+    profile_name: str,
+    nameplate: Nameplate,
+    plan: ProcedurePlan,
+    identification: Identification,
+    recordings: Sequence[Path],
+    *,
+    runs: Path,
+    present: Present,
+) -> Commissioned:
+    """Check, snapshot, verdict, write, read back, as a run with a folder, which `restore` takes. Energises nothing."""
+    profile = load_profile(profile_name)
+    profile.require("write_back")
+    parse_url(url)
+    order = Order(url, profile, nameplate, plan, write_back=True)
+    findings = Findings(identification=identification)
+    folder = order.open_folder(runs, recordings={str(path): _sha256(path) for path in recordings})
+    with closing(folder):
+        ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings")
+        result = close_run(order, folder, findings, ended)
+    return Commissioned(ended, folder.path, result)
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
