@@ -1,20 +1,14 @@
-"""The command line: verbs, and the one place where failures become sentences, JSON and exit codes.
-
-Verbs import what they need when they are called, so that `--help` stays fast.
-"""
+"""The command line: the verbs and their options. Verbs import what they need when they are called: `--help` stays fast."""
 
 from __future__ import annotations
 
 import sys
-import tempfile
-import traceback
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer.exceptions import TyperException
 
-from commissioner.errors import CommissionerError
+from commissioner.cli.failures import run_to_exit
 
 app = typer.Typer(
     name="commissioner",
@@ -276,67 +270,4 @@ def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
 
 def main() -> None:
     """Entry point of the console script."""
-    arguments = sys.argv[1:]
-    as_json = "--json" in arguments
-    try:
-        sys.exit(app(arguments, standalone_mode=False, prog_name="commissioner") or 0)
-    except CommissionerError as error:
-        _say(error, as_json)
-        sys.exit(error.exit_code)
-    except TyperException as error:
-        if as_json:
-            _say(_usage(error), as_json)
-        else:
-            _show_usage(error)
-        sys.exit(2)
-    except typer.Exit as stop:
-        sys.exit(stop.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        print("stopped by the operator", file=sys.stderr)  # noqa: T201
-        sys.exit(4)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
-    except Exception as surprise:
-        _say(_internal(surprise), as_json)
-        sys.exit(5)
-
-
-def _say(error: CommissionerError, as_json: bool) -> None:
-    from commissioner.cli import screen
-
-    if as_json:
-        screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
-    else:
-        screen.failure(error)
-
-
-def _show_usage(error: TyperException) -> None:
-    if hasattr(error, "show"):
-        error.show()
-    else:
-        print(error, file=sys.stderr)  # noqa: T201
-
-
-def _usage(error: Exception) -> CommissionerError:
-    from commissioner.errors import UsageError
-
-    text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return UsageError(
-        text, step="command line", value=" ".join(sys.argv[1:]), limit="see --help", remedy="correct the call"
-    )
-
-
-def _internal(surprise: Exception) -> CommissionerError:
-    """A defect of ours: the traceback goes to a file, the person gets a sentence."""
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8"
-    ) as file:
-        traceback.print_exception(surprise, file=file)
-    return CommissionerError(
-        f"a defect in commissioner: {type(surprise).__name__}: {surprise}",
-        step=" ".join(sys.argv[1:2]) or "start",
-        value=type(surprise).__name__,
-        limit="no such error",
-        remedy=f"please report it with the file {file.name}",
-    )
+    run_to_exit(app, sys.argv[1:])

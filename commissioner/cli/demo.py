@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from commissioner.cli.run import commission_and_show, parse_axes
+from commissioner.cli.angles import parse_axes
+from commissioner.cli.run import commission_and_show
 from commissioner.errors import LinkUnreachable
 
 START_S = 120.0

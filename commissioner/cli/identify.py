@@ -28,11 +28,20 @@ def identify(files: Sequence[Path], *, motor: str | None, estimator: str, as_jso
     """Identify a motor from standstill recordings, with the estimators a live run uses."""
     from commissioner.identify.analysis import identify as analyse
 
-    document = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
+    document: dict[str, Any] = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
     if as_json:
-        screen.emit(document)
+        screen.emit(document | {"flux_guard": _flux_reached(document), "written": []})
     else:
         show(document, [str(path) for path in files])
+
+
+def _flux_reached(document: Mapping[str, Any]) -> dict[str, Any]:
+    """As a run's: the largest flux of the recording, of the limit that the shipped procedure would have had."""
+    from commissioner.settings import load_procedure
+
+    limit_wb = load_procedure().limits.flux_fraction * document["rated_flux_wb"]["stator_peak"]
+    peak_wb = max(axis["peak_stator_flux_wb"] for axis in document["axes"])
+    return {"peak_fraction": peak_wb / limit_wb, "acted": False, "limit_wb": limit_wb}
 
 
 def identify_and_write(

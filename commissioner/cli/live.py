@@ -52,7 +52,7 @@ class LiveView:
                 self._close()
                 self._line(
                     f"    R_s {record.stator_resistance_ohm:.4g} ± {record.stator_resistance_std_ohm:.2g} Ω, "
-                    f"inverter loses {record.error_voltage_v:.3g} V on the axis"
+                    f"a leg of the inverter loses {record.error_voltage_v:.3g} V"
                 )
             case told.FirstLook(parameters=(r_s, r_r, l_s, l_m)):
                 self._line(
@@ -65,8 +65,9 @@ class LiveView:
                 self._line(f"    {record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
             case told.EstimateUpdated():
                 self._progress(record)
-            case told.GuardActed(advice=advice, flux_fraction=fraction):
-                self._line(f"    [yellow]flux guard: {advice} at {fraction:.0%} of the limit[/]")
+            case told.GuardActed(flux_fraction=flux, current_fraction=current, scale=scale):
+                what = f"flux would reach {flux:.0%}" if flux > current else f"current would reach {current:.0%}"
+                self._line(f"    [yellow]guard: {what} of its limit, amplitude reduced to {scale:.0%}[/]")
             case told.AxisFinished():
                 self._close()
                 state = "settled" if record.has_settled else f"not settled, {record.why}"

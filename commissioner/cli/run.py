@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli import screen
+from commissioner.cli.angles import parse_axes
 from commissioner.cli.live import LiveView
-from commissioner.errors import UsageError
 from commissioner.run.commission import Commissioned, commission
 from commissioner.settings import load_motor, load_procedure
 
@@ -67,25 +67,6 @@ def commission_and_show(
             diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
         )
     show_and_exit(done, as_json=as_json)
-
-
-def parse_axes(text: str | None) -> tuple[float, ...] | None:
-    """`0,60,120` as numbers; None where the procedure's own are to be used."""
-    if text is None:
-        return None
-    try:
-        axes = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        axes = ()
-    if not axes or len(axes) > 12 or not all(-360 <= axis <= 360 for axis in axes):
-        raise UsageError(
-            f"--axes {text!r} is not a list of angles",
-            step="command line",
-            value=text,
-            limit="1 to 12 electrical degrees within -360 ... 360, separated by commas",
-            remedy="write --axes 0,60,120",
-        )
-    return axes
 
 
 def _ask(url: str, seconds: float, write_back: bool) -> None:

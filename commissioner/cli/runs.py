@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from commissioner.cli import screen
-from commissioner.errors import DataRefused, UsageError
+from commissioner.errors import DataRefused
 from commissioner.identify.combine import Combined, compare
 from commissioner.motor.circuit import InverseGamma
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.procedure.verdict import PARAMETERS
-from commissioner.recordings.table import write_table
-from commissioner.run.archive import read_blocks
+from commissioner.recordings.table import check_ending, write_table
+from commissioner.run.archive import read_blocks, read_saved
 from commissioner.run.catalogue import RunSummary, find_run, read_runs
+from commissioner.run.reporting import make_report
 
 
 def list_runs(folder: Path, *, as_json: bool) -> None:
@@ -57,14 +57,11 @@ def _print(summary: RunSummary, result: dict[str, Any] | None) -> None:
 
 
 def report_run(folder: Path, name: str, *, as_json: bool) -> None:
-    """The path of the run's report."""
+    """The path of the run's report, made from its archive where the run could not make it."""
     summary = find_run(folder, name)
     report = Path(summary.folder) / "report.html"
     if not report.is_file():
-        raise DataRefused(
-            f"{summary.run} has no report", step="archive", value=summary.outcome, limit="a run that ended",
-            remedy=f"`commissioner runs export {summary.run} x.parquet`, then `commissioner identify x.parquet`",
-        )  # fmt: skip
+        make_report(summary)
     if as_json:
         screen.emit({"run": summary.run, "report": str(report)})
     else:
@@ -74,14 +71,10 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
 def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
     """The run's whole samples as a recording in the contract's format."""
     summary = find_run(folder, name)
-    if not out.name.endswith((".csv", ".csv.gz", ".parquet")):
-        raise UsageError(
-            f"{out.name} is not a recording's name", step="export", value=out.suffix, limit=".csv, .csv.gz or .parquet",
-            remedy="choose one of these endings",
-        )  # fmt: skip
+    check_ending(out)
     source = Path(summary.folder)
-    request = json.loads((source / "request.json").read_text("utf-8"))
-    plate = {key: value for key, value in request["nameplate"].items() if value is not None}
+    nameplate = read_saved(source, "request.json", "nameplate")["nameplate"]
+    plate = {key: value for key, value in dict(nameplate).items() if value is not None}
     recording = assemble(read_blocks(source / "blocks.bin"), plate, summary.run)
     if recording is None:
         raise DataRefused(
@@ -109,8 +102,8 @@ def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> Non
 
 def _combined(run: RunSummary) -> Combined:
     """A run's combined result as its document holds it."""
-    parameters = (run.result or {}).get("parameters") or {}
-    if not parameters:
+    parameters = (run.result or {}).get("parameters")
+    if not isinstance(parameters, dict) or not all(_is_quantity(parameters.get(name)) for name in PARAMETERS):
         raise DataRefused(
             f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
             remedy="compare runs that ended as commissioned or rejected",
@@ -118,3 +111,7 @@ def _combined(run: RunSummary) -> Combined:
     values = [parameters[name]["value"] for name in PARAMETERS]
     std = np.array([parameters[name]["std"] for name in PARAMETERS])
     return Combined(InverseGamma(*values), np.diag(std**2), (0.0, 0.0, 0.0, 0.0), (), ())
+
+
+def _is_quantity(value: Any) -> bool:
+    return isinstance(value, dict) and all(isinstance(value.get(key), int | float) for key in ("value", "std"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from commissioner.cli.angles import parse_axes
 from commissioner.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
@@ -25,12 +26,15 @@ def simulate(
     """
     from commissioner.cli.screen import emit, err
     from commissioner.diagnose import play as player
-    from commissioner.recordings.table import write_table
+    from commissioner.recordings.table import check_ending, write_table
 
+    check_ending(out)
+    angles = parse_axes(axes) or ()
+    _check_size(seconds, noise_a)
     made, layout, lines, plate = _model(model, plain)
     facts = _facts(plate)
     if like is None:
-        plan = player.default_plan(tuple(float(a) for a in axes.split(",")))
+        plan = player.default_plan(angles)
         segments = player.command(made, facts, plan, seconds, seed)
     else:
         segments, facts = _command_of(like, facts)
@@ -45,6 +49,13 @@ def simulate(
         emit(summary)
     else:
         err.print(f"{summary['samples']} samples in {summary['segments']} segments written to {out}")
+
+
+def _check_size(seconds: float, noise_a: float) -> None:
+    for name, value, low, high in (("--seconds", seconds, 0.1, 3600.0), ("--noise-a", noise_a, 0.0, 1e4)):
+        if not low <= value <= high:
+            raise UsageError(f"{name} {value:g} is out of range", step="command line", value=value,
+                             limit=f"{low:g} ... {high:g}", remedy=f"give {name} a value in this range")
 
 
 def _model(name: str, plain: bool) -> tuple[Model, Layout | None, dict[str, float], dict[str, Any]]:

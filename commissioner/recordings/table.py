@@ -73,6 +73,15 @@ def read_table(path: Path) -> Table:
         ) from error
 
 
+def check_ending(path: Path) -> None:
+    """UsageError where the name does not say which kind of recording it is to be."""
+    if not path.name.endswith((".csv", ".csv.gz", ".parquet")):
+        raise UsageError(
+            f"{path.name} is not a recording's name", step="write recording", value=path.suffix,
+            limit=".csv, .csv.gz or .parquet", remedy="choose one of these endings",
+        )  # fmt: skip
+
+
 def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str, float | str]) -> None:
     """Write the table whole or not at all (a temporary file is renamed into place)."""
     temporary = path.with_name(path.name + ".part")

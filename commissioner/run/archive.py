@@ -6,7 +6,7 @@
     recording.parquet            the same samples in the contract's format, made when the run ends
     snapshot.json                the drive's parameters as they were found (what `restore` writes back)
     result.json  report.html     what the technician gets
-    drive.toml motor.json plan.json   what the run was asked to do
+    request.json                 what the run was asked to do; the address without secrets
 """
 
 from __future__ import annotations
@@ -135,6 +135,24 @@ def read_journal(path: Path) -> list[dict[str, Any]]:
             break
         records.append(record)
     return records
+
+
+def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
+    """The JSON document `name` of a run. DataRefused: missing, damaged, or without one of the `needed` keys."""
+    path = folder / name
+    document = read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
+    missing = [key for key in needed if key not in document]
+    if missing or not document:
+        raise damaged(folder, name, f"no {missing[0]}" if document else "not readable" if path.is_file() else "no such file")
+    return document
+
+
+def damaged(folder: Path, name: str, seen: str) -> DataRefused:
+    """What is raised where an archived file is not as a run leaves it."""
+    return DataRefused(
+        f"{folder.name}: {name} is damaged or missing", step="read the archive", value=seen,
+        limit="the file as the run left it", remedy="use the run folder as the run left it, or another run",
+    )  # fmt: skip
 
 
 def read_document(text: str) -> dict[str, Any]:

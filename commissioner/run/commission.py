@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from commissioner.report.summary import diagnosis_sentences, summarise
 from commissioner.run.archive import RunFolder, plain, read_journal, write_recording
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Course, Present, Runner
 
 
@@ -82,12 +84,14 @@ def commission(
     order = Order(url, profile, nameplate, plan, write_back)
     findings = Findings()
     folder = order.open_folder(runs)
-    with closing(folder):
-        ended = carry_out(order, folder, findings, present, course, "job")
+    with closing(folder), OperatorStop() as stop:
+        ended = carry_out(order, folder, findings, present, course, "job", stop)
         result = close_run(order, folder, findings, ended)
-        if diagnosis_s > 0.0 and findings.identification is not None:
+        if diagnosis_s > 0.0 and findings.identification is not None and not stop.asked:
             present(Diagnosing(diagnosis_s))
-            result = _with_diagnosis(folder, result, findings, diagnosis_s)
+            end = time.monotonic() + diagnosis_s
+            go_on = lambda: time.monotonic() < end and not stop.asked  # noqa: E731
+            result = _with_diagnosis(folder, result, findings, go_on)
     return Commissioned(ended, folder.path, result)
 
 
@@ -98,15 +102,17 @@ def carry_out(
     present: Present,
     steps: Callable[[Job, Findings], Course],
     kind: str,
+    stop: OperatorStop,
 ) -> RunEnded:
-    """The steps over the order's link, each refusal and failure as the end of a run. The job is journalled as `kind`."""
+    """The steps over the order's link, each refusal and failure as the end of a run. The job is journalled as `kind`;
+    a `stop` asked for before it began ends the run, too."""
     profile = order.profile
     try:
         with open_drive(order.url, profile, order.plan) as port:
             inverter = Inverter(port, profile, lambda intent: _announce(folder, intent))
             job = make_job(profile, order.nameplate, order.plan, port, write_back=order.write_back)
             folder.journal(kind, job, durable=True)
-            runner = Runner(inverter, folder, bounds(job), watch_limits(job), present)
+            runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
             ended = runner.perform(steps(job, findings))
             folder.journal("link", port.stats.as_dict())
             return ended
@@ -140,10 +146,10 @@ def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnd
 
 
 def _with_diagnosis(
-    folder: RunFolder, result: Mapping[str, Any], findings: Findings, seconds: float
+    folder: RunFolder, result: Mapping[str, Any], findings: Findings, go_on: Callable[[], bool]
 ) -> Mapping[str, Any]:
     """Result and report once more, with what a four-parameter simulation would have got wrong."""
-    diagnosis = diagnose_run(folder, seconds)
+    diagnosis = diagnose_run(folder, go_on)
     remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
     completed: dict[str, Any] = {**result, "diagnosis": diagnosis, "remarks": remarks}
     folder.save("result.json", completed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from typing import Any
 
 from commissioner.diagnose.diagnosis import Diagnosis, diagnose
@@ -15,14 +15,16 @@ from commissioner.run.archive import RunFolder, plain
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
 
 
-def diagnose_run(folder: RunFolder, seconds: float) -> dict[str, Any]:
-    """Short form for the result; the whole document goes to `diagnosis.json`. A recording that cannot be read is said."""
-    end = time.monotonic() + seconds
+def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]:
+    """Short form for the result; the whole document goes to `diagnosis.json`. A recording that cannot be read is said.
+
+    No further cause is looked for once `go_on` says no.
+    """
     try:
         recording = to_standstill(read_table(folder.path / RECORDING))
     except CommissionerError as error:
         return {"verdict": "refused", "reason": error.what, "causes": [], "moved": [], "file": None}
-    seen = diagnose([recording], go_on=lambda: time.monotonic() < end)
+    seen = diagnose([recording], go_on=go_on)
     document = plain(as_document(seen, None))
     folder.save(FILE, document)
     return {

@@ -15,7 +15,7 @@ from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, WrittenParameter
-from commissioner.run.archive import plain, read_blocks, read_journal
+from commissioner.run.archive import damaged, plain, read_blocks, read_journal, read_saved
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask
 
@@ -51,15 +51,32 @@ def replay(folder: Path) -> Replayed:
     A run that a guard, a fault or the operator ended is compared up to there. DataRefused: the folder holds no run.
     """
     journal = read_journal(folder / "journal.jsonl")
-    job = next((line["record"] for line in journal if line["kind"] == "job"), None)
-    if job is None:
+    archived = [_decision(line["kind"], line["record"]) for line in journal if line["kind"] in _DECISIONS]
+    replayed = list(_decide_again(read_job(folder, journal), Findings(), journal, folder))
+    return Replayed(len(archived), _first_difference(archived, replayed))
+
+
+def learn_again(folder: Path) -> tuple[Job, Findings]:
+    """The job of a run, and all that it had learnt by its end, also where it was cut off. DataRefused as `replay`."""
+    journal = read_journal(folder / "journal.jsonl")
+    job, findings = read_job(folder, journal), Findings()
+    for _ in _decide_again(job, findings, journal, folder):
+        pass
+    return job, findings
+
+
+def read_job(folder: Path, journal: list[dict[str, Any]]) -> Job:
+    """What the run was to do, from its journal."""
+    record = next((line["record"] for line in journal if line["kind"] == "job"), None)
+    if record is None:
         raise DataRefused(
             f"{folder.name} cannot be replayed", step="replay", value="no job in the journal",
-            limit="a run that reached its drive", remedy="replay another run",
+            limit="a run that reached its drive and tested the motor", remedy="replay another run",
         )  # fmt: skip
-    archived = [_decision(line["kind"], line["record"]) for line in journal if line["kind"] in _DECISIONS]
-    replayed = list(_decide_again(_job(job), journal, folder))
-    return Replayed(len(archived), _first_difference(archived, replayed))
+    try:
+        return _job(record)
+    except (TypeError, KeyError, ValueError, AttributeError) as error:
+        raise damaged(folder, "journal.jsonl", f"its job: {error}") from error
 
 
 _DECISIONS = frozenset(
@@ -74,10 +91,12 @@ def _decision(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
     return {"kind": kind, "record": record}
 
 
-def _decide_again(job: Job, journal: list[dict[str, Any]], folder: Path) -> Iterator[dict[str, Any]]:
+def _decide_again(
+    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path
+) -> Iterator[dict[str, Any]]:
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
     blocks = (block for _, block in read_blocks(folder / "blocks.bin"))
-    steps, reply = course(job, Findings()), None
+    steps, reply = course(job, findings), None
     try:
         while True:
             command = steps.send(reply)
@@ -97,9 +116,12 @@ def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Ite
     if not isinstance(command, JUDGED_REPLIES):
         return None
     held = next(replies, None)
-    if held is None or held["command"] != type(command).__name__:
+    if not isinstance(held, dict) or held.get("command") != type(command).__name__:
         raise _ArchiveEnds
-    return _READ[held["command"]](held["reply"])
+    try:
+        return _READ[held["command"]](held["reply"])
+    except (TypeError, KeyError, ValueError):  # cut short or changed: it is compared up to here
+        raise _ArchiveEnds from None
 
 
 def _first_difference(archived: list[dict[str, Any]], replayed: list[dict[str, Any]]) -> Difference | None:
@@ -141,9 +163,21 @@ def _snapshot(record: Mapping[str, Any]) -> ParameterSnapshot:
     return ParameterSnapshot(**(dict(record) | {"identity": DriveIdentity(**record["identity"])}))
 
 
-def read_snapshot(path: Path) -> ParameterSnapshot:
-    """The snapshot a run archived before it wrote anything."""
-    return _snapshot(json.loads(path.read_text("utf-8")))
+def read_snapshot(folder: Path) -> ParameterSnapshot:
+    """The snapshot a run archived before it wrote anything. DataRefused: damaged."""
+    document = read_saved(folder, "snapshot.json", "identity", "in_use", "stored")
+    try:
+        return _checked(_snapshot(document))
+    except (TypeError, ValueError, AttributeError) as error:
+        raise damaged(folder, "snapshot.json", str(error)) from error
+
+
+def _checked(snapshot: ParameterSnapshot) -> ParameterSnapshot:
+    """Refuse what is no set of finite numbers: it is going to be written into a drive."""
+    for name, value in (*snapshot.in_use.items(), *snapshot.stored.items()):
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r}")
+    return snapshot
 
 
 _READ: dict[str, Callable[[Any], Any]] = {

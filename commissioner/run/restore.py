@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import open_port
 from commissioner.link.url import TlsUrl, parse_url
 from commissioner.records import WrittenParameter
-from commissioner.run.archive import RunFolder
+from commissioner.run.archive import RunFolder, read_saved
 from commissioner.run.catalogue import RunSummary
 from commissioner.run.replay import read_snapshot
 
@@ -41,7 +40,8 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             limit="a run that reached the pre-energise checks",
             remedy="choose an earlier run of this drive: `commissioner runs list`",
         )  # fmt: skip
-    request = json.loads((folder / "request.json").read_text("utf-8"))
+    request = read_saved(folder, "request.json", "profile", "url")
+    snapshot = read_snapshot(folder)
     profile = load_profile(request["profile"])
     address = parse_url(url or request["url"])
     if isinstance(address, TlsUrl) and url is None:
@@ -54,7 +54,7 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
         try:
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
-            report = inverter.restore(read_snapshot(folder / "snapshot.json"))
+            report = inverter.restore(snapshot)
         finally:
             port.close()
         journal.journal("snapshot_restored", report, durable=True)

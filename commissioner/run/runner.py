@@ -6,13 +6,11 @@ journals, on the disk, what energises or writes before it goes out.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 import traceback
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from types import FrameType
 from typing import Any
 
 from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
@@ -21,6 +19,7 @@ from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, Param
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
 from commissioner.run.archive import RunFolder
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
 from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
@@ -55,7 +54,13 @@ class Runner:
     """Carries one course out: `perform` returns how the run ended, whatever happens on the way."""
 
     def __init__(
-        self, inverter: Inverter, folder: RunFolder, bounds: Bounds, watch: WatchLimits, present: Present
+        self,
+        inverter: Inverter,
+        folder: RunFolder,
+        bounds: Bounds,
+        watch: WatchLimits,
+        present: Present,
+        stop: OperatorStop | None = None,
     ) -> None:
         self._inverter = inverter
         self._folder = folder
@@ -63,7 +68,7 @@ class Runner:
         self._watch = watch
         self._present = present
         self._progress = _Progress()
-        self._stop = OperatorStop()
+        self._stop = stop or OperatorStop()
         self._cursor: StreamCursor | None = None
         self._snapshot: ParameterSnapshot | None = None
 
@@ -81,17 +86,12 @@ class Runner:
                 ended = self._drive(course)
             except CommissionerError as failure:
                 error = failure
-            except Exception as defect:  # a defect must not leave a motor energised or a run without an end
-                self._folder.journal("defect", traceback.format_exc())
-                error = CommissionerError(
-                    f"a defect in commissioner: {type(defect).__name__}: {defect}",
-                    step="run",
-                    remedy="please report it with the run folder",
-                )
+            except Exception as surprise:  # must not leave a motor energised or a run without an end
+                error = self._unexpected(surprise)
             finally:
                 self._disarm(error.what if error is not None else "the run has ended")
         ended = ended or self._failed(error)
-        self._folder.journal("run_ended", ended, durable=True)
+        self._note("run_ended", ended)
         self._present(ended)
         return ended
 
@@ -267,11 +267,29 @@ class Runner:
         """The one place that de-energises. It tries every path and says what it verified."""
         verified = self._inverter.disarm()
         self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
-        self._folder.journal("disarmed", {"because": reason, "verified": verified}, durable=True)
+        self._note("disarmed", {"because": reason, "verified": verified})
+
+    def _unexpected(self, surprise: Exception) -> CommissionerError:
+        if isinstance(surprise, OSError):
+            return CommissionerError(
+                f"the run's archive cannot be written: {surprise.strerror or surprise}", step="archive",
+                value=str(self._folder.path), limit="a disk with room that this user may write",
+                remedy="make room or give another folder with --runs, then start again",
+            )  # fmt: skip
+        self._note("defect", "".join(traceback.format_exception(surprise)))
+        return CommissionerError(
+            f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
+            remedy="please report it with the run folder",
+        )  # fmt: skip
+
+    def _note(self, kind: str, record: object) -> None:
+        """Journal how the run ends. A disk that is full cannot keep it from ending."""
+        with suppress(OSError):
+            self._folder.journal(kind, record, durable=True)
 
     def _failed(self, error: CommissionerError | None) -> RunEnded:
         assert error is not None
-        self._folder.journal("error", error.as_dict(), durable=True)
+        self._note("error", error.as_dict())
         return RunEnded(error.outcome, error.what, self.energised_s, error.as_dict())
 
 
@@ -279,26 +297,3 @@ def kind_of(record: object) -> str:
     """`EstimateUpdated` -> `estimate_updated`"""
     name = type(record).__name__
     return "".join("_" + c.lower() if c.isupper() else c for c in name).lstrip("_")
-
-
-class OperatorStop:
-    """Ctrl-C and SIGTERM, taken as a wish that the runner grants between two commands; never in the middle of one.
-
-    So a second Ctrl-C cannot interrupt the de-energising that the first one asked for.
-    """
-
-    def __init__(self) -> None:
-        self.asked = ""
-        self._before: list[tuple[int, Any]] = []
-
-    def __enter__(self) -> OperatorStop:
-        if threading.current_thread() is threading.main_thread():
-            self._before = [(number, signal.signal(number, self._ask)) for number in (signal.SIGINT, signal.SIGTERM)]
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before:
-            signal.signal(number, handler)
-
-    def _ask(self, number: int, _frame: FrameType | None) -> None:
-        self.asked = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name

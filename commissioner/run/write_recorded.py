@@ -15,6 +15,7 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.recorded import recorded_course
 from commissioner.procedure.steps import Findings
 from commissioner.run.commission import Commissioned, Order, carry_out, close_run
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Present
 
 
@@ -36,8 +37,8 @@ def write_recorded(
     order = Order(url, profile, nameplate, plan, write_back=True)
     findings = Findings(identification=identification)
     folder = order.open_folder(runs, recordings={str(path): _sha256(path) for path in recordings})
-    with closing(folder):
-        ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings")
+    with closing(folder), OperatorStop() as stop:
+        ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings", stop)
         result = close_run(order, folder, findings, ended)
     return Commissioned(ended, folder.path, result)
 

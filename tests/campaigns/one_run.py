@@ -47,6 +47,7 @@ TRUE_STATOR_RESISTANCE_OHM = 3.7
 WATCHDOG_TRIP = 6
 REPEATS, STALL_S = 8, 0.02
 """A sequence that this machine disturbed by letting a thread or an answer wait so long is run again, so often at most."""
+PAUSE_S = 0.1
 RING_SAMPLES = 1000
 AFTER_STALL_S = 1.0
 """So long after a stall that was asked for, a slow answer says nothing about the machine."""
@@ -177,6 +178,7 @@ def run_until_undisturbed(sequence: Sequence, scenario: Scenario, root: Path) ->
     What must happen without a fault is judged only where the machine did not disturb; what must never happen, always.
     """
     for repeats in range(REPEATS + 1):
+        time.sleep(PAUSE_S * (2**repeats - 1))  # a busy spell of the machine passes
         with StallWatch() as watch, AnswerWatch() as answers:
             outcome = run_one(sequence, scenario, root)
         outcome.stall_s, outcome.answer_s, outcome.repeats = watch.longest_s, answers.longest_s, repeats

@@ -1,0 +1,113 @@
+"""The one place where failures become sentences, JSON and exit codes."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
+
+import typer
+from typer.exceptions import TyperException
+
+from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
+
+
+def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
+    """Carry the verb out and leave with its exit code; with --json every failure is one document, too."""
+    as_json = "--json" in arguments
+    signal.signal(signal.SIGTERM, _terminated)
+    try:
+        code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
+        sys.exit(code)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+    except typer.Exit as stop:
+        sys.exit(stop.exit_code)
+    except TyperException as usage:
+        if not as_json and hasattr(usage, "show"):
+            usage.show()
+            sys.exit(UsageError.exit_code)
+        error: CommissionerError = _usage(usage, arguments)
+    except (KeyboardInterrupt, typer.Abort) as stop:
+        error = _stopped(str(stop))
+    except CommissionerError as failure:
+        error = failure
+    except OSError as failure:
+        error = _file_failure(failure, arguments)
+    except MemoryError:
+        error = _too_much(arguments)
+    except Exception as surprise:
+        error = _defect(surprise, arguments)
+    _say(error, as_json)
+    sys.exit(error.exit_code)
+
+
+def _terminated(number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt(signal.Signals(number).name)
+
+
+def _say(error: CommissionerError, as_json: bool) -> None:
+    from commissioner.cli import screen
+
+    if as_json:
+        screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
+    else:
+        screen.failure(error)
+
+
+def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
+    text = error.format_message() if hasattr(error, "format_message") else str(error)
+    return UsageError(
+        text, step="command line", value=" ".join(arguments), limit="see --help", remedy="correct the call"
+    )
+
+
+def _stopped(by: str) -> CommissionerError:
+    return Aborted(
+        "stopped by the operator", step="wait", value=by or "Ctrl-C", limit="no stop", remedy="start again when ready"
+    )
+
+
+def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:
+    """A file or folder that is in the way, closed to us, or on a disk that is full or failing."""
+    kind = CommissionerError if failure.errno in FULL else UsageError
+    remedy = "make room on the disk, or use another one" if kind is CommissionerError else "give another file or folder"
+    return kind(
+        f"{failure.filename or 'a file'} cannot be used: {failure.strerror or failure}", step=_verb(arguments),
+        value=failure.filename, limit="a file or folder that this user may read or write", remedy=remedy,
+    )  # fmt: skip
+
+
+def _too_much(arguments: Sequence[str]) -> CommissionerError:
+    return DataRefused(
+        "this needs more memory than there is", step=_verb(arguments), value=" ".join(arguments),
+        limit="what fits into memory", remedy="split the recording, or ask for less",
+    )  # fmt: skip
+
+
+def _defect(surprise: Exception, arguments: Sequence[str]) -> CommissionerError:
+    """A defect of ours: the traceback goes to a file, the person gets a sentence."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8"
+        ) as file:
+            traceback.print_exception(surprise, file=file)
+        where = f"the file {file.name}"
+    except OSError:
+        where = "what you did"
+    return CommissionerError(
+        f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step=_verb(arguments),
+        value=type(surprise).__name__, limit="no such error", remedy=f"please report it with {where}",
+    )  # fmt: skip
+
+
+def _verb(arguments: Sequence[str]) -> str:
+    return " ".join(argument for argument in arguments[:2] if not argument.startswith("-")) or "start"
