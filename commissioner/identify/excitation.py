@@ -18,7 +18,6 @@ from scipy.optimize import minimize
 
 from commissioner.identify.resistance import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.motor.standstill import admittance_s, held_input, poles_per_s
 from commissioner.records import Signal
 
@@ -83,20 +82,7 @@ class DesignedExcitation:
         return 4.0 * self.seconds
 
 
-def first_guess(
-    nameplate: Nameplate, stator_resistance_ohm: float | None, limits: ExcitationLimits
-) -> DesignedExcitation:
-    """An excitation from the plate (and the DC resistance, if measured), for a drive that starts it at a small
-    scale."""
-    typical = prior(nameplate).typical
-    machine = (
-        typical if stator_resistance_ohm is None else replace(typical, stator_resistance_ohm=stator_resistance_ohm)
-    )
-    return design(nameplate, machine, limits, 2e-4)
-
-
 def design(
-    nameplate: Nameplate,
     estimate: InverseGamma,
     limits: ExcitationLimits,
     sample_period_s: float,
@@ -247,17 +233,15 @@ def _information(
     An unknown delay between voltage and current is carried along and eliminated (Schur complement): two tones could fix
     four parameters, but not tell them from a delay.
     """
-    nominal = admittance_s(machine, np.asarray(f)) * amplitudes
-    columns = []
-    for j, value in enumerate(machine.as_tuple()):
-        pair = []
-        for sign in (1.0, -1.0):
-            moved = list(machine.as_tuple())
-            moved[j] = value * (1.0 + sign * 1e-5)
-            pair.append(admittance_s(InverseGamma(*moved), np.asarray(f)))
-        columns.append((pair[0] - pair[1]) / 2e-5 * amplitudes)
-    delay = -2j * np.pi * np.asarray(f) * nominal
-    sensitivity = np.column_stack(columns)
+    r_s, r_r, l_s, l_m = machine.as_tuple()
+    omega = 2j * np.pi * np.asarray(f)
+    branch = 1.0 / (1.0 / r_r + 1.0 / (omega * l_m))
+    admittance = 1.0 / (r_s + omega * l_s + branch)
+    # d ln Y = -Y dZ, dZ per relative change of each parameter
+    impedance = np.column_stack([np.full(omega.size, r_s), branch**2 / r_r, omega * l_s, branch**2 / (omega * l_m)])
+    nominal = admittance * amplitudes
+    sensitivity = -(nominal * admittance)[:, None] * impedance
+    delay = -omega * nominal
     shared = (sensitivity.conj().T @ delay).real
     alone = (sensitivity.conj().T @ sensitivity).real
     return np.asarray(alone - np.outer(shared, shared) / float(np.vdot(delay, delay).real))

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from commissioner.identify.excitation import Excitation
 from commissioner.identify.kernels import implicit_loss
+from commissioner.identify.resistance import InverterError
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.standstill import held_input
+from commissioner.records import Signal
 
 Array = NDArray[np.float64]
 
@@ -24,19 +31,55 @@ def forecast(
     i: float,
     psi_r: float,
     free: float,
-) -> float:
-    """The largest |stator flux| under the voltages u, `(n,)`, held for `period` each: of the linear machine from
-    (i, psi_R), and of the flux `free` that integrates u - F(i) - R_s i.
+) -> tuple[float, float]:
+    """(largest |stator flux|, largest |current|) under the voltages u, `(n,)`, held for `period` each: of the linear
+    machine from (i, psi_R); the flux also of `free`, which integrates u - F(i) - R_s i.
 
     `matrix`, `gain`: held-input model of (i, psi_R). F, the inverter's loss, tabulated over 0 ... `lost_span`, is taken
     at the end of each period: i' + g F(i') = i' without loss.
     """
-    top = abs(free)
+    top, top_a = abs(free), abs(i)
     for k in range(u.size):
         known = matrix[0, 0] * i + matrix[0, 1] * psi_r + gain[0] * u[k]
         loss, _ = implicit_loss(lost_v, lost_span, known, gain[0])
         free += period * (u[k] - loss - r_s * i)
         psi_r = matrix[1, 0] * i + matrix[1, 1] * psi_r + gain[1] * (u[k] - loss)
         i = known - gain[0] * loss
-        top = max(top, abs(psi_r + leakage * i), abs(free))
-    return top
+        top, top_a = max(top, abs(psi_r + leakage * i), abs(free)), max(top_a, abs(i))
+    return top, top_a
+
+
+LOSS_ROWS = 1025
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """The excitation behind the inverter as it is known, along one axis."""
+
+    excitation: Excitation
+    lost_v: Signal
+    span_a: float
+
+    @classmethod
+    def behind(cls, inverter: InverterError, excitation: Excitation, axis_deg: float) -> Forecast:
+        span_a = max(inverter.current_a[-1], 1e-9)
+        return cls(excitation, inverter.on_axis(np.linspace(0.0, span_a, LOSS_ROWS), axis_deg), span_a)
+
+    def peaks(
+        self,
+        machine: InverseGamma,
+        time_s: Signal,
+        scale: float | Signal,
+        start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        loss: float = 1.0,
+    ) -> tuple[float, float]:
+        """(largest |stator flux|, largest |current|) over evenly spaced instants, from (current, rotor flux, integrated
+        stator flux), this share of the inverter's loss taken off."""
+        voltage = self.excitation.voltage_v(time_s, scale)
+        period_s = float(time_s[1] - time_s[0])
+        matrix, gain = held_input(machine, period_s)
+        r_s, leakage = machine.stator_resistance_ohm, machine.leakage_inductance_h
+        flux_wb, current_a = forecast(
+            voltage, period_s, matrix, gain, r_s, leakage, loss * self.lost_v, self.span_a, *start
+        )
+        return float(flux_wb), float(current_a)

@@ -57,10 +57,10 @@ def _design(job: Job, findings: Findings, seconds: float) -> DesignedExcitation:
     machine = findings.estimate or plate_machine(job, findings)
     limits = ExcitationLimits(
         flux_wb=job.flux_limit_wb(findings.resistance_ohm(job)),
-        current_a=job.test_current_a,
+        current_a=findings.test_current_a(job),
         voltage_v=job.test_voltage_v,
     )
-    return excitation.design(job.nameplate, machine, limits, period_s(findings), findings.inverter, seconds)
+    return excitation.design(machine, limits, period_s(findings), findings.inverter, seconds)
 
 
 def _look(job: Job, findings: Findings) -> Generator[Command, Any, None]:
@@ -123,7 +123,12 @@ def _test(
         if wanted is not None:
             if reading.advice is FluxAdvice.BACK_OFF:
                 findings.guard_acted = True
-                yield Tell(GuardActed(axis_deg, under_test.time_s, reading.advice.name, reading.fraction, wanted))
+                yield Tell(
+                    GuardActed(
+                        axis_deg, under_test.time_s, reading.advice.name, reading.fraction, reading.current_fraction,
+                        wanted,
+                    )
+                )  # fmt: skip
             yield SetScale(wanted)
         if under_test.is_time_to_tell():
             yield Tell(under_test.update(reading))

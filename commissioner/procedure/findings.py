@@ -92,10 +92,13 @@ class EstimateUpdated:
 
 @dataclass(frozen=True)
 class GuardActed:
+    """The amplitude was taken back to `scale`: flux or current, seen or predicted, in fractions of what is allowed."""
+
     axis_deg: float
     time_s: float
     advice: str
     flux_fraction: float
+    current_fraction: float
     scale: float
 
 

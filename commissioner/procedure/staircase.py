@@ -97,7 +97,8 @@ class _Stair:
     def __post_init__(self) -> None:
         job = self.job
         flux_wb = job.flux_limit_wb(self.findings.resistance_ohm(job))
-        limits = StaircaseLimits(job.test_current_a, flux_wb, job.test_voltage_v)
+        self._most_a = self.findings.test_current_a(job)
+        limits = StaircaseLimits(self._most_a, flux_wb, job.test_voltage_v)
         self._plan = resistance.staircase(job.nameplate, limits)
         look = self.findings.look
         self._known: InverseGamma | None = look.parameters if look else None
@@ -107,7 +108,7 @@ class _Stair:
         self._top_a = self._plan.top_current_a
         if self._known is not None:
             inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
-            self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, job.test_current_a)
+            self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -182,7 +183,7 @@ class _Stair:
             return
         machine, job = self._known, self.job
         step_v = machine.stator_resistance_ohm * abs(self._current_at(voltage_v) - self._current_at(before_v))
-        room_v = (job.test_current_a - self._top_a) * (machine.stator_resistance_ohm + machine.rotor_resistance_ohm)
+        room_v = (self._most_a - self._top_a) * (machine.stator_resistance_ohm + machine.rotor_resistance_ohm)
         surplus_v = max(0.0, min(PUSH * step_v, room_v, job.test_voltage_v - abs(voltage_v)))
         length_s = self._slow_s * _push_length(surplus_v / step_v) if surplus_v > step_v else 0.0
         if length_s < PUSH_ABOVE_S:

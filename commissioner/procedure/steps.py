@@ -40,6 +40,8 @@ from commissioner.safety.commands import (
 Step = Generator[Command, Any, Event]
 """What a state's generator is: yields commands, is sent replies, returns an event."""
 
+BELOW_TRIP = 0.85
+"""Of the drive's current limit: what tests aim at where that is less than they would take otherwise."""
 DWELL_READINGS = 4
 """Status readings spread over the standstill dwell time."""
 
@@ -62,7 +64,7 @@ class Job:
 
     @property
     def test_current_a(self) -> float:
-        """The largest phase current that any test aims at, peak."""
+        """The largest phase current that any test aims at, peak; less on a small drive (`Findings.test_current_a`)."""
         return self.plan.limits.current_fraction * self.nameplate.rated_current_peak_a
 
     @property
@@ -140,6 +142,15 @@ class Findings:
         noise_a = [axis.batch.noise_a for axis in found.axes]
         return longer_test(found.parameters, found.std, self.excitations, noise_a)
 
+    def trip_current_a(self, job: Job) -> float:
+        """Peak phase current at which the drive will end a test: the motor's or the drive's own limit."""
+        assert self.identity is not None
+        return min(job.trip_current_a, self.identity.rated_drive_current_a * math.sqrt(2))
+
+    def test_current_a(self, job: Job) -> float:
+        """The largest current along the axis that a test on this drive aims at, peak."""
+        return min(job.test_current_a, BELOW_TRIP * self.trip_current_a(job))
+
     def resistance_ohm(self, job: Job) -> float:
         """The best stator resistance so far: newest look, else last staircase, else the plate's typical value."""
         if self.look is not None:
@@ -179,11 +190,7 @@ def check(job: Job, findings: Findings) -> Step:
         )
     findings.snapshot = yield TakeSnapshot()
     yield ArmWatchdog(job.plan.supervision.watchdog_s)
-    yield SetDriveLimits(
-        min(job.trip_current_a, findings.identity.rated_drive_current_a * math.sqrt(2)),
-        job.test_voltage_v,
-        job.axis_time_s,
-    )
+    yield SetDriveLimits(findings.trip_current_a(job), job.test_voltage_v, job.axis_time_s)
     return Event.CHECKS_PASSED
 
 

@@ -49,7 +49,7 @@ class UnderTest:
         )  # fmt: skip
         self._guard = FluxGuard(
             job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, sample_s, resistance_ohm,
-            inverter, axis_deg,
+            inverter, axis_deg, current_a=findings.test_current_a(job), trip_a=findings.trip_current_a(job),
         )  # fmt: skip
         first = min(job.plan.excitation.first_scale, self._guard.safe_scale)
         if findings.is_measured:

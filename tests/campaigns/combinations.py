@@ -49,6 +49,8 @@ CASES = (
     Case("15k", "sps_20hp_400v_50hz", 3, 4, 1.4, 38),
     Case("15k_hard", "sps_20hp_400v_50hz", 4, 8, 1.6, 38, 0.6),
     Case("18k5", "msl_18kw5", 3, 3, 1.4, 45),
+    Case("18k5_drive_of_its_size", "msl_18kw5", 3, 5, 1.4, 39),
+    Case("37k_drive_of_its_size", "sps_50hp_400v_50hz", 3, 5, 1.4, 77),
 )
 
 

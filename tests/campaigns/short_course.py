@@ -74,7 +74,7 @@ ROGUES: dict[str, ask.Command | Exception] = {
 def _designed() -> DesignedExcitation:
     known = replace(prior(plate()).typical, stator_resistance_ohm=NEW_SI[0])
     limits = ExcitationLimits(PLAN.limits.flux_fraction * rated_flux(plate(), NEW_SI[0]).stator_peak_wb, 6.0, 90.0)
-    return excitation.design(plate(), known, limits, 2e-4, IDEAL_INVERTER, 1.0)
+    return excitation.design(known, limits, 2e-4, IDEAL_INVERTER, 1.0)
 
 
 def _stronger(chosen: DesignedExcitation, factor: float) -> DesignedExcitation:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.identify.bound import cramer_rao
-from commissioner.identify.excitation import ExcitationLimits, first_guess
+from commissioner.identify.excitation import ExcitationLimits, design
 from commissioner.identify.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior, rated_flux
@@ -21,7 +21,7 @@ def excitation_voltage(motor, seconds: float) -> np.ndarray:
     """What the product drives knowing only the plate."""
     flux = 0.9 * rated_flux(motor.plate, prior(motor.plate).typical.stator_resistance_ohm).stator_peak_wb
     limits = ExcitationLimits(flux, motor.plate.rated_current_peak_a, 0.5 * motor.plate.rated_voltage_v)
-    chosen = first_guess(motor.plate, None, limits).excitation
+    chosen = design(prior(motor.plate).typical, limits, PERIOD_S).excitation
     return chosen.voltage_v(np.arange(round(seconds / PERIOD_S)) * PERIOD_S)
 
 

@@ -16,14 +16,23 @@ from tests.support.command_line import COMMAND, at_flux, call, truth
 from tests.support.sim_process import SimProcess
 
 
+def commission(url, runs, *arguments):
+    """`commissioner run` for the 2.2-kW motor on the drive at the URL, without asking."""
+    return call("run", "--drive", url, "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(runs), *arguments)
+
+
+def started(url, runs):
+    """The same, under way."""
+    arguments = ["run", "--drive", url, "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(runs)]
+    return subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 @pytest.fixture(scope="module")
 def job(tmp_path_factory):
     """One whole commissioning over TCP with write-back; many tests look at it."""
     runs = tmp_path_factory.mktemp("archive") / "runs"
     with SimProcess("--scenario", "default", "--tcp", "0", "--seed", "1") as sim:
-        answer = call(
-            "run", "--drive", sim.url, "--motor", "motor_2kw2", "--write-back", "--yes", "--json", "--runs", str(runs)
-        )
+        answer = commission(sim.url, runs, "--write-back")
         restored = call("restore", "last", "--drive", sim.url, "--runs", str(runs), "--yes", "--json")
         checked = call("check", "--drive", sim.url, "--motor", "motor_2kw2", "--json")
         log = sim.log()
@@ -159,19 +168,7 @@ def test_the_archive_lists_and_shows_the_run(job):
 
 def test_the_same_seed_gives_the_same_samples(job, tmp_path):
     with SimProcess("--scenario", "default", "--tcp", "0", "--seed", "1") as sim:
-        again = call(
-            "run",
-            "--drive",
-            sim.url,
-            "--motor",
-            "motor_2kw2",
-            "--axes",
-            "0",
-            "--yes",
-            "--json",
-            "--runs",
-            str(tmp_path),
-        )
+        again = commission(sim.url, tmp_path, "--axes", "0")
     assert again.code == 0
     first, second = (first_axis(runs) for runs in (job["runs"], tmp_path))
     count = min(first.shape[1], second.shape[1])
@@ -192,10 +189,7 @@ def first_axis(runs):
 
 def test_the_whole_job_runs_over_rtu(tmp_path):
     with SimProcess("--scenario", "default", "--rtu", "pty", "--seed", "2") as sim:
-        answer = call(
-            "run", "--drive", sim.url, "--motor", "motor_2kw2", "--axes", "0", "--write-back", "--yes", "--json",
-            "--runs", str(tmp_path),
-        )  # fmt: skip
+        answer = commission(sim.url, tmp_path, "--axes", "0", "--write-back")
     assert answer.code == 0, answer.stdout
     result = answer.json
     for name, true in at_flux(truth("default"), result["holds_for_stator_flux_wb"]).items():
@@ -218,7 +212,7 @@ def test_the_whole_job_runs_over_rtu(tmp_path):
 )
 def test_a_drive_that_is_not_fit_is_refused_with_its_reason_and_never_energised(scenario, code, says, tmp_path):
     with SimProcess("--scenario", scenario, "--tcp", "0") as sim:
-        answer = call("run", "--drive", sim.url, "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path))
+        answer = commission(sim.url, tmp_path)
         log = sim.log()
     assert answer.code == code
     document = answer.json
@@ -231,9 +225,7 @@ def test_a_drive_that_is_not_fit_is_refused_with_its_reason_and_never_energised(
 
 
 def test_no_drive_at_the_url_is_a_fault_with_a_remedy(tmp_path):
-    answer = call(
-        "run", "--drive", "tcp://127.0.0.1:1", "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path)
-    )
+    answer = commission("tcp://127.0.0.1:1", tmp_path)
     assert answer.code == 5
     assert answer.json["outcome"] == "faulted"
     assert "cable" in answer.json["error"]["remedy"]
@@ -251,10 +243,7 @@ def test_without_yes_and_without_a_person_nothing_is_energised(tmp_path):
 
 def test_ctrl_c_while_energised_de_energises_and_still_writes_the_report(tmp_path):
     with SimProcess("--scenario", "default", "--tcp", "0", speed="2") as sim:
-        run = subprocess.Popen(
-            [*COMMAND, "run", "--drive", sim.url, "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+        run = started(sim.url, tmp_path)
         _wait_for(lambda: any(row["event"] == "energised" for row in sim.log()))
         time.sleep(0.5)
         run.send_signal(signal.SIGINT)
@@ -270,10 +259,7 @@ def test_ctrl_c_while_energised_de_energises_and_still_writes_the_report(tmp_pat
 
 def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
     with SimProcess("--scenario", "default", "--tcp", "0", speed="2") as sim:
-        run = subprocess.Popen(
-            [*COMMAND, "run", "--drive", sim.url, "--motor", "motor_2kw2", "--yes", "--json", "--runs", str(tmp_path)],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+        run = started(sim.url, tmp_path)
         _wait_for(lambda: any(row["event"] == "energised" for row in sim.log()))
         time.sleep(0.7)
         os.kill(run.pid, signal.SIGKILL)
@@ -291,26 +277,14 @@ def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
 
 def test_a_motor_that_would_pass_the_flux_limit_is_held_back_in_truth(tmp_path):
     with SimProcess("--scenario", "flux_hazard", "--tcp", "0", "--seed", "3") as sim:
-        answer = call(
-            "run",
-            "--drive",
-            sim.url,
-            "--motor",
-            "motor_2kw2",
-            "--axes",
-            "0",
-            "--yes",
-            "--json",
-            "--runs",
-            str(tmp_path),
-        )
+        answer = commission(sim.url, tmp_path, "--axes", "0")
         peak = max(row["stator_flux_wb"] for row in sim.log() if row["event"] == "peaks")
     limit = answer.json["flux_guard"]["limit_wb"]
     assert answer.code in (0, 3, 4)
     assert peak <= 1.02 * limit
 
 
-@pytest.mark.parametrize("name", ["large_motor", "0k18_small_inverter", "15k_hard"])
+@pytest.mark.parametrize("name", ["large_motor", "0k18_small_inverter", "15k_hard", "37k_drive_of_its_size"])
 def test_another_motor_behind_another_inverter_is_commissioned_as_well(name, tmp_path):
     """A short version, one axis, of `python -m tests.campaigns.combinations`."""
     case = next(case for case in CASES if case.name == name)

@@ -26,7 +26,7 @@ def limits_of(motor) -> ExcitationLimits:
 @pytest.mark.parametrize("motor", MOTORS[::4], ids=lambda m: m.name)
 def test_true_flux_and_current_stay_under_the_limits_and_use_them(motor):
     limits = limits_of(motor)
-    chosen = design(motor.plate, InverseGamma(*motor.truth), limits, PERIOD_S)
+    chosen = design(InverseGamma(*motor.truth), limits, PERIOD_S)
     time = np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S
     current, rotor = linear_response(motor.truth, chosen.excitation.voltage_v(time), PERIOD_S)
     stator = np.max(np.abs(rotor + motor.truth[2] * current))
@@ -38,7 +38,7 @@ def test_true_flux_and_current_stay_under_the_limits_and_use_them(motor):
 
 @pytest.mark.parametrize("motor", MOTORS[::8], ids=lambda m: m.name)
 def test_at_least_four_tones_on_a_common_grid_and_at_most_twelve_seconds_with_the_staircase(motor):
-    chosen = design(motor.plate, InverseGamma(*motor.truth), limits_of(motor), PERIOD_S)
+    chosen = design(InverseGamma(*motor.truth), limits_of(motor), PERIOD_S)
     frequencies = [t.frequency_hz for t in chosen.excitation.tones]
     assert 4 <= len(frequencies) <= 8
     grid = 0.01
@@ -50,7 +50,7 @@ def test_at_least_four_tones_on_a_common_grid_and_at_most_twelve_seconds_with_th
 def test_stated_standard_errors_are_what_a_fit_scatters():
     motor = next(m for m in MOTORS if m.name == "abb_2k2")
     limits = limits_of(motor)
-    chosen = design(motor.plate, InverseGamma(*motor.truth), limits, PERIOD_S, seconds=3.0)
+    chosen = design(InverseGamma(*motor.truth), limits, PERIOD_S, seconds=3.0)
     voltage = chosen.excitation.voltage_v(np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S)
     current = linear_response(motor.truth, voltage, PERIOD_S)[0]
     found = []
@@ -69,7 +69,7 @@ def test_stated_standard_errors_are_what_a_fit_scatters():
 def test_the_design_beats_the_same_peak_flux_spent_on_decade_spaced_tones():
     motor = next(m for m in MOTORS if m.name == "abb_2k2")
     machine, limits = InverseGamma(*motor.truth), limits_of(motor)
-    chosen = design(motor.plate, machine, limits, PERIOD_S)
+    chosen = design(machine, limits, PERIOD_S)
     plain = multitone([(1.0, f, 0.3 * k) for k, f in enumerate((0.5, 5.0, 50.0))], chosen.seconds, PERIOD_S)
     current, rotor = linear_response(motor.truth, plain, PERIOD_S)
     use = max(
