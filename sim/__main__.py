@@ -37,11 +37,11 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m sim", description=__doc__)
     parser.add_argument("--scenario", default="default", help="name of a scenario, or a TOML file")
-    parser.add_argument("--tcp", type=int, default=-1, metavar="PORT", help="serve Modbus TCP; 0 = any free port")
+    parser.add_argument("--tcp", type=_port, default=-1, metavar="PORT", help="serve Modbus TCP; 0 = any free port")
     parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--parity", choices="NEO", default="N")
-    parser.add_argument("--tls", type=int, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port")
+    parser.add_argument("--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port")
     parser.add_argument("--cert", type=Path, help="server certificate (PEM)")
     parser.add_argument("--key", type=Path, help="its key (PEM)")
     parser.add_argument("--ca", type=Path, help="certificate authority that client certificates must come from")
@@ -54,6 +54,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--recording", type=Path, metavar="FILE", help="write a recording (.csv, .csv.gz, .parquet)")
     parser.add_argument("--list", action="store_true", help="list the scenarios")
     return parser
+
+
+def _port(text: str) -> int:
+    """A TCP port, 0 for any free one."""
+    if not text.isascii() or not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: 0 ... 65535")
+    return int(text)
 
 
 def _speed(text: str) -> float:

@@ -17,6 +17,8 @@ from typer.exceptions import TyperException
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
+INTERRUPTED = 130
+"""What typer makes of a KeyboardInterrupt."""
 
 
 def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
@@ -30,12 +32,14 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
         sys.stderr.close()
         sys.exit(0)
     except typer.Exit as stop:
-        sys.exit(stop.exit_code)
+        if stop.exit_code != INTERRUPTED:
+            sys.exit(stop.exit_code)
+        error: CommissionerError = _stopped(str(stop.__cause__ or ""))
     except TyperException as usage:
         if not as_json and hasattr(usage, "show"):
             usage.show()
             sys.exit(UsageError.exit_code)
-        error: CommissionerError = _usage(usage, arguments)
+        error = _usage(usage, arguments)
     except (KeyboardInterrupt, typer.Abort) as stop:
         error = _stopped(str(stop))
     except CommissionerError as failure:

@@ -51,7 +51,7 @@ class LiveView:
             case told.StaircaseFitted():
                 self._close()
                 self._line(
-                    f"    R_s {record.stator_resistance_ohm:.4g} ± {record.stator_resistance_std_ohm:.2g} Ω, "
+                    f"    start values: R_s {record.stator_resistance_ohm:.3g} Ω, "
                     f"a leg of the inverter loses {record.error_voltage_v:.3g} V"
                 )
             case told.FirstLook(parameters=(r_s, r_r, l_s, l_m)):
@@ -62,7 +62,8 @@ class LiveView:
             case told.ExcitationChosen():
                 volts = sum(amplitude for amplitude, _, _ in record.tones)
                 tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)
-                self._line(f"    {record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
+                what = "first look at the motor: " if record.is_look else ""
+                self._line(f"    {what}{record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
             case told.EstimateUpdated():
                 self._progress(record)
             case told.GuardActed(flux_fraction=flux, current_fraction=current, scale=scale):
@@ -70,9 +71,10 @@ class LiveView:
                 self._line(f"    [yellow]guard: {what} of its limit, amplitude reduced to {scale:.0%}[/]")
             case told.AxisFinished():
                 self._close()
-                state = "settled" if record.has_settled else f"not settled, {record.why}"
+                state = "; settled" if record.has_settled else f"; not settled, {record.why}"
                 self._line(
-                    f"    {record.energised_s:.1f} s, flux to {record.peak_flux_fraction:.0%} of the limit; {state}"
+                    f"    {record.energised_s:.1f} s, flux to {record.peak_flux_fraction:.0%} of the limit"
+                    + ("" if record.is_look else state)
                 )
             case told.VerdictReached():
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")

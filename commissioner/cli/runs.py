@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from commissioner.cli import screen
 from commissioner.errors import DataRefused
-from commissioner.identify.combine import Combined, compare
-from commissioner.motor.circuit import InverseGamma
-from commissioner.procedure.assembly import assemble, columns
-from commissioner.procedure.verdict import PARAMETERS
-from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive import read_blocks, read_saved
 from commissioner.run.catalogue import RunSummary, find_run, read_runs
-from commissioner.run.reporting import make_report
+
+if TYPE_CHECKING:
+    from commissioner.identify.combine import Combined
 
 
 def list_runs(folder: Path, *, as_json: bool) -> None:
@@ -58,6 +53,8 @@ def _print(summary: RunSummary, result: dict[str, Any] | None) -> None:
 
 def report_run(folder: Path, name: str, *, as_json: bool) -> None:
     """The path of the run's report, made from its archive where the run could not make it."""
+    from commissioner.run.reporting import make_report
+
     summary = find_run(folder, name)
     report = Path(summary.folder) / "report.html"
     if not report.is_file():
@@ -70,6 +67,9 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
 
 def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
     """The run's whole samples as a recording in the contract's format."""
+    from commissioner.procedure.assembly import assemble, columns
+    from commissioner.recordings.table import check_ending, write_table
+
     summary = find_run(folder, name)
     check_ending(out)
     source = Path(summary.folder)
@@ -90,6 +90,8 @@ def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
 
 def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> None:
     """Same motor, changed, or another one."""
+    from commissioner.identify.combine import compare
+
     first, second = find_run(folder, before), find_run(folder, after)
     comparison = compare(_combined(first), _combined(second))
     if as_json:
@@ -102,6 +104,12 @@ def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> Non
 
 def _combined(run: RunSummary) -> Combined:
     """A run's combined result as its document holds it."""
+    import numpy as np
+
+    from commissioner.identify.combine import Combined
+    from commissioner.motor.circuit import InverseGamma
+    from commissioner.procedure.verdict import PARAMETERS
+
     parameters = (run.result or {}).get("parameters")
     if not isinstance(parameters, dict) or not all(_is_quantity(parameters.get(name)) for name in PARAMETERS):
         raise DataRefused(

@@ -19,13 +19,14 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from enum import Enum
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from commissioner.errors import DataRefused, UsageError
+from commissioner.errors import CommissionerError, DataRefused, UsageError
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import write_table
 from commissioner.records import SampleBlock
@@ -94,8 +95,10 @@ class RunFolder:
         return target
 
     def close(self) -> None:
-        self._journal.close()
-        self._blocks.close()
+        """Never fails: what could not be written by now is lost, and was said when it was tried."""
+        for file in (self._journal, self._blocks):
+            with suppress(OSError):
+                file.close()
 
 
 def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path | None:
@@ -152,6 +155,15 @@ def damaged(folder: Path, name: str, seen: str) -> DataRefused:
     return DataRefused(
         f"{folder.name}: {name} is damaged or missing", step="read the archive", value=seen,
         limit="the file as the run left it", remedy="use the run folder as the run left it, or another run",
+    )  # fmt: skip
+
+
+def archive_lost(folder: Path, failure: OSError, so_far: str = "") -> CommissionerError:
+    """The disk took no more of a run."""
+    return CommissionerError(
+        f"the run's archive cannot be written: {failure.strerror or failure}{so_far}", step="archive",
+        value=str(folder), limit="a disk with room that this user may write",
+        remedy="make room or give another folder with --runs, then start again",
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run_page import run_page
 from commissioner.report.summary import diagnosis_sentences, summarise
-from commissioner.run.archive import RunFolder, plain, read_journal, write_recording
+from commissioner.run.archive import RunFolder, archive_lost, plain, read_journal, write_recording
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.operator_stop import OperatorStop
@@ -114,7 +114,8 @@ def carry_out(
             folder.journal(kind, job, durable=True)
             runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
             ended = runner.perform(steps(job, findings))
-            folder.journal("link", port.stats.as_dict())
+            with suppress(OSError):
+                folder.journal("link", port.stats.as_dict())
             return ended
     except CommissionerError as error:
         folder.journal("error", error.as_dict(), durable=True)
@@ -132,6 +133,13 @@ def _announce(folder: RunFolder, intent: Intent) -> None:
 
 def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
     """Recording, result and report, in that order: each needs only the one before."""
+    try:
+        return _saved(order, folder, findings, ended)
+    except OSError as failure:
+        raise archive_lost(folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}") from failure
+
+
+def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
     metadata: dict[str, float | str] = {
         key: value for key, value in dataclasses.asdict(order.nameplate).items() if value is not None
     }

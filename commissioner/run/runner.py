@@ -18,7 +18,7 @@ from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
-from commissioner.run.archive import RunFolder
+from commissioner.run.archive import RunFolder, archive_lost
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -271,11 +271,7 @@ class Runner:
 
     def _unexpected(self, surprise: Exception) -> CommissionerError:
         if isinstance(surprise, OSError):
-            return CommissionerError(
-                f"the run's archive cannot be written: {surprise.strerror or surprise}", step="archive",
-                value=str(self._folder.path), limit="a disk with room that this user may write",
-                remedy="make room or give another folder with --runs, then start again",
-            )  # fmt: skip
+            return archive_lost(self._folder.path, surprise)
         self._note("defect", "".join(traceback.format_exception(surprise)))
         return CommissionerError(
             f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
