@@ -41,7 +41,6 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             remedy="choose an earlier run of this drive: `commissioner runs list`",
         )  # fmt: skip
     request = read_saved(folder, "request.json", "profile", "url")
-    snapshot = read_snapshot(folder)
     profile = load_profile(request["profile"])
     address = parse_url(url or request["url"])
     if isinstance(address, TlsUrl) and url is None:
@@ -49,6 +48,7 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             f"the archive of {run.run} keeps no TLS files", step="restore", value=str(address),
             limit="an address with ca=, cert= and key=", remedy="give the drive's whole address with --drive",
         )  # fmt: skip
+    snapshot = read_snapshot(folder)
     journal = RunFolder(folder)
     try:
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)

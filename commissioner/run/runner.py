@@ -199,6 +199,12 @@ class Runner:
             if failed.was_restored:
                 self._folder.journal("snapshot_restored", failed.as_dict(), durable=True)
             raise
+        except OSError as failure:
+            lost = archive_lost(self._folder.path, failure, "; the drive holds its old or its new parameters")
+            raise WriteBackFailed(
+                lost.what, step=lost.step, value=lost.value, limit=lost.limit,
+                remedy="make room, then `commissioner restore` this run",
+            ) from failure
         self._folder.journal("parameters_written", report, durable=True)
         facts = (report.store_count_after, report.wear_fraction, report.is_stored)
         self._present(ParametersWritten(report.written, *facts))
