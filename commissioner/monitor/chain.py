@@ -155,14 +155,14 @@ def _invert(
     shaft_speed = 2 * np.pi * found.shaft.frequency_hz
     shaft_std = 2 * np.pi * found.shaft.frequency_std_hz
     lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
-    lines, problem, fitted = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
+    lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
     if len(combs) > 1:
-        bent = with_wobble(combs, problem, fitted, shaft_speed)
+        bent = with_wobble(combs, problem, fitted, kept, shaft_speed)
         if bent is not None:
             combs = bent
             lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
-            lines, problem, fitted = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
-    solved = waveform.solve(problem, fitted)
+            lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
+    solved = waveform.solve(problem, fitted, kept)
     period = _characteristic(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
     )

@@ -19,8 +19,9 @@ from commissioner.records import Signal
 
 PRIOR_SHARE = 0.2
 """Standard deviation of the feeder's impedance around zero, of the motor's own: a short circuit of five times its current."""
-KEEPS_BEYOND = 4.0
-"""|rest|^2 over its variance below which a line's rest is taken for noise: P = e^-4 on noise alone."""
+KEEPS_BEYOND = 9.0
+"""|rest|^2 over its variance below which a line's rest is taken for noise: P = e^-9 on noise alone. At 4 one line in fifty let its
+voltage's noise in, which is four times the current's."""
 OUTLIER = 3.0
 
 
@@ -35,7 +36,7 @@ def quieten(lines: Lines, combs: int) -> Lines:
     rest = lines.voltage_v[own] + drop
     rest_influence = lines.voltage_influence[:, own] + moved
     variance = _variance(rest_influence)
-    kept = np.maximum(0.0, 1 - KEEPS_BEYOND * variance / np.maximum(np.abs(rest) ** 2, 1e-300))
+    kept = np.maximum(0.0, 1 - (KEEPS_BEYOND * variance / np.maximum(np.abs(rest) ** 2, 1e-300)) ** 2)
     voltage, influence = lines.voltage_v.copy(), lines.voltage_influence.copy()
     voltage[own] = kept * rest - drop
     influence[:, own] = np.maximum(kept, _hidden(rest, variance, kept)) * rest_influence - moved
@@ -63,9 +64,12 @@ def _variance(influence: Vector) -> Signal:
 
 
 def _hidden(rest: Vector, variance: Signal, kept: Signal) -> float:
-    """Share of its standard deviation that a rest taken for noise may still hide: from the excess of all of them."""
+    """Share of its standard deviation that a rest taken for noise may still hide: from the excess of all of them over what
+    chance gives their mean (two of its standard deviations).
+    """
     small = kept == 0.0
     if not small.any():
         return 0.0
-    excess = float(np.mean(np.abs(rest[small]) ** 2 / np.maximum(variance[small], 1e-300))) - 1.0
+    ratio = np.abs(rest[small]) ** 2 / np.maximum(variance[small], 1e-300)
+    excess = float(np.mean(ratio)) - 1.0 - 2.0 / np.sqrt(ratio.size)
     return float(np.sqrt(np.clip(excess, 0.0, 1.0)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.monitor.averaging import Comb
 from commissioner.monitor.combs import Found
-from commissioner.monitor.estimate import band_weights, speed_lines
+from commissioner.monitor.estimate import Kept, band_weights, speed_lines
 from commissioner.monitor.fit import Fitted, Problem
 from commissioner.monitor.periods import Periodicity
 from commissioner.monitor.tracking import PhaseDrift
@@ -46,7 +46,7 @@ def members_of(found: Found) -> list[Periodicity]:
 
 
 def with_wobble(
-    combs: tuple[Comb, ...], problem: Problem, fitted: Fitted, shaft_speed: float
+    combs: tuple[Comb, ...], problem: Problem, fitted: Fitted, kept: Kept, shaft_speed: float
 ) -> tuple[Comb, ...] | None:
     """Combs locked to the shaft with the phase that the other loads' speed ripple gives it; None where it is small.
 
@@ -58,7 +58,7 @@ def with_wobble(
     wobble = np.zeros(combs[0].phase_rad.size)
     for p, comb in enumerate(combs[1:], start=1):
         for k in np.flatnonzero(owner == p):
-            amplitude = 2 * speed.amplitude_rad_per_s[k] / (1j * rate[k])
+            amplitude = 2 * kept.share[k] * speed.amplitude_rad_per_s[k] / (1j * rate[k])
             if abs(amplitude) > 1e-5:
                 wobble = wobble + np.real(amplitude * np.exp(1j * orders[k] * comb.phase_rad))
     if np.abs(wobble).max() * 8 < FM_MATTERS_RAD:

@@ -17,9 +17,10 @@ from commissioner.monitor.supply import Vector
 from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
 
-AIR_GAP_FLUX = {1: 1e-3, 2: 1e-4}
-"""Amplitude of the flux, as share of the main flux, that an eccentric gap modulates once and twice per turn (standard
-deviation): mixed eccentricity shows 50 dB below the current's fundamental. No torque makes it."""
+AIR_GAP_FLUX = {1: 1e-3, 2: 3e-5}
+"""Amplitude of the flux, as share of the main flux, that an uneven gap modulates once and twice per turn (standard
+deviation); no torque makes it. Mixed eccentricity shows 50 dB below the current's fundamental; twice per turn takes an oval
+stator and an oval rotor, 0.8 % of the gap each: their product's half, 75 dB below."""
 LINE_MODEL_ERROR = 0.015
 """Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
 SENSOR_ASYMMETRY = 0.001

@@ -40,7 +40,7 @@ def demodulate(
             sums.append((vector[:used] * factor).reshape(blocks, length).sum(axis=1))
     stacked = np.array(sums)
     steps = np.diff(stacked, axis=1)
-    noise = 0.5 * np.median(np.abs(steps - np.median(steps, axis=1, keepdims=True)) ** 2, axis=1) / np.log(2)
+    noise = 0.5 * np.median(np.abs(steps - steps.mean(axis=1, keepdims=True)) ** 2, axis=1) / np.log(2)
     centre = time_s[:used].reshape(blocks, length).mean(axis=1)
     return Demodulated(np.array(orders), stacked, centre, noise)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.estimate import band_weights, shrinkage, speed_lines
+from commissioner.monitor.estimate import Kept, band_weights, speed_lines
 from commissioner.monitor.fit import Fitted, Problem, circuit_at, steps
 from commissioner.monitor.inversion import (
     RotorState,
@@ -52,36 +52,37 @@ class Solved:
     state: RotorState
     raw: SpeedLines
     weight: Vector
+    kept: Kept
     changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
     """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
 
 
-def solve(problem: Problem, fitted: Fitted) -> Solved:
+def solve(problem: Problem, fitted: Fitted, kept: Kept) -> Solved:
     """The solution and one change per noise block and per direction of the parameters' covariance."""
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     weight = band_weights(problem, fitted)
     raw = speed_lines(problem, fitted, weight)
-    speed = SpeedLines(raw.mean_rad_per_s, shrinkage(problem, fitted, weight) * raw.amplitude_rad_per_s)
+    speed = SpeedLines(raw.mean_rad_per_s, kept.share * raw.amplitude_rad_per_s)
     state = rotor_state(fitted.circuit, pairs, lines, on, speed)
     changes = [
-        *_noise_changes(problem, fitted, speed, state, weight),
-        *_parameter_changes(problem, fitted, speed, weight),
-        *_model_changes(problem, fitted, speed, state, weight),
+        *_noise_changes(problem, fitted, speed, state, weight, kept),
+        *_parameter_changes(problem, fitted, speed, weight, kept),
+        *_model_changes(problem, fitted, speed, state, weight, kept),
     ]
     if np.isfinite(problem.mean_speed_std):
         moved = SpeedLines(speed.mean_rad_per_s + problem.mean_speed_std, speed.amplitude_rad_per_s)
         changes.append((fitted.circuit, moved, state.flux_wb, lines.current_a))
-    return Solved(fitted.circuit, speed, state, raw, weight, tuple(changes))
+    return Solved(fitted.circuit, speed, state, raw, weight, kept, tuple(changes))
 
 
 def _noise_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector, kept: Kept
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
     """Each block's residual, in speed, flux and current together."""
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     circuit = fitted.circuit
     _, noise_up, noise_low = speed_noise(circuit, pairs, lines, on)
-    noise = weight * noise_up + (1 - weight) * noise_low
+    noise = kept.share * (weight * noise_up + (1 - weight) * noise_low)
     drive = circuit.rotor_resistance_ohm * circuit.magnetizing_inductance_h / circuit.rotor_inductance_h
     flux_on = on.basis @ state.flux_wb
     changes = []
@@ -96,13 +97,13 @@ def _noise_changes(
 
 
 def _model_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector, kept: Kept
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
     """Each harmonic moved by its circuit error, real and imaginary part in turn, and all by each air-gap mode."""
     error = problem.band_error
-    own = np.hypot(np.abs(weight) * error.upper, np.abs(1 - weight) * error.lower) / np.sqrt(2.0)
+    own = kept.share * np.hypot(np.abs(weight) * error.upper, np.abs(1 - weight) * error.lower) / np.sqrt(2.0)
     alone = np.diag(own).astype(np.complex128)
-    gap = weight * error.gap_upper + (1 - weight) * error.gap_lower
+    gap = kept.share * (weight * error.gap_upper + (1 - weight) * error.gap_lower)
     return [
         (
             fitted.circuit,
@@ -115,7 +116,7 @@ def _model_changes(
 
 
 def _parameter_changes(
-    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Vector
+    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Vector, kept: Kept
 ) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)
@@ -124,9 +125,8 @@ def _parameter_changes(
         circuit = circuit_at(fitted, step)
         mean, upper, lower = complex_speed(circuit, pairs, lines, on)
         value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
-        moved = SpeedLines(
-            value, speed.amplitude_rad_per_s + weight * (upper - start_up) + (1 - weight) * (lower - start_low)
-        )
+        shift = kept.share * (weight * (upper - start_up) + (1 - weight) * (lower - start_low))
+        moved = SpeedLines(value, speed.amplitude_rad_per_s + shift)
         changes.append((circuit, moved, rotor_state(circuit, pairs, lines, on, moved).flux_wb, lines.current_a))
     return changes
 
@@ -141,11 +141,15 @@ def evaluate(
     moved = [
         _at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes
     ]
-    spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved)) for k in range(3)]
+    left_out = (solved.kept.speed_variance, 0.0)
+    spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved) + left_out[k]) for k in range(2)]
     inertia = inertia_kg_m2
     load_std = None
     if inertia is not None:
-        load_std = np.sqrt(sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved))
+        load_std = np.sqrt(
+            sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved)
+            + inertia**2 * solved.kept.acceleration_variance
+        )
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (value[0][1:] + value[0][:-1]) * np.diff(time_s))])
     return Waveform(
         time_s,
