@@ -143,7 +143,7 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     disagreement = _disagreement(pao, at_flux, own + np.diag(covariance))
     return AxisResult(
         axis_deg=axis_deg,
-        parameters=_judged(pao, at_flux, own, covariance, disagreement, estimator),
+        parameters=_judged(pao, batch, at_flux, own, covariance, disagreement, estimator),
         covariance=covariance,
         batch=batch,
         observer_parameters=pao,
@@ -195,16 +195,24 @@ def _disagreement(pao: InverseGamma, batch: InverseGamma, variance: Matrix) -> f
 
 
 def _judged(
-    pao: InverseGamma, batch: InverseGamma, own: Matrix, covariance: Matrix, disagreement: float, estimator: Estimator
+    pao: InverseGamma,
+    batch: BatchFit,
+    at_flux: InverseGamma,
+    own: Matrix,
+    covariance: Matrix,
+    disagreement: float,
+    estimator: Estimator,
 ) -> InverseGamma:
-    """What counts. The gradient law stands for itself. The fast law has no sensitivity to saturation's feedback and sees
-    the tones only: where it agrees with the batch fit both count by their information, where not the batch fit does."""
+    """What counts. The gradient law stands for itself. The fast law sees the tones only, an inverter's loss at the ends of
+    a period only, and has no sensitivity to saturation's feedback: behind a linear machine it and the batch fit count by
+    their information, else it is the check and the batch fit counts."""
     if estimator == "lyapunov":
         return pao
-    if estimator == "nls" or disagreement > LARGEST_DISAGREEMENT:
-        return batch
+    is_linear = batch.model.leg is None and not batch.model.extra_powers
+    if estimator == "nls" or not is_linear or disagreement > LARGEST_DISAGREEMENT:
+        return at_flux
     weight = 1.0 / own / (1.0 / own + 1.0 / np.diag(covariance))
-    values = weight * np.array(pao.as_tuple()) + (1.0 - weight) * np.array(batch.as_tuple())
+    values = weight * np.array(pao.as_tuple()) + (1.0 - weight) * np.array(at_flux.as_tuple())
     return InverseGamma(*map(float, values))
 
 

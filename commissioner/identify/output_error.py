@@ -2,15 +2,16 @@
 
 Gamma circuit at standstill, everything nonlinear in it taken as extra voltage on the stator flux:
 
-    d psi_s/dt = u - R_s i_lin + n,      n = -F(i) - R_s g(psi_s)
+    d psi_s/dt = u - R_s i_lin - F(i) - R_s g(psi_s)
     d psi_R/dt = R_r (psi_s - psi_R) / L_l
     i_lin = psi_s / L_0 + (psi_s - psi_R) / L_l,    i = i_lin + g(psi_s)
 
 g(psi) is the magnetizing current beyond psi / L_0, F(i) the inverter's voltage error along the axis, both linear in
-their coefficients. Linear part exact for held u and for n linear over the period (first-order hold); the steep F is
-solved implicitly at the end of each period (A-stable), so that currents caught at zero do not chatter. Sensitivities
-differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m, F_1..F_k, then the
-segment's own: offset, psi_s(0), psi_R(0).
+their coefficients. Linear part exact for held u. Of F counts its mean over the step, the current taken as straight from
+end to end and solved for implicitly (A-stable: currents caught at zero do not chatter); where a current passes zero, and
+F with it from one end to the other, the step is a part of the period. One value of F per period at 5 kHz moved L_sigma by
+0.1 %. Sensitivities differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m,
+F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
 """
 
 from __future__ import annotations
@@ -25,6 +26,63 @@ CIRCUIT = 4
 DELAY = 4
 SHARED = 5
 OWN = 3
+PARTS = 4
+"""Steps of a period in which the current passes zero."""
+_SOLVED = 1e-12
+_MOST_STEPS = 40
+
+
+@njit(cache=True)
+def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
+    """(cell, fraction inside it, rows beyond the table) of the size of a current."""
+    at = abs(i) * per_a
+    if at >= rows - 1:
+        return rows - 2, 1.0, at - (rows - 1)
+    cell = int(at)
+    return cell, at - cell, 0.0
+
+
+@njit(cache=True)
+def _loss(table: Array, per_a: float, i: float) -> tuple[float, float]:
+    """(F, F') at a current; constant beyond the table."""
+    cell, fraction, beyond = _locate(table.size, per_a, i)
+    rise = table[cell + 1] - table[cell]
+    value = table[cell] + fraction * rise
+    return (value if i >= 0.0 else -value), (0.0 if beyond > 0.0 else rise * per_a)
+
+
+@njit(cache=True)
+def _integral(table: Array, integral: Array, per_a: float, i: float) -> float:
+    """Of F from 0 to a current, in table rows: even."""
+    cell, fraction, beyond = _locate(table.size, per_a, i)
+    inside = fraction * (table[cell] + 0.5 * fraction * (table[cell + 1] - table[cell]))
+    return float(integral[cell] + inside + beyond * table[-1])
+
+
+@njit(cache=True)
+def _mean_loss(table: Array, integral: Array, per_a: float, i0: float, i1: float) -> tuple[float, float, float]:
+    """(mean of F over the currents i0 ... i1, its derivatives by i0 and by i1)."""
+    apart = i1 - i0
+    if abs(apart) * per_a < 1e-3:
+        mean, slope = _loss(table, per_a, 0.5 * (i0 + i1))
+        return mean, 0.5 * slope, 0.5 * slope
+    mean = (_integral(table, integral, per_a, i1) - _integral(table, integral, per_a, i0)) / (apart * per_a)
+    f0, _ = _loss(table, per_a, i0)
+    f1, _ = _loss(table, per_a, i1)
+    return mean, (mean - f0) / apart, (f1 - mean) / apart
+
+
+@njit(cache=True)
+def _extra(theta: Array, powers: int, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
+    """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
+    relative = flux / flux_scale
+    x, g, slope = relative, 0.0, 0.0
+    for m in range(powers):
+        slope += theta[SHARED + m] * (2 * m + 3) * x * relative / flux_scale
+        x *= relative * relative
+        power[m] = x
+        g += theta[SHARED + m] * x
+    return g, slope
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -32,6 +90,7 @@ def simulate(
     u: Array,
     y: Array,
     weight: Array,
+    passes_zero: NDArray[np.bool_],
     u_before: float,
     ad: Array,
     b1: Array,
@@ -43,6 +102,7 @@ def simulate(
     extra_powers: int,
     flux_scale: float,
     basis: Array,
+    basis_integral: Array,
     current_span: float,
     own: Array,
     delay: float,
@@ -54,159 +114,154 @@ def simulate(
     residual: Array,
     flux: Array,
 ) -> float:
-    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J and J^T W e added to `information`, `score`.
+    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J (lower triangle) and J^T W e added to
+    `information`, `score`.
 
-    `ad` (2, 2), `b1`, `b2` (2,): held-input and ramp response; `dad` (4, 2, 2), `db1`, `db2` (4, 2) their derivatives
-    by the circuit's four. `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span. `wanted`
-    (p,) is 1 where a sensitivity is to be carried. `block_scores` (blocks, p) collects J^T W e by stretches of `block`
-    samples. `weight` is 0 for samples that were lost. Returns sum W e^2.
+    First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
+    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `basis` (rows, k) tabulates the
+    coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
+    from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
+    (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
+    W e^2.
     """
     p = wanted.size
     k_f = basis.shape[1]
     first_g, first_f = SHARED, SHARED + extra_powers
     first_own = first_f + k_f
-    rows = basis.shape[0]
-    per_a = (rows - 1) / current_span
+    per_a = (basis.shape[0] - 1) / current_span
     r_s, l_l, l_0 = theta[0], theta[2], theta[3]
     h_s, h_r = 1.0 / l_0 + 1.0 / l_l, -1.0 / l_l
-    s1, s2 = np.zeros(p), np.zeros(p)  # d(psi_s, psi_R)
-    dn, si, dc1, dc2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
-    lost = np.zeros(rows)
-    for r in range(rows):
-        for c in range(k_f):
-            lost[r] += basis[r, c] * theta[first_f + c]
-    beta = h_s * b2[0] + h_r * b2[1]
-    dbeta = np.zeros(p)
-    for j in range(CIRCUIT):
-        dbeta[j] = h_s * db2[j, 0] + h_r * db2[j, 1]
-    dbeta[2] += (b2[1] - b2[0]) / (l_l * l_l)
-    dbeta[3] -= b2[0] / (l_0 * l_0)
+    table, integral = np.zeros(basis.shape[0]), np.zeros(basis.shape[0])
+    for c in range(k_f):
+        table += theta[first_f + c] * basis[:, c]
+        integral += theta[first_f + c] * basis_integral[:, c]
+    furthest = np.max(np.abs(table))
 
     x1, x2 = own[1], own[2]
-    s1[first_own + 1] = 1.0
-    s2[first_own + 2] = 1.0
-    v, n, cell = 0.0, 0.0, 0
-    total = 0.0
-    g_power = np.zeros(extra_powers + 1)
-    v_last = u_before
-    for k in range(-1, u.size):
-        # Flux at the end of the period without the change of n; k = -1 evaluates the initial state.
-        if k >= 0:
-            # A late step inside the period: its mean, and its first moment as a centred ramp of that moment.
-            jump = u[k] - v_last
-            tilt = 6.0 * delay * (1.0 - delay) * jump
-            v = u[k] - delay * jump + n
-            c1 = ad[0, 0] * x1 + ad[0, 1] * x2 + b1[0] * (v - 0.5 * tilt) + b2[0] * (tilt - n)
-            c2 = ad[1, 0] * x1 + ad[1, 1] * x2 + b1[1] * (v - 0.5 * tilt) + b2[1] * (tilt - n)
-            for j in range(p):
-                dc1[j] = ad[0, 0] * s1[j] + ad[0, 1] * s2[j] + (b1[0] - b2[0]) * dn[j]
-                dc2[j] = ad[1, 0] * s1[j] + ad[1, 1] * s2[j] + (b1[1] - b2[1]) * dn[j]
-            for j in range(CIRCUIT):
-                held, ramp = v - 0.5 * tilt, tilt - n
-                dc1[j] += dad[j, 0, 0] * x1 + dad[j, 0, 1] * x2 + db1[j, 0] * held + db2[j, 0] * ramp
-                dc2[j] += dad[j, 1, 0] * x1 + dad[j, 1, 1] * x2 + db1[j, 1] * held + db2[j, 1] * ramp
-            steep = 6.0 * (1.0 - 2.0 * delay) * jump
-            dc1[DELAY] += b2[0] * steep - b1[0] * (jump + 0.5 * steep)
-            dc2[DELAY] += b2[1] * steep - b1[1] * (jump + 0.5 * steep)
-            v_last = u[k]
-        else:
-            c1, c2 = x1, x2
-            for j in range(p):
-                dc1[j], dc2[j] = s1[j], s2[j]
-
-        # Magnetizing current beyond the linear one, at the predicted flux.
-        live = 1.0 if k >= 0 else 0.0
-        flux_s = c1 + live * b2[0] * n
-        g, slope_g = 0.0, 0.0
-        if extra_powers > 0:
-            rel = flux_s / flux_scale
-            square = rel * rel
-            power = rel
-            for m in range(extra_powers):
-                order = 2 * m + 3
-                slope_g += theta[first_g + m] * order * power * rel / flux_scale
-                power *= square
-                g_power[m] = power
-                g += theta[first_g + m] * power
-
-        # Current at the end of the period: i + beta F(i) = known, F piecewise linear and rising.
-        b_live = beta * live
-        known = h_s * c1 + h_r * c2 + g - b_live * r_s * g
-        size = abs(known)
-        i_abs, slope_f, f_abs, fraction = size, 0.0, 0.0, 0.0
-        if k_f > 0:
-            for _ in range(64):  # concave F: from the left monotone, at most one knot a step
-                lower = lost[cell]
-                s_cell = (lost[cell + 1] - lower) * per_a
-                i_abs = (size - b_live * (lower - s_cell * cell / per_a)) / (1.0 + b_live * s_cell)
-                new = int(i_abs * per_a) if i_abs > 0.0 else 0
-                new = min(new, rows - 2)
-                if new == cell:
-                    break
-                cell = new
-            i_abs = max(i_abs, 0.0)
-            fraction = i_abs * per_a - cell
-            if fraction > 1.0 and cell == rows - 2:
-                fraction, slope_f = 1.0, 0.0
-                i_abs = size - b_live * lost[rows - 1]
-            else:
-                slope_f = (lost[cell + 1] - lost[cell]) * per_a
-            f_abs = lost[cell] + fraction * (lost[cell + 1] - lost[cell])
-        sign = 1.0 if known >= 0.0 else -1.0
-        i = sign * i_abs
-        n_new = -sign * f_abs - r_s * g
-
-        # Sensitivities of the current, then of n and of the state.
-        scale = 1.0 / (1.0 + b_live * slope_f)
-        for j in range(p):
-            dg = slope_g * (dc1[j] + live * b2[0] * dn[j])
-            si[j] = h_s * dc1[j] + h_r * dc2[j] + dg * (1.0 - b_live * r_s) + dbeta[j] * live * n_new
-            dn[j] = -r_s * dg
-        si[2] += (c2 - c1) / (l_l * l_l)
-        si[3] -= c1 / (l_0 * l_0)
-        si[0] -= b_live * g
-        dn[0] -= g
-        for j in range(CIRCUIT):
-            dg = slope_g * live * db2[j, 0] * n
-            si[j] += dg * (1.0 - b_live * r_s)
-            dn[j] -= r_s * dg
-        for m in range(extra_powers):
-            si[first_g + m] += g_power[m] * (1.0 - b_live * r_s)
-            dn[first_g + m] -= r_s * g_power[m]
-        for c in range(k_f):
-            at = sign * (basis[cell, c] + fraction * (basis[cell + 1, c] - basis[cell, c]))
-            si[first_f + c] -= b_live * at
-            dn[first_f + c] -= at
-        for j in range(p):
-            si[j] *= scale * wanted[j]
-            dn[j] -= slope_f * si[j]
-        if k >= 0:
-            x1, x2 = c1 + b2[0] * n_new, c2 + b2[1] * n_new
-            for j in range(p):
-                s1[j] = dc1[j] + b2[0] * dn[j]
-                s2[j] = dc2[j] + b2[1] * dn[j]
-            for j in range(CIRCUIT):
-                s1[j] += db2[j, 0] * n_new
-                s2[j] += db2[j, 1] * n_new
-        n = n_new
-
-        # The sample at the end of this period is y[k + 1].
-        at_sample = k + 1
-        if at_sample >= u.size:
-            break
-        e = y[at_sample] - i - own[0]
-        residual[at_sample] = e
-        flux[at_sample] = x1
-        w = weight[at_sample]
+    s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
+    dg, dg_last, push = np.zeros(p), np.zeros(p), np.zeros(p)
+    power = np.zeros(extra_powers + 1)
+    s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
+    g, slope_g = _extra(theta, extra_powers, flux_scale, x1, power)
+    g_last = g
+    i = h_s * x1 + h_r * x2 + g
+    for j in range(p):
+        si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j]
+        dg[j] = slope_g * s1[j]
+    si[2] += (x2 - x1) / (l_l * l_l)
+    si[3] -= x1 / (l_0 * l_0)
+    for m in range(extra_powers):
+        si[first_g + m] += power[m]
+        dg[first_g + m] += power[m]
+    dg_last[:] = dg
+    total, v_last, last_parts = 0.0, u_before, 1
+    for k in range(u.size):
+        e = y[k] - i - own[0]
+        residual[k], flux[k] = e, x1
+        w = weight[k]
         if w > 0.0:
             total += w * e * e
-            si[first_own] = wanted[first_own]
-            row = at_sample // block
+            row = k // block
             for a in range(p):
                 if wanted[a] > 0.0:
-                    wa = w * si[a]
+                    wa = w * (si[a] if a != first_own else 1.0)
                     score[a] += wa * e
                     block_scores[row, a] += wa * e
-                    for b in range(a + 1):
-                        information[a, b] += wa * si[b]
+                    for b in range(a):
+                        information[a, b] += wa * (si[b] if b != first_own else 1.0)
+                    information[a, a] += wa * (si[a] if a != first_own else 1.0)
+        if k == u.size - 1:
+            break
+        jump = u[k] - v_last
+        v_last = u[k]
+        parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
+        beta = h_s * b1[h, 0] + h_r * b1[h, 1]
+        for part in range(parts):
+            # A late step inside: its mean, and its first moment as a centred ramp of that moment.
+            late, d_late = delay * parts - part, float(parts)
+            if 0.0 <= delay <= 1.0 and parts > 1:
+                if late < 0.0 or late > 1.0:
+                    late, d_late = (0.0 if late < 0.0 else 1.0), 0.0
+            elif parts > 1:
+                late, d_late = delay, 1.0
+            tilt, steep = 6.0 * late * (1.0 - late) * jump, 6.0 * (1.0 - 2.0 * late) * jump
+            ahead = 0.5 * last_parts / parts
+            last_parts = parts
+            extra = g + ahead * (g - g_last)
+            held = u[k] - late * jump - 0.5 * tilt - r_s * extra
+            c1 = ad[h, 0, 0] * x1 + ad[h, 0, 1] * x2 + b1[h, 0] * held + b2[h, 0] * tilt
+            c2 = ad[h, 1, 0] * x1 + ad[h, 1, 1] * x2 + b1[h, 1] * held + b2[h, 1] * tilt
+            g_last = g
+
+            # The current at the end: i = h (c - b w(i)) + g(c_1 - b_1 w(i)), w the mean loss over the step.
+            mean, by_i0, by_i1 = 0.0, 0.0, 0.0
+            i0 = i
+            if k_f > 0:
+                free = h_s * c1 + h_r * c2
+                reach = beta * furthest
+                low, high = -np.inf, np.inf
+                for _ in range(_MOST_STEPS):
+                    mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i)
+                    g, slope_g = _extra(theta, extra_powers, flux_scale, c1 - b1[h, 0] * mean, power)
+                    missed = i - free + beta * mean - g
+                    if abs(missed) <= _SOLVED * (current_span + reach):
+                        break
+                    if missed > 0.0:
+                        high = i
+                    else:
+                        low = i
+                    i -= missed / (1.0 + (beta + slope_g * b1[h, 0]) * by_i1)
+                    if not low < i < high:
+                        i = 0.5 * (low + high)
+            old1, old2 = x1, x2
+            x1, x2 = c1 - b1[h, 0] * mean, c2 - b1[h, 1] * mean
+            if k_f == 0:
+                g, slope_g = _extra(theta, extra_powers, flux_scale, x1, power)
+                i = h_s * x1 + h_r * x2 + g
+            held -= mean
+
+            # Sensitivities: all but the part by the new current's own loss, then that.
+            for j in range(p):
+                push[j] = -r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+                dg_last[j] = dg[j]
+            push[0] -= extra
+            push[DELAY] -= (jump + 0.5 * steep) * d_late
+            if k_f > 0:
+                apart = (i - i0) * per_a
+                cell0, in0, out0 = _locate(table.size, per_a, i0)
+                cell1, in1, out1 = _locate(table.size, per_a, i)
+                cell, inside, _ = _locate(table.size, per_a, 0.5 * (i0 + i))
+                sign = 1.0 if i0 + i >= 0.0 else -1.0
+                for c in range(k_f):
+                    if abs(apart) < 1e-3:
+                        at = sign * (basis[cell, c] + inside * (basis[cell + 1, c] - basis[cell, c]))
+                    else:
+                        at = basis_integral[cell1, c] - basis_integral[cell0, c]
+                        at += in1 * (basis[cell1, c] + 0.5 * in1 * (basis[cell1 + 1, c] - basis[cell1, c]))
+                        at -= in0 * (basis[cell0, c] + 0.5 * in0 * (basis[cell0 + 1, c] - basis[cell0, c]))
+                        at = (at + (out1 - out0) * basis[-1, c]) / apart
+                    push[first_f + c] -= at
+            for j in range(p):
+                d1 = ad[h, 0, 0] * s1[j] + ad[h, 0, 1] * s2[j] + b1[h, 0] * push[j]
+                d2 = ad[h, 1, 0] * s1[j] + ad[h, 1, 1] * s2[j] + b1[h, 1] * push[j]
+                s1[j], s2[j] = d1, d2
+            for j in range(CIRCUIT):
+                s1[j] += dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
+                s2[j] += dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
+            s1[DELAY] += b2[h, 0] * steep * d_late
+            s2[DELAY] += b2[h, 1] * steep * d_late
+            for j in range(p):
+                si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j]
+            si[2] += (x2 - x1) / (l_l * l_l)
+            si[3] -= x1 / (l_0 * l_0)
+            for m in range(extra_powers):
+                si[first_g + m] += power[m]
+            scale = 1.0 / (1.0 + (beta + slope_g * b1[h, 0]) * by_i1)
+            for j in range(p):
+                si[j] *= scale * wanted[j]
+                s1[j] -= b1[h, 0] * by_i1 * si[j]
+                s2[j] -= b1[h, 1] * by_i1 * si[j]
+                dg[j] = slope_g * s1[j]
+            for m in range(extra_powers):
+                dg[first_g + m] += power[m]
     return total

@@ -21,6 +21,7 @@ from commissioner.records import Signal
 
 SCORE_BLOCK_S = 0.25
 CURRENT_MARGIN = 1.5
+NEAR_ZERO = 0.03
 FALL_OF_LEG = 0.001
 """How much of its largest value a leg error may fall from knot to knot, one standard deviation: physics lets it rise only."""
 
@@ -48,6 +49,8 @@ class Problem:
         self.free = np.concatenate([model.free_shared, *[self._own_free(s) for s in segments]])
         self.current_span_a = CURRENT_MARGIN * max(float(np.max(np.abs(s.current_a))) for s in segments)
         self.bases = [self._basis(s.axis_deg) for s in segments]
+        self.integrals = [_from_zero(b) for b in self.bases]
+        self.passes_zero = [self._passes_zero(s.current_a) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
         self.noise_a2 = float(np.median([np.var(np.diff(s.current_a, 2)) for s in segments])) / 6.0
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
@@ -68,10 +71,22 @@ class Problem:
             return np.zeros((TABLE_ROWS, 0))
         return np.ascontiguousarray(self.model.leg.on_axis(np.linspace(0.0, self.current_span_a, TABLE_ROWS), axis_deg))
 
+    def _passes_zero(self, current_a: Signal) -> NDArray[np.bool_]:
+        """Periods in which the leg loss may turn round, by the measured current: near zero beside what it moves in one."""
+        if self.model.leg is None:
+            return np.zeros(current_a.size, dtype=bool)
+        moves = np.abs(np.diff(current_a, append=current_a[-1]))
+        return np.asarray(np.abs(current_a) < NEAR_ZERO * self.model.leg.largest_a + 1.5 * moves)
+
+    def _held(self, circuit: Matrix) -> tuple[Matrix, ...]:
+        """Responses and derivatives over a period and over a part of one, stacked."""
+        both = (_held_with_derivatives(circuit, self.period_s / parts) for parts in (1, output_error.PARTS))
+        return tuple(np.stack(pair) for pair in zip(*both, strict=True))
+
     def evaluate(self, theta: Matrix, own: Matrix, over: Evaluation | None = None) -> Evaluation:
         """All segments simulated; the signals of `over`, which is not needed any more, are written over."""
         is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
-        held = () if is_linear else _held_with_derivatives(theta[:CIRCUIT], self.period_s)
+        held = () if is_linear else self._held(theta[:CIRCUIT])
         out = Evaluation(0.0, np.zeros((self.total, self.total)), np.zeros(self.total), [], [], [])
         block = max(1, round(SCORE_BLOCK_S / self.period_s))
         for k, segment in enumerate(self.segments):
@@ -154,6 +169,7 @@ class Problem:
             segment.voltage_v,
             segment.current_a,
             self.weights[k],
+            self.passes_zero[k],
             before,
             ad,
             b1,
@@ -165,6 +181,7 @@ class Problem:
             model.extra_powers,
             model.flux_scale_wb,
             self.bases[k],
+            self.integrals[k],
             self.current_span_a,
             own,
             theta[DELAY] / self.period_s,
@@ -178,6 +195,11 @@ class Problem:
         )
         information += np.tril(information, -1).T
         return float(squares)
+
+
+def _from_zero(table: Matrix) -> Matrix:
+    """Integral over the rows of a table, from the first on."""
+    return np.vstack([np.zeros(table.shape[1]), np.cumsum(0.5 * (table[1:] + table[:-1]), axis=0)])
 
 
 def _held_with_derivatives(circuit: Matrix, period_s: float) -> tuple[Matrix, ...]:
