@@ -492,8 +492,9 @@ def coast(x, p, seconds):
         size = math.hypot(x[2], x[3])
         rate = p[at.P_RR] * (size - _open_flux(size, m)) * m.per_leak_h
         keep = math.exp(-step * rate / size) if size > 1e-12 else 0.0
-        x[2] *= keep
-        x[3] *= keep
+        turn = step * _shaft_speed(x[at.X_TIME] + spent, p)  # the rotor takes its flux along
+        c, s = keep * math.cos(turn), keep * math.sin(turn)
+        x[2], x[3] = c * x[2] - s * x[3], s * x[2] + c * x[3]
         _open_terminals(x, m)
         spent += step
     _cool(x, p, seconds)

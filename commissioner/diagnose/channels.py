@@ -76,7 +76,10 @@ def _three_phases(segment: Segment) -> Array:
 
 
 def _heat(record: Record, rotor: Sequence[Array]) -> Named:
-    """Doses in minutes at rated current: own phase, mean of phases, own phase with a leak, rotor. Carried over segments."""
+    """Doses in minutes at rated current, carried over segments: own phase, mean of phases, own phase with a leak, plain time
+
+    (to the same end as the mean), rotor, rotor in plain time.
+    """
     period, rated = record.facts.sample_period_s, record.facts.rated_current_peak_a / np.sqrt(2.0)
     own, leaky, cage = np.zeros(3), np.zeros(3), 0.0
     last_time, last_file = None, -1
@@ -95,11 +98,25 @@ def _heat(record: Record, rotor: Sequence[Array]) -> Named:
         ])
         cage_dose = cage + np.cumsum(rotor_rate) - rotor_rate
         mean = np.repeat(dose.mean(axis=0)[None], 3, axis=0)
-        out.append(np.vstack([dose, mean, leak, cage_dose[None]]).T)
+        time = np.repeat(_since_start(record, segment)[None], 3, axis=0)
+        out.append(np.vstack([dose, mean, leak, time, cage_dose[None], time[:1]]).T)
         own, leaky, cage = dose[:, -1], leak[:, -1], float(cage_dose[-1])
         last_time, last_file = float(segment.time_s[-1]), segment.file
-    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky") for p in "uvw")
-    return (*names, "rotor_heat"), out
+    for file in {s.file for s in record.segments}:
+        rows = [k for k, s in enumerate(record.segments) if s.file == file]
+        for column, of in ((slice(9, 12), slice(3, 6)), (slice(13, 14), slice(12, 13))):
+            scale = float(out[rows[-1]][-1, of].mean())
+            for k in rows:
+                out[k][:, column] *= scale
+    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky", "time") for p in "uvw")
+    return (*names, "rotor_heat", "rotor_heat_time"), out
+
+
+def _since_start(record: Record, segment: Segment) -> Array:
+    """Time since the file's first sample as a share of its whole length."""
+    times = [s.time_s for s in record.segments if s.file == segment.file]
+    share: Array = (segment.time_s - times[0][0]) / max(float(times[-1][-1] - times[0][0]), 1e-9)
+    return share
 
 
 def _sag(record: Record) -> Named:

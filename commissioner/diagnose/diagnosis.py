@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -36,7 +36,9 @@ from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
 MOSTLY_EXPLAINED_SIGMA, UNEXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.3, 0.95
-COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.7
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.5
+"""Named as a cause: steps beyond a share of the rated peak current that make a quarter of the noise power."""
+TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 IRON_CORNER_HZ = 400.0
 NEVER_NAMEABLE = (
@@ -131,7 +133,8 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
         part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples
     )
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise) for name in found.accepted]
-    causes += _audit_causes(audit, found, noise)
+    causes = _without_truncation(causes, audit)
+    causes += _audit_causes(audit, found, noise, {c.name for c in causes})
     count = float(found.fit.normal.count.sum())
     structured = max(found.nominal.chi2 - count, 0.0)
     share = 1.0 - min(rest.sigma**2 * count / max(structured, rest.sigma**2 * count, 1.0), 1.0)
@@ -170,11 +173,28 @@ def _is_iron_like(found: Found) -> bool:
     return bool(weights[corners >= IRON_CORNER_HZ].sum() > 0.5 * weights.sum())
 
 
-def _audit_causes(audit: Audit, found: Found, noise: Noise) -> list[Cause]:
+def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
+    """A converter that cuts off instead of rounding shifts every channel by half a step: that is quantization, no offset."""
+    out = []
+    for cause in causes:
+        offsets = [value for value, _, _ in cause.sizes.values()]
+        halves = 0.5 * np.array(audit.step_a)
+        if cause.name == "sensor_offset" and len(offsets) == halves.size and halves.min() > 0.0:
+            ratio = np.array(offsets) / halves
+            if np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0):
+                step = {"step_a": (float(halves.max()) * 2.0, 0.0, "A")}
+                out.append(replace(cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()))
+                continue
+        out.append(cause)
+    return out
+
+
+def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[str]) -> list[Cause]:
     """Causes that leave no waveform: coarse converter steps, clipped and missing samples."""
     out = []
     step = max(audit.step_a, default=0.0)
-    if step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
+    is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
+    if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
         out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
     if audit.clipped:
         out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),

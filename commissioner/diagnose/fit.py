@@ -133,25 +133,6 @@ def _averaged(stacked: Array, good: NDArray[np.bool_], block: int) -> tuple[Arra
     return summed, good[:n].reshape(-1, block).all(axis=1)
 
 
-def chi2_of(model: Model, record: Record, layout: Layout, noise: Noise) -> float:
-    """Whitened squared residual plus the dictionary's prior."""
-    theta = model.theta
-    prior = float(theta @ layout.penalty(model.terms) @ theta)
-    return float(sum(segment_chi2(model, record, layout, noise))) + prior
-
-
-def segment_chi2(model: Model, record: Record, layout: Layout, noise: Noise) -> list[float]:
-    """Whitened squared residual of each segment."""
-
-    def of_segment(k: int) -> float:
-        segment = record.segments[k]
-        residual = segment.currents_a - predict(model, record, k, layout).currents_a
-        white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
-        return float(white @ white)
-
-    return each_segment(of_segment, record)
-
-
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:
     """Minimise |r - J d|^2 + damping |diag J'J d|^2 within bounds, from the normal equations."""
     scale = np.sqrt(np.diag(gram))
@@ -199,15 +180,15 @@ def fit(
             if promised < tolerance:
                 return Fit(model, normal, True, done)
             trial = model.moved(theta + step)
+            # the tangent costs little beside the trajectory: not worth looking at chi2 first
             with np.errstate(over="ignore", invalid="ignore"):
-                there_chi2 = chi2_of(trial, record, layout, noise)
-            if np.isfinite(there_chi2) and there_chi2 < normal.total_chi2:
+                there = normal_equations(trial, record, layout, trial.terms, noise)
+            if np.isfinite(there.total_gram).all() and there.total_chi2 < normal.total_chi2:
                 improved = True
                 break
             damping = max(10.0 * damping, 1e-4)
         if not improved:
             return Fit(model, normal, False, done)
-        there = normal_equations(trial, record, layout, trial.terms, noise)
         gained = normal.total_chi2 - there.total_chi2
         model, normal = trial, there
         damping = damping * 0.1 if gained > 0.5 * promised else damping * 3.0

@@ -74,12 +74,13 @@ def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, 
     """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M.
 
     `delay_s` of the current, and the half period by which it follows a held command, are taken out of the phases first.
+    Clipped samples count as they are: without them the lines would be further off.
     """
     segment = max(record.segments, key=lambda s: float(np.std(s.voltage_axis_v)))
     n = segment.count
     window = np.hanning(n)
     volts = np.fft.rfft(segment.voltage_axis_v * window)
-    amps = np.fft.rfft(np.where(segment.is_good, segment.axis_current_a, 0.0) * window)
+    amps = np.fft.rfft(segment.axis_current_a * window)
     frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
     strong = np.flatnonzero(np.abs(volts) > 0.02 * np.abs(volts[1:]).max())
     strong = strong[(strong > 0) & (np.abs(amps[strong]) > 0.0)]
@@ -101,7 +102,7 @@ def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, 
 
 
 CARRY = (
-    Term("", "flux_carried_over", "1", kinds.CARRY, 0, 0.01, 0.0, 1.0),
+    Term("", "flux_carried_over", "1", kinds.CARRY, 0, 0.01, -1.0, 1.0),
     Term("", "flux_carried_over_turned", "1", kinds.CARRY, 1, 0.01, -1.0, 1.0),
 )
 """Nuisances of the nominal model: how much of the rotor flux outlives the pause between two segments, and what a shaft

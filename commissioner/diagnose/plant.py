@@ -15,7 +15,7 @@ from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.tangent import sensitivities
 from commissioner.diagnose.terminals import sense
-from commissioner.diagnose.trajectory import propagate, propagate_linear
+from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying
 
 Array = NDArray[np.float64]
 
@@ -91,9 +91,18 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v} | (every & {kinds.STOP, kinds.BRANCH})
     if all(k in (kinds.INITIAL_FLUX, kinds.CARRY) or k >= kinds.FIRST_OF_SENSING for k in acting):
-        transition, gain, output, slope = _exact_step(model.nominal, period)
+        transition, gain, output, slope = exact_step(model.nominal, period)
         states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
         rotor = states[:-1, 2:4].T / model.nominal[3] - current
+        return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+    if not acting & kinds.NONLINEAR:
+        base, branches = machine[0], machine[-2:]
+        rate = _fastest(model, *branches) * period
+        steps = max(int(np.ceil(rate)), 1) * layout.substeps
+        factors = (drive[0], *drive[2:])
+        states, current, after, before, rotor = propagate_varying(
+            va, vb, *factors, period, steps, _taylor_order(rate / steps), base, *branches, start
+        )
         return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
         va, vb, *drive, period, _substeps(model, layout, segment), layout.crossing_substeps, *machine, start
@@ -101,7 +110,11 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
     return _Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
 
 
-def _exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
+def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
+    """Of the four-parameter machine, per axis, states (stator, rotor flux): (2, 2) transition over one period, (2,) gain of
+
+    the held voltage, (2,) current of the states, (3,) slope of the current by states and voltage.
+    """
     r_s, r_r, l_sigma, l_m = nominal
     output = np.array([1.0 / l_sigma, -1.0 / l_sigma])
     rate = np.array([[-r_s, r_s], [r_r, -r_r * (1.0 + l_sigma / l_m)]]) / l_sigma
@@ -148,7 +161,7 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
     aniso = [model.sum_kind(k, 2) for k in (
         kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)]
     r_s, r_r, l_sigma, l_m = model.nominal
-    nu = 0.5 + model.total(kinds.NU)
+    nu = float(np.clip(0.5 + model.total(kinds.NU), 0.0, 1.0))
     kappa = 1.0 + (0.5 + model.total(kinds.LEAK_SPLIT)) * layout.leak_ratio
     # an inductance that differs between directions, leakage half on the rotor side, tilts R_R and the other one, too
     coupled = layout.leak_ratio / (1.0 + layout.leak_ratio)
@@ -192,6 +205,22 @@ def _initial_state(model: Model, segment: Segment) -> Array:
             else:
                 state[term.index - 2] += value
     return state
+
+
+def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:
+    """Rate of the fastest mode, 1/s (an upper bound)."""
+    r_s, r_r, l_sigma, l_m = model.nominal
+    rate = (r_s + r_r) / l_sigma + r_r / l_m
+    return max(rate, *((1.0 + r_r * branch_gain) / branch_time)) if branch_time.size else rate
+
+
+def _taylor_order(rate_times_step: float) -> int:
+    """Terms after which the series of the fastest mode is within 1e-7."""
+    term, order = rate_times_step, 1
+    while term > 1e-7 or order < 4:
+        order += 1
+        term *= rate_times_step / order
+    return order
 
 
 def _substeps(model: Model, layout: Layout, segment: Segment) -> int:

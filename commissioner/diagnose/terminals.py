@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, FIFTH, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.resample import resample, resample_hermite
@@ -30,9 +30,9 @@ def sense(
     if capacitance.any() or any(t.kind == CABLE for t in listed):
         edges = _edges(to_phases @ segment.voltage_ab_v / period)
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
-    elapsed = segment.time_s - segment.time_s[0]
-    late = model.total(DELAY) + model.total(CLOCK) * 1e-6 * elapsed
-    late = np.broadcast_to(late, elapsed.shape)
+    clocks = CLOCK in {t.kind for t in (*model.terms, *listed)}
+    clock = 1e-6 * _clock(segment) if clocks else np.zeros((0, segment.count))
+    late = model.total(DELAY) + model.sum_kind(CLOCK, len(clock)) @ clock
     is_late = bool(np.any(late))
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
@@ -50,18 +50,18 @@ def sense(
         for row in rows:
             jacobian[row] = _low_pass(jacobian[row], lag, period)
     scale = layout.nonlinearity_scale_a
-    gain, even = model.sum_kind(GAIN, 3)[:phases, None], model.sum_kind(EVEN, 3)[:phases, None]
-    odd, fifth = model.sum_kind(ODD, 3)[:phases, None], model.sum_kind(FIFTH, 3)[:phases, None]
+    gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
-    distorted = current * (1.0 + gain + even * s + odd * s * s + fifth * s**4)
-    if rows and (gain.any() or even.any() or odd.any() or fifth.any()):
-        slope_of_sensor = 1.0 + gain + 2.0 * even * s + 3.0 * odd * s * s + 5.0 * fifth * s**4
+    reported = current + model.sum_kind(OFFSET, 3)[:phases, None]
+    if gain.any() or even.any() or odd.any():
+        reported += current * (gain + s * (even + s * odd))
+        slope_of_sensor = 1.0 + gain + s * (2.0 * even + 3.0 * s * odd)
         for row in rows:
             jacobian[row] *= slope_of_sensor
-    reported = distorted + model.sum_kind(OFFSET, 3)[:phases, None]
     ages = _ages(record, segment)
     drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
-    reported = reported + sum(d[:, None] * age for d, age in zip(drift, ages, strict=True))
+    if drift.any():
+        reported += drift.T @ np.stack(ages)
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == TONE and value and term.segment in (-1, segment.uid):
             reported[term.index % 3] += value * channels[:, term.index // 3]
@@ -72,7 +72,7 @@ def sense(
         elif term.kind == LAG:
             row[:] = -lag_slope
         elif term.kind == CLOCK:
-            row[:] = -slope * elapsed * 1e-6
+            row[:] = -slope * clock[term.index]
         elif term.kind == OFFSET:
             row[term.index] = 1.0
         elif term.kind == DRIFT:
@@ -83,8 +83,6 @@ def sense(
             row[term.index] = current[term.index] * s[term.index]
         elif term.kind == ODD:
             row[term.index] = current[term.index] * s[term.index] ** 2
-        elif term.kind == FIFTH:
-            row[term.index] = current[term.index] * s[term.index] ** 4
         elif term.kind == TONE:
             row[term.index % 3] = channels[:, term.index // 3]
         elif term.kind == CABLE:
@@ -100,6 +98,16 @@ def _ages(record: Record, segment: Segment) -> list[Array]:
     age = (segment.time_s - first) / 60.0
     settling = [max(float(last - first), 1e-3) / 60.0 / share for share in (4.0, 16.0)]
     return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
+
+
+def _clock(segment: Segment) -> Array:
+    """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
+
+    and fro within it (cosine and sine).
+    """
+    elapsed = segment.time_s - segment.time_s[0]
+    turn = 2.0 * np.pi / max(segment.count * segment.period_s, 1e-9)
+    return np.stack([elapsed, np.sin(turn * elapsed) / turn, (1.0 - np.cos(turn * elapsed)) / turn])
 
 
 def _edges(voltage_per_period: Array) -> list[Array]:

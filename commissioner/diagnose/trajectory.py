@@ -19,7 +19,7 @@ IEEE Trans. Ind. Appl. 25(6), 1989). In the same way kappa = 1 + x L_sigma/L_M c
 stator current (x = 0), with the rotor current (x = 1, the Gamma circuit) or with both.
 
 Classical fourth-order Runge-Kutta with the voltage held over the sample, in steps fine enough for the leg curve; a
-model without nonlinearity, branch or modulation is stepped exactly.
+model without nonlinearity is stepped by the Taylor series of its matrix exponential, the four-parameter one exactly.
 """
 
 from __future__ import annotations
@@ -266,3 +266,77 @@ def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, init
         states[samples, c] = s
         states[samples, 2 + c] = r
     return states, current, slope_after, slope_before
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
+    """(3)-(7) without nonlinear terms: d x/dt into k, terminal current into `current`; `a` resistances aa, ab, bb."""
+    gs, gm, g = base[2], base[3], base[5]
+    sa, sb = x[0] - x[2], x[1] - x[3]
+    ia = gs * ((1.0 + base[8]) * sa + base[9] * sb)
+    ib = gs * (base[9] * sa + (1.0 - base[8]) * sb)
+    shrink = 1.0 / (1.0 + g * base[0])
+    ta, tb = (ia + g * va) * shrink, (ib + g * vb) * shrink
+    current[0], current[1] = ta, tb
+    k[0] = va - a[0] * ta - a[1] * tb
+    k[1] = vb - a[1] * ta - a[2] * tb
+    ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) - ia
+    cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) - ib
+    for n in range(branch_gain.shape[0]):
+        ca -= branch_gain[n] * x[4 + 2 * n]
+        cb -= branch_gain[n] * x[5 + 2 * n]
+    wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
+    wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
+    k[2] = -wa - omega * x[3]
+    k[3] = -wb + omega * x[2]
+    for n in range(branch_gain.shape[0]):
+        k[4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
+        k[5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def propagate_varying(
+    voltage_a, voltage_b, voltage_factor, phase_factor, rotor_factor, omega_rad_per_s, period, steps, order,
+    base, branch_gain, branch_time, initial_state,
+):
+    """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms."""
+    samples = voltage_a.shape[0]
+    size = 4 + 2 * branch_gain.shape[0]
+    states = np.zeros((samples + 1, size))
+    current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
+    slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
+    x, k, k_next, a = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(3)
+    i_now, unused = np.zeros(2), np.zeros(2)
+    x[0:4] = initial_state
+    h = period / steps
+    gs, shrink = base[2], 1.0 / (1.0 + base[5] * base[0])
+    iaa, iab, ibb = gs * (1.0 + base[8]) * shrink, gs * base[9] * shrink, gs * (1.0 - base[8]) * shrink
+    last_a = last_b = 0.0
+    for t in range(samples):
+        va, vb = voltage_a[t] * voltage_factor[t], voltage_b[t] * voltage_factor[t]
+        ru, rv, rw = base[0] * phase_factor[t, 0], base[0] * phase_factor[t, 1], base[0] * phase_factor[t, 2]
+        a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
+        rr, omega = base[1] * rotor_factor[t], omega_rad_per_s[t]
+        states[t] = x
+        _rate(x, k, last_a, last_b, a, rr, omega, base, branch_gain, branch_time, i_now)
+        for c in range(2):
+            current[c, t] = i_now[c]
+            rotor_current[c, t] = -k[2 + c] / rr
+        ua, ub = k[0] - k[2], k[1] - k[3]
+        slope_before[0, t], slope_before[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
+        for step in range(steps):
+            _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, unused)
+            if step == 0:
+                ua, ub = k[0] - k[2], k[1] - k[3]
+                slope_after[0, t], slope_after[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
+            factor = h
+            for j in range(order):
+                for c in range(size):
+                    x[c] += factor * k[c]
+                if j + 1 < order:
+                    _rate(k, k_next, 0.0, 0.0, a, rr, omega, base, branch_gain, branch_time, unused)
+                    k, k_next = k_next, k
+                    factor *= h / (j + 2.0)
+        last_a, last_b = va, vb
+    states[samples] = x
+    return states, current, slope_after, slope_before, rotor_current

@@ -168,6 +168,13 @@ def _remanence(sizes: Numbers, values: Numbers, setting: Setting, model: Model) 
     return {"size": abs(flux), "angle_deg": float(np.degrees(np.angle(flux)))}
 
 
+def _clock(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    wander = values.get("wander_sin", 0.0)
+    if abs(wander) > abs(sizes["drift_ppm"]):
+        return {"size": -wander, "shape": "wandering"}
+    return {"size": -sizes["drift_ppm"]}
+
+
 TRANSLATED: dict[str, Translate] = {
     "dead_time": _legs(1.0), "device_drop": _legs(ROOT_AT_HALF), "dc_link_sag": _sag,
     "dc_link_ripple": _line("ripple"), "sampling_delay": _size("delay_us", 1e-6),
@@ -178,7 +185,7 @@ TRANSLATED: dict[str, Translate] = {
     "sensor_offset": _phases("offset"), "sensor_drift": _phases("drift"), "sensor_gain_mismatch": _phases("gain"),
     "sensor_nonlinearity": _sensor, "quantization": _size("step_a"),
     "clipping": lambda sizes, values, setting, model: {"size": 0.1, "limit_a": sizes["limit_a"]},
-    "lost_samples": _size("samples"), "mains_pickup": _line("mains"), "clock_drift": _size("drift_ppm", -1.0),
+    "lost_samples": _size("samples"), "mains_pickup": _line("mains"), "clock_drift": _clock,
     "shaft_motion": _size("speed_rad_per_s"),
     "inductance_anisotropy": _tensor("leakage", "magnetizing", ("leakage", "main")),
     "resistance_anisotropy": _tensor("stator", "rotor", ("phases", "cage"), 0.5),

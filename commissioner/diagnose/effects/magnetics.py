@@ -40,11 +40,16 @@ def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
         Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > 2 else -np.inf)
         for k in range(count)
     )
-    return (*curve, Term("magnetizing_saturation", "split", "1", kinds.NU, 0, 0.1, -0.5, 0.5))
+    return (*curve, _split("magnetizing_saturation"))
+
+
+def _split(effect_name: str) -> Term:
+    """Where between rotor (-0.5) and stator (+0.5) side of the leakage the iron's flux is taken."""
+    return Term(effect_name, "split", "1", kinds.NU, 0, 0.1, -0.5, 0.5)
 
 
 def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"coercive_current_a": (float(sum(values.values())), "A")}
+    return {"coercive_current_a": (float(sum(v for k, v in values.items() if k != "split")), "A")}
 
 
 @effect(
@@ -55,11 +60,15 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="repeat the lowest tone at several amplitudes",
 )
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
-    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k the stop operator of the iron flux with fixed radius r_k."""
-    radii = setting.layout.stop_radius_wb
-    return tuple(
-        Term("magnetic_hysteresis", f"loop_{k}", "A", kinds.STOP, k, 0.01, 0.0, np.inf) for k in range(radii.size)
+    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k the stop operator of the iron flux with fixed radius r_k.
+
+    `split` as with saturation.
+    """
+    loops = tuple(
+        Term("magnetic_hysteresis", f"loop_{k}", "A", kinds.STOP, k, 0.01, 0.0, np.inf)
+        for k in range(setting.layout.stop_radius_wb.size)
     )
+    return (*loops, _split("magnetic_hysteresis"))
 
 
 def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -167,7 +176,7 @@ def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def stator_heating(setting: Setting) -> tuple[Term, ...]:
     """R_x = R_s (1 + k integral i_x^2 / I_N^2 dt): relative rise per minute at rated current, k >= 0, each phase by its
 
-    own current, by the mean of the three, and with a leak of 20 s (a dictionary).
+    own current, by the mean of the three, with a leak of 20 s, and in proportion to time (a dictionary).
     """
     names = [n for n in setting.record.channel_names if n.startswith("heat_") and n.endswith("_u")]
     return tuple(
@@ -184,7 +193,10 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
     split_by="a DC-bias segment between two AC segments",
 )
 def rotor_heating(setting: Setting) -> tuple[Term, ...]:
-    """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current."""
+    """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current; or in proportion
+
+    to time.
+    """
     names = [n for n in setting.record.channel_names if n.startswith("rotor_heat")]
     return tuple(
         Term("rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
@@ -192,7 +204,16 @@ def rotor_heating(setting: Setting) -> tuple[Term, ...]:
 
 
 def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"speed_rad_per_s": (float(np.abs(list(values.values())).max(initial=0.0)), "rad/s")}
+    """Root mean square over the time in which the command would show it: without flux a speed leaves no trace."""
+    power, weight = 0.0, 0.0
+    for segment, channels in zip(setting.record.segments, setting.record.channels, strict=True):
+        shown = segment.voltage_axis_v**2
+        for name, value in values.items():
+            hat, _, uid = name.rpartition("_")
+            if uid == str(segment.uid):
+                mine = float(shown @ channels[:, setting.record.channel(hat)])
+                power, weight = power + mine * value**2, weight + mine
+    return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
 
 
 @effect(

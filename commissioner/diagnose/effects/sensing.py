@@ -182,7 +182,10 @@ def mains_pickup(setting: Setting) -> tuple[Term, ...]:
 
 
 def _clock_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"drift_ppm": (values.get("drift", 0.0), "ppm")}
+    wander = float(np.hypot(values.get("wander_cos", 0.0), values.get("wander_sin", 0.0)))
+    drift = values.get("drift", 0.0)
+    sizes = {"drift_ppm": (drift, "ppm"), "wander_ppm": (wander, "ppm")}
+    return sizes if abs(drift) >= wander else dict(reversed(sizes.items()))
 
 
 @effect(
@@ -192,8 +195,9 @@ def _clock_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="a longer segment",
 )
 def clock_drift(setting: Setting) -> tuple[Term, ...]:
-    """eps [ppm], from the start of each segment."""
-    return (Term("clock_drift", "drift", "ppm", CLOCK, 0, 0.01, -2e4, 2e4),)
+    """eps [ppm] from the start of each segment, and a rate that wanders."""
+    symbols = ("drift", "wander_cos", "wander_sin")
+    return tuple(Term("clock_drift", symbol, "ppm", CLOCK, k, 0.01, -2e4, 2e4) for k, symbol in enumerate(symbols))
 
 
 @effect(
