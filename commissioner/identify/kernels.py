@@ -31,13 +31,16 @@ LAST_VOLTAGE, LAST_EXTRA = 16, 17
 LOOP = 22  # the loss fed back through the predicted current: per parameter two filter states of y, two of u, (4, 4)
 ABSORBING = 18  # 1 while the unknown initial state is still being estimated
 REJECTED, COUNT, SQUARES = 19, 20, 21
-STATE_SIZE = 38
+DEVIATION = 38  # of the initial state, the offset and theta from those the observer runs with (`REVIEW`)
+STATE_SIZE = 45
 
 # Initial state first: dropping it then leaves the factor of the marginal covariance. Then the sensor's offset, then
 # theta.
 OFFSET, THETA, PARAMETERS = 2, 3, 7
 
-FAST, LYAPUNOV, FROZEN = 0, 1, 2
+FAST, LYAPUNOV, FROZEN, REVIEW = 0, 1, 2, 3
+"""`REVIEW`: the fast law's recursion along the trajectory of held parameters, a Gauss-Newton step. What it finds is left in
+the state at `DEVIATION`."""
 
 
 @njit(cache=True)
@@ -178,7 +181,9 @@ def advance(
     ff = np.zeros(PARAMETERS)
     k_gain = np.zeros(PARAMETERS)
     has_lost, has_extra = lost_v.size > 1, extra_a.size > 1
-    loop = state[LOOP:].reshape(4, 4)
+    loop = state[LOOP:DEVIATION].reshape(4, 4)
+    deviation = state[DEVIATION:]
+    recurses = law == FAST or law == REVIEW
     seen = np.zeros(4)  # d(current)/d(theta) with the loop closed
     slope_now, slope_next = 0.0, 0.0
 
@@ -205,7 +210,7 @@ def advance(
             e_last = e
             squares += e * e
 
-        if law == FAST:
+        if recurses:
             rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)
             rho = 0.0 if rho < 0.0 else (0.999 if rho > 0.999 else rho)
             r = c0 * (1.0 + rho) / (1.0 - rho) + noise_floor
@@ -226,6 +231,8 @@ def advance(
                     s += upper[i, j] * psi[i]
                 ff[j] = s
                 v[j] = diagonal[j] * s
+                if law == REVIEW:
+                    e -= psi[j] * deviation[j]
             alpha = r
             for j in range(first, PARAMETERS):
                 alpha_last = alpha
@@ -242,15 +249,19 @@ def advance(
             n1, n2 = t1 + k_gain[3] * step, t2 + k_gain[4] * step
             half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
             a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
-            if half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0:
-                t1, t2 = n1, n2
-                t3 += k_gain[5] * step
-                t4 += k_gain[6] * step
-                offset += k_gain[2] * step
-                if absorbing:
-                    s1, s2 = k_gain[0] * step, k_gain[1] * step
-                    z1 += d11 * s1 + d12 * s2
-                    z2 += d21 * s1 + d22 * s2
+            if law == REVIEW or (half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0):
+                if law == REVIEW:
+                    for j in range(first, PARAMETERS):
+                        deviation[j] += k_gain[j] * step
+                else:
+                    t1, t2 = n1, n2
+                    t3 += k_gain[5] * step
+                    t4 += k_gain[6] * step
+                    offset += k_gain[2] * step
+                    if absorbing:
+                        s1, s2 = k_gain[0] * step, k_gain[1] * step
+                        z1 += d11 * s1 + d12 * s2
+                        z2 += d21 * s1 + d22 * s2
                 alpha = r
                 for j in range(first, PARAMETERS):
                     alpha_last = alpha
@@ -316,7 +327,7 @@ def advance(
         x1, x2 = f1 * x1 + g1 * drive, f2 * x2 + g2 * drive
         py1, py2 = f1 * py1 + g1 * p, f2 * py2 + g2 * p
         pu1, pu2 = f1 * pu1 + g1 * q, f2 * pu2 + g2 * q
-        if has_lost and law == FAST:
+        if has_lost and recurses:
             gain = t3 * g1 + t4 * g2
             for j in range(4):
                 held = t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * loop[j, 2] + t4 * loop[j, 3]

@@ -214,11 +214,29 @@ class ParallelObserver:
         if not self._history or self.law != "fast" or self._is_known:
             return
         # The noise of the last pass includes the model's error, which the new pass starts without.
-        fresh = self._fresh(self.parameters, float(self._shell.state[kernels.NOISE]), around_start=True)
+        noise_a2 = float(self._shell.state[kernels.NOISE])
+        fresh = self._fresh(self.parameters, noise_a2, around_start=True)
+        # A recursion that starts wide runs through machines far away; sensitivities along the present one do not. Unknown
+        # initial states need the recursion, which sets them as it goes.
+        is_linearised = not any(piece.restarts for piece in self._history)
         for piece in self._history:
-            self._run(fresh, piece)
-        if np.all(np.isfinite(fresh.theta)) and self._is_machine(fresh.theta):
-            self._shell = fresh
+            self._run(fresh, piece, kernels.REVIEW if is_linearised else None)
+        if is_linearised:
+            fresh.theta += fresh.state[kernels.DEVIATION + kernels.OFFSET :][[1, 2, 3, 4, 0]]
+        if not (np.all(np.isfinite(fresh.theta)) and self._is_machine(fresh.theta)):
+            return
+        if is_linearised:
+            self._bring_up(fresh, noise_a2)
+        self._shell = fresh
+
+    def _bring_up(self, shell: _Shell, noise_a2: float) -> None:
+        """The shell's state at the end of the stored data, run with its parameters."""
+        held = self._fresh(self.parameters, noise_a2)
+        held.theta[:], held.state[:] = shell.theta, 0.0
+        for piece in self._history:
+            self._run(held, piece, kernels.FROZEN)
+        held.state[kernels.NOISE : kernels.LAST_ERROR + 1] = shell.state[kernels.NOISE : kernels.LAST_ERROR + 1]
+        shell.state[:], shell.machine[:] = held.state, held.machine
 
     @property
     def history(self) -> tuple[StoredBlock, ...]:
@@ -239,12 +257,13 @@ class ParallelObserver:
     def _is_machine(self, theta: Matrix) -> bool:
         return bool(kernels.machine_from_theta(theta, self._filter, self.sample_period_s, np.empty(4)))
 
-    def _run(self, shell: _Shell, piece: StoredBlock) -> tuple[Signal, Signal, Signal]:
+    def _run(self, shell: _Shell, piece: StoredBlock, law: int | None = None) -> tuple[Signal, Signal, Signal]:
         if piece.restarts or piece.begins_at_rest:
             _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
             self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
-        return self._kernel(shell, piece.voltage_v, piece.current_a, self._law if piece.adapts else kernels.FROZEN)
+        chosen = self._law if law is None else law
+        return self._kernel(shell, piece.voltage_v, piece.current_a, chosen if piece.adapts else kernels.FROZEN)
 
     def _kernel(self, shell: _Shell, voltage_v: Signal, current_a: Signal, law: int) -> tuple[Signal, Signal, Signal]:
         signals = tuple(np.empty_like(voltage_v) for _ in range(3))
@@ -329,6 +348,6 @@ def _restart(shell: _Shell, current_scale_a: float, is_at_rest: bool) -> None:
     shell.state[kernels.FREE], shell.state[kernels.FREE + 3] = 1.0, 1.0
     shell.state[kernels.LAST_VOLTAGE : kernels.ABSORBING] = 0.0
     shell.state[kernels.ABSORBING] = 0.0 if is_at_rest else 1.0
-    shell.state[kernels.LOOP :] = 0.0
+    shell.state[kernels.LOOP : kernels.DEVIATION + kernels.OFFSET] = 0.0
     shell.upper[:2, :] = np.eye(2, kernels.PARAMETERS)
     shell.diagonal[:2] = (4.0 * current_scale_a) ** 2
