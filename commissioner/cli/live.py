@@ -64,6 +64,13 @@ class LiveView:
                 tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)
                 what = "first look at the motor: " if record.is_look else ""
                 self._line(f"    {what}{record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
+            case told.BiasChosen():
+                self._close()
+                self._line(
+                    f"    then {record.seconds:.3g} s on a direct current of {record.bias_a:.3g} A"
+                    if record.seconds
+                    else "    no direct current beside tones: none worth its time fits under the limits"
+                )
             case told.EstimateUpdated():
                 self._progress(record)
             case told.GuardActed(flux_fraction=flux, current_fraction=current, scale=scale):

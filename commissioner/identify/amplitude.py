@@ -25,6 +25,7 @@ SURE_LOSS, KNOWN_LOSS = 0.8, 0.97
 """Share of the inverter's loss that is sure to be taken: from before, and once current has flowed."""
 SMALL_RAISE, CURRENT_STEP = 1.25, 0.15
 """While the estimates are unsure: largest ratio of two amplitudes, and what a raise may add of the permitted current."""
+GROWTH = 3.0
 STRIDE, HALVINGS = 4, 7
 """Periods per step of a simulated test; halvings in the search for a scale."""
 
@@ -95,19 +96,21 @@ class Amplitude:
         return TARGET * self.limit_wb / max(float(np.sum(flux * amplitude)), 1e-12)
 
     def by_current(
-        self, worst: InverseGamma, estimate: BlockEstimate, time_s: float, scale: float, wanted: float
+        self, worst: InverseGamma, estimate: BlockEstimate, time_s: float, scale: float, wanted: float, seen_a: float
     ) -> float:
         """The largest scale up to the wanted one, at least the present, that keeps the simulated current of what is left
-        of the test below what is aimed at. `time_s` is from the excitation's start."""
+        of the test below what is aimed at and below `GROWTH` times the largest one seen: a machine fitted to a small
+        current is no promise of a large one. `time_s` is from the excitation's start."""
         if wanted <= scale or math.isinf(self.current_a):
             return wanted
         step_s = STRIDE * self.sample_period_s
         ahead_s = max(self.forecast.excitation.duration_s - time_s, 2.0 * step_s)
         ahead = time_s + np.arange(0.0, ahead_s, step_s)
         start = (float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1]), 0.0)
+        most_a = min(self.current_a, max(GROWTH * seen_a, CURRENT_STEP * self.current_a))
 
         def is_permitted(tried: float) -> bool:
-            return self.forecast.peaks(worst, ahead, tried, start, KNOWN_LOSS)[1] < self.current_a
+            return self.forecast.peaks(worst, ahead, tried, start, KNOWN_LOSS)[1] < most_a
 
         return _largest(scale, wanted, is_permitted)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 from typing import Any
 
 from commissioner.errors import DataRefused
@@ -13,10 +14,11 @@ from commissioner.identify.flux import FluxAdvice
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from commissioner.procedure.assembly import assemble
-from commissioner.procedure.energised import BIAS_RAMP_PER_S, measure_offset, next_block, period_s, ramp_down
+from commissioner.procedure.energised import BIAS_RAMP_PER_S, OFFSET_S, measure_offset, next_block, period_s, ramp_down
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
 from commissioner.procedure.states import Event
 from commissioner.procedure.steps import Findings, Job, Step
+from commissioner.procedure.under_bias import bias_seconds, under_bias
 from commissioner.procedure.under_test import UnderTest, plate_machine, warm_up
 from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetScale, Tell
 
@@ -27,6 +29,8 @@ LOOK_STD = 0.15
 """A value of the first look counts where its relative standard error is below this."""
 AXIS_SECONDS = 12.0
 """Energised on one axis at most, staircase and all, for rotor time constants up to 0.5 s."""
+SHORTEST = 0.6
+"""Of its planned time: what a first test keeps where look and staircase have taken the rest of the axis' time."""
 FIRST_LOOK = 0.3
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
@@ -38,9 +42,11 @@ def excite(job: Job, findings: Findings) -> Step:
     is_first = findings.tests_done == 0
     if is_first:
         look_s = FIRST_LOOK * seconds
-        yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s)
+        yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
         yield from _look(job, findings)
-    longest_s = max(seconds, AXIS_SECONDS * job.stretch - findings.axis_s)
+    left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - bias_seconds(job) - 1.0 / job.scale_ramp_per_s
+    seconds = min(seconds, max(left_s, SHORTEST * seconds))
+    longest_s = max(seconds, left_s)
     chosen = _design(job, findings, seconds)
     yield from _test(job, findings, axis_deg, chosen, seconds, longest_s)
     findings.excitations.append(chosen)
@@ -96,7 +102,14 @@ def _believable(look: Identification, otherwise: InverseGamma, box: ParameterBox
 
 
 def _test(
-    job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float, longest_s: float
+    job: Job,
+    findings: Findings,
+    axis_deg: float,
+    chosen: DesignedExcitation,
+    seconds: float,
+    longest_s: float,
+    *,
+    is_look: bool = False,
 ) -> Generator[Command, Any, None]:
     """One energised multitone session: raise the amplitude as the guard permits, end when the time is up and settled.
 
@@ -105,7 +118,7 @@ def _test(
     tones = tuple((t.amplitude_v, t.frequency_hz, t.phase_rad) for t in chosen.excitation.tones)
     yield Tell(
         ExcitationChosen(
-            axis_deg, tones, seconds, chosen.peak_flux_wb, chosen.peak_current_a,
+            axis_deg, is_look, tones, seconds, chosen.peak_flux_wb, chosen.peak_current_a,
             dict(zip(("R_s", "R_R", "L_sigma", "L_M"), (100 * s for s in chosen.relative_std), strict=True)),
         )
     )  # fmt: skip
@@ -132,7 +145,10 @@ def _test(
             yield SetScale(wanted)
         if under_test.is_time_to_tell():
             yield Tell(under_test.update(reading))
+    finished = under_test.finished(is_look=is_look)
+    if not is_look:
+        yield from under_bias(job, findings, STEP, axis_deg, chosen.excitation, under_test)
     yield SetScale(0.0)
     yield from ramp_down(findings, STEP, axis_deg, 1.0 / job.scale_ramp_per_s)
     yield Disarm("test done")
-    yield Tell(under_test.finished())
+    yield Tell(replace(finished, energised_s=under_test.time_s, peak_flux_fraction=under_test.peak_fraction))

@@ -40,6 +40,8 @@ class ChecksJudged:
 
 @dataclass(frozen=True)
 class StaircaseFitted:
+    """Start values for the fit of all samples together: what the levels alone say, the inverter's knee taken by form."""
+
     axis_deg: float
     stator_resistance_ohm: float
     stator_resistance_std_ohm: float
@@ -59,14 +61,29 @@ class FirstLook:
 
 @dataclass(frozen=True)
 class ExcitationChosen:
-    """Amplitudes in volts along the axis at scale 1; `predicted` in per cent relative standard error."""
+    """Amplitudes in volts along the axis at scale 1; `predicted` in per cent relative standard error. `is_look`: the short
+    test of a motor of which only the plate is known."""
 
     axis_deg: float
+    is_look: bool
     tones: tuple[tuple[float, float, float], ...]
     seconds: float
     peak_flux_wb: float
     peak_current_a: float
     predicted_std_percent: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class BiasChosen:
+    """The DC bias a test ends with: voltage, current, share of the tones' amplitude, peak flux of the limit. `seconds` 0:
+    left out, because none worth its time fits under flux, current and voltage limits, or the motor is not known yet."""
+
+    axis_deg: float
+    seconds: float
+    bias_v: float
+    bias_a: float
+    scale: float
+    peak_flux_fraction: float
 
 
 @dataclass(frozen=True)
@@ -105,6 +122,7 @@ class GuardActed:
 @dataclass(frozen=True)
 class AxisFinished:
     axis_deg: float
+    is_look: bool
     energised_s: float
     has_settled: bool
     why: str

@@ -157,9 +157,10 @@ class Findings:
             look = self.look
             if look.std[0] < 0.05 * look.parameters.stator_resistance_ohm:
                 return look.parameters.stator_resistance_ohm
+        box = prior(job.nameplate)
         if self.staircases:
-            return self.staircases[-1].stator_resistance.value
-        return prior(job.nameplate).typical.stator_resistance_ohm
+            return max(self.staircases[-1].stator_resistance.value, box.lower.stator_resistance_ohm)
+        return box.typical.stator_resistance_ohm
 
 
 def connect(job: Job, findings: Findings) -> Step:

@@ -57,25 +57,25 @@ class UnderTest:
         self.scale = first
         self._wakes_a = min(KNEES * inverter.knee_a, EXCITED * chosen.peak_current_a)
         self._is_awake = False
-        self._offset_a = 0.0
+        self.offset_a = 0.0
         self._present_scale = 0.0
         self.time_s = 0.0
         self._told_s = 0.0
         self._lost = 0
-        self._peak_fraction = 0.0
+        self.peak_fraction = 0.0
         self._history: list[tuple[float, BlockEstimate]] = []
         self._estimate: BlockEstimate | None = None
-        self._limit_wb = findings.flux_limit_wb = self._guard.limit_wb
+        self.limit_wb = findings.flux_limit_wb = self._guard.limit_wb
 
     def begin(self, offset_a: float) -> None:
         """The current sensors' offset along the axis, measured before the first amplitude."""
-        self._offset_a = offset_a
+        self.offset_a = offset_a
 
     def take(self, block: SampleBlock) -> FluxReading:
         """Observer first, guard second, on the same block."""
         if self._estimate is None:
             self._guard.began_s = block.first_index * block.sample_period_s
-        current = along_axis(block) - self._offset_a
+        current = along_axis(block) - self.offset_a
         self._is_awake |= float(np.max(np.abs(current))) >= self._wakes_a
         self._estimate = self._observer.advance(block.voltage_axis_v, current, block.lost_before, adapts=self._is_awake)
         taken_s = duration_s(block)
@@ -86,16 +86,27 @@ class UnderTest:
             block.voltage_axis_v, current, self._estimate, self._present_scale, block.lost_before
         )
         self._lost += block.lost_before
-        self._peak_fraction = max(self._peak_fraction, self._measured_fraction(reading))
-        self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self._peak_fraction)
+        self.peak_fraction = max(self.peak_fraction, self._measured_fraction(reading))
+        self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self.peak_fraction)
         return reading
+
+    def take_biased(self, block: SampleBlock, reached_wb: float, predicted_wb: float) -> FluxReading:
+        """A block of the biased stretch, which the observer does not see: flux as the bias' own guard tells it."""
+        assert self._estimate is not None
+        self.time_s += duration_s(block)
+        self._lost += block.lost_before
+        self.peak_fraction = max(self.peak_fraction, reached_wb / self.limit_wb)
+        self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self.peak_fraction)
+        return FluxReading(
+            reached_wb, reached_wb, predicted_wb, 0.0, predicted_wb / self.limit_wb, 0.0, FluxAdvice.HOLD, self.scale
+        )
 
     def answer(self, reading: FluxReading) -> float | None:
         """The amplitude to ask for now, or None to leave it. Raises Aborted where the guard says so."""
         if reading.advice is FluxAdvice.ABORT:
             raise Aborted(
                 "the flux reached its limit and kept rising", step=f"multitone test, axis {self._axis_deg:g} deg",
-                value=reading.fraction * self._limit_wb, limit=self._limit_wb,
+                value=reading.fraction * self.limit_wb, limit=self.limit_wb,
                 remedy="check rated voltage, frequency and connection of the plate; lower limits.flux_fraction",
             )  # fmt: skip
         is_new = reading.advice is not FluxAdvice.HOLD and abs(reading.permitted_scale - self.scale) > 1e-3
@@ -111,6 +122,11 @@ class UnderTest:
             return True
         return self.time_s >= self._seconds and self._settling().has_settled
 
+    @property
+    def rotor_flux_wb(self) -> float:
+        """At the last sample, as the observer sees it."""
+        return float(self._estimate.rotor_flux_wb[-1]) if self._estimate is not None else 0.0
+
     def is_time_to_tell(self) -> bool:
         return self.time_s - self._told_s >= TELL_EVERY_S
 
@@ -122,18 +138,19 @@ class UnderTest:
             axis_deg=self._axis_deg, time_s=self.time_s, planned_s=self._seconds,
             parameters=self._estimate.parameters.as_tuple(), std=self._estimate.std, scale=self._present_scale,
             flux_fraction=reading.fraction,
-            agreed_flux_fraction=min(reading.observer_wb, reading.model_free_wb) / self._limit_wb, observer_flux_wb=reading.observer_wb,
+            agreed_flux_fraction=min(reading.observer_wb, reading.model_free_wb) / self.limit_wb, observer_flux_wb=reading.observer_wb,
             model_free_flux_wb=reading.model_free_wb, residual_rms_a=self._estimate.residual_rms_a,
         )  # fmt: skip
 
-    def finished(self) -> AxisFinished:
+    def finished(self, *, is_look: bool) -> AxisFinished:
         """The verdict on this session. Where no batch fit has measured the motor yet, a settled estimate counts."""
         settling = self._settling()
         if settling.has_settled and self._estimate is not None and not self._findings.is_measured:
             self._findings.estimate, self._findings.is_measured = self._estimate.parameters, True
         return AxisFinished(
-            self._axis_deg, self.time_s, settling.has_settled, settling.reason, self._peak_fraction, self._lost
-        )
+            self._axis_deg, is_look, self.time_s, settling.has_settled, settling.reason, self.peak_fraction,
+            self._lost,
+        )  # fmt: skip
 
     def _settling(self) -> Settling:
         limits = self._job.plan.acceptance
@@ -145,7 +162,7 @@ class UnderTest:
         return settled(self._history, 0.2 * self._seconds, (r_s, r_r, l_s, l_m))
 
     def _measured_fraction(self, reading: FluxReading) -> float:
-        return max(reading.observer_wb, reading.model_free_wb) / self._limit_wb
+        return max(reading.observer_wb, reading.model_free_wb) / self.limit_wb
 
 
 def plate_machine(job: Job, findings: Findings) -> InverseGamma:

@@ -5,11 +5,13 @@ to saturate between 0.7 and 1.3 of rated flux, an ideal inverter or one that los
 DC voltage that nobody asked for, a drive that trips at 1.0 ... 1.4 of the motor's rated peak, a link of 5-100 ms, and the
 amplitude following the guard's advice. What is known of the motor comes from the plate alone, is wrong, or was measured
 before; of resistance and inverter, what a DC staircase says: their sum at its top current, and where the inverter loses
-several times R_s I, up to a fifth of its loss taken for resistance.
+several times R_s I, up to a fifth of its loss taken for resistance. A motor that was measured also gets the DC bias the
+product ends a test with, from levels that are 3 % off.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,22 +20,25 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from commissioner.identify.bias import CUT_ABOVE, BiasGuard, plan_bias
 from commissioner.identify.compensation import NOTHING, Compensation
 from commissioner.identify.coordinates import PRIOR_LOG_STD
 from commissioner.identify.excitation import Excitation, ExcitationLimits, design
 from commissioner.identify.flux import FluxAdvice, FluxGuard
 from commissioner.identify.observer import ParallelObserver
-from commissioner.identify.resistance import IDEAL_INVERTER, InverterError, StaircaseLimits, staircase
+from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, StaircaseLimits, staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.procedure.steps import BELOW_TRIP
+from commissioner.procedure.under_bias import SECONDS as BIAS_S
 from commissioner.procedure.under_test import KNOWN_LOG_STD
 from tests.support.standstill import saturating_block, usable_motors
 
 PERIOD_S = 2e-4
 FLUX_FRACTION, CURRENT_FRACTION, TRIP_FRACTION = 0.9, 1.0, 1.4  # as in config/procedure.toml
 RAMP_PER_S = 5.0
+BIAS_RAMP_V_PER_S = 4.0 * 100.0
 FIRST_SCALE = 0.05
 NOISE = 0.005
 MOTORS = list(usable_motors())
@@ -90,7 +95,7 @@ def _known(
     taken = rng.uniform(-0.03, 0.03)
     if not is_measured and truth.plateau_v:
         taken = rng.uniform(-0.05, 0.2) * min(1.0, 0.5 * truth.plateau_v / (resistance * top_a))
-        resistance += 4.0 / 3.0 * taken * truth.plateau_v / top_a
+        resistance = max(resistance + 4.0 / 3.0 * taken * truth.plateau_v / top_a, 0.5 * resistance)
     if not truth.plateau_v:
         return resistance, IDEAL_INVERTER
     grid = np.linspace(0.0, span_a, 400)
@@ -135,7 +140,10 @@ def run_case(seed: int, seconds: float = 6.0) -> Outcome:
     if knowledge == "measured":
         first = guard.begin_known(start, log_std, RAMP_PER_S)
     played = _Played(truth, axis_deg, chosen.excitation, first)
-    aborted = _follow(played, guard, observer, rng, seconds)
+    aborted, rotor_wb = _follow(played, guard, observer, rng, seconds)
+    if knowledge == "measured" and not aborted and played.peak_a <= trip_a:
+        limits = ExcitationLimits(limit_wb, test_a, volts)
+        _bias(played, guard, start, limits, _levels(rng, truth, top_a, axis_deg), rotor_wb, seconds)
     begin = f"{knowledge}{', inverter' if has_inverter else ''}"
     return Outcome(
         seed, motor.name, played.peak_wb / limit_wb, played.peak_a / trip_a, aborted, played.scale, latency, begin
@@ -149,6 +157,7 @@ class _Played:
         self._truth, self._excitation, self._state = truth, excitation, np.zeros(2)
         self._cosines = np.array(phase_cosines(axis_deg))
         self.wanted, self.scale, self.peak_wb, self.peak_a = first_scale, 0.0, 0.0, 0.0
+        self.wanted_bias_v, self.bias_v = 0.0, 0.0
 
     def play(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """(voltage, current) of the samples from `first` on."""
@@ -156,8 +165,12 @@ class _Played:
         change = np.clip(self.wanted - self.scale, -step * count, step * count)
         ramp = self.scale + np.sign(change) * np.minimum(np.arange(1, count + 1) * step, abs(change))
         self.scale = float(ramp[-1])
+        step = BIAS_RAMP_V_PER_S * PERIOD_S
+        change = np.clip(self.wanted_bias_v - self.bias_v, -step * count, step * count)
+        bias = self.bias_v + np.sign(change) * np.minimum(np.arange(1, count + 1) * step, abs(change))
+        self.bias_v = float(bias[-1])
         time_s = (first + np.arange(count, dtype=np.float64)) * PERIOD_S
-        voltage = self._excitation.voltage_v(time_s, ramp)
+        voltage = self._excitation.voltage_v(time_s, ramp) + bias
         current, flux, t = np.empty(count), np.empty(count), self._truth
         saturating_block(
             voltage + t.bias_v, PERIOD_S, self._state, t.machine, t.plateau_v, t.knee_a, self._cosines, current, flux
@@ -169,12 +182,12 @@ class _Played:
 
 def _follow(
     played: _Played, guard: FluxGuard, observer: ParallelObserver, rng: np.random.Generator, seconds: float
-) -> bool:
-    """Let the amplitude follow the guard's advice, one latency late; whether it said to de-energise. Ends where the drive
-    would."""
+) -> tuple[bool, float]:
+    """Let the amplitude follow the guard's advice, one latency late: whether it said to de-energise, and the rotor flux seen
+    last. Ends where the drive would."""
     block = max(50, round(0.5 * guard.latency_s / PERIOD_S))
     pending: list[tuple[int, float]] = []
-    aborted = False
+    aborted, rotor_wb = False, 0.0
     for first in range(0, round(seconds / PERIOD_S), block):
         while pending and pending[0][0] <= first:
             played.wanted = pending.pop(0)[1]
@@ -184,7 +197,9 @@ def _follow(
         if aborted:
             continue
         measured = current + NOISE * observer.current_scale_a * rng.standard_normal(block)
-        reading = guard.advance(voltage, measured, observer.advance(voltage, measured), played.scale)
+        estimate = observer.advance(voltage, measured)
+        rotor_wb = float(estimate.rotor_flux_wb[-1])
+        reading = guard.advance(voltage, measured, estimate, played.scale)
         due = first + block + round(guard.latency_s / PERIOD_S)
         is_steady = abs(played.scale - played.wanted) < 1e-6
         if reading.advice is FluxAdvice.ABORT:
@@ -192,7 +207,52 @@ def _follow(
             pending.append((due, 0.0))
         elif reading.advice is FluxAdvice.BACK_OFF or (reading.advice is FluxAdvice.RAISE and is_steady):
             pending.append((due, min(1.0, reading.permitted_scale)))
-    return aborted
+    return aborted, rotor_wb
+
+
+def _levels(rng: np.random.Generator, truth: Hidden, top_a: float, axis_deg: float) -> list[DcLevel]:
+    """A staircase's settled levels."""
+    currents = top_a * np.array([1.0, 0.6, 0.3])
+    cosines = np.array(phase_cosines(axis_deg))
+    lost = [
+        2.0 / 3.0 * float(np.sum(cosines * truth.plateau_v * np.tanh(i * cosines / truth.knee_a))) for i in currents
+    ]
+    held = currents * rng.uniform(0.97, 1.03)
+    return [
+        DcLevel(float(truth.machine[0] * i + f), float(h), 0.0) for i, f, h in zip(currents, lost, held, strict=True)
+    ]
+
+
+def _bias(
+    played: _Played,
+    guard: FluxGuard,
+    machine: InverseGamma,
+    limits: ExcitationLimits,
+    levels: Sequence[DcLevel],
+    rotor_wb: float,
+    began_s: float,
+) -> None:
+    """The stretch on a DC bias, as `procedure.under_bias` plays it, commands one latency late."""
+    plan = plan_bias(machine, guard.excitation, limits, levels, PERIOD_S)
+    if plan is None:
+        return
+    block = max(50, round(0.5 * guard.latency_s / PERIOD_S))
+    watch = BiasGuard(
+        machine, limits.flux_wb, guard.latency_s, guard.excitation, plan.scale, plan.voltage_v, PERIOD_S, guard.inverter,
+        guard.axis_deg, rotor_wb,
+    )  # fmt: skip
+    played.wanted = plan.scale
+    first, cut_at = round(began_s / PERIOD_S), math.inf
+    last = first + round(BIAS_S * max(1.0, 2.0 * machine.rotor_time_constant_s) / PERIOD_S)
+    while first < last:
+        if first >= cut_at:
+            played.wanted, played.wanted_bias_v = 0.0, 0.0
+        elif abs(played.scale - plan.scale) < 1e-6:
+            played.wanted_bias_v = plan.voltage_v
+        _, current = played.play(first, block)
+        first += block
+        if watch.advance(current, first * PERIOD_S)[1] > CUT_ABOVE * limits.flux_wb:
+            cut_at = min(cut_at, first + round(guard.latency_s / PERIOD_S))
 
 
 def _outcomes(seeds: Sequence[int], processes: int) -> Iterator[Outcome]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import DriveLimits, judge_drive
+from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, judge_drive
 from commissioner.records import DriveIdentity, DriveStatus
 
 PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
@@ -74,8 +74,9 @@ def test_a_link_that_is_still_charging_is_not_steady():
 
 
 def test_a_drive_too_small_for_the_test_current_fails():
-    assert _failed(test_current=7.0 * math.sqrt(2) + 0.01) == ["drive rated for the test current"]
-    assert _failed(test_current=7.0 * math.sqrt(2) - 0.01) == []
+    smallest_a = 7.0 * math.sqrt(2) / SMALLEST_DRIVE
+    assert _failed(test_current=smallest_a - 0.01) == []
+    assert _failed(test_current=smallest_a + 0.01) == ["drive rated for the test current"]
 
 
 def test_a_drive_set_up_for_another_motor_fails_and_an_empty_plate_does_not():

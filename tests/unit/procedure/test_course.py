@@ -10,15 +10,17 @@ from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import (
     AxisFinished,
+    BiasChosen,
     EstimateUpdated,
     ExcitationChosen,
     StaircaseFitted,
     StateEntered,
     VerdictReached,
 )
+from commissioner.procedure.under_bias import SECONDS
 from commissioner.safety import commands as ask
 from commissioner.settings import load_motor, load_procedure
-from tests.support.scripted_drive import INTERLOCKS, Machine, ScriptedDrive
+from tests.support.scripted_drive import BLOCK, INTERLOCKS, PERIOD_S, Machine, ScriptedDrive
 
 NAMES = {
     "stator_resistance": "stator_resistance_ohm", "rotor_resistance": "rotor_resistance_ohm",
@@ -96,6 +98,20 @@ def test_each_axis_stays_within_twelve_seconds_of_energised_time(good_run):
     assert drive.energised_s / len(job.plan.tests_deg) <= 12.0  # with the first look, which is made once
     designed = [e for e in _told(drive, ExcitationChosen) if e.seconds > 2.0]
     assert all(len(e.tones) >= 4 for e in designed)
+
+
+def test_each_test_ends_on_a_dc_bias_that_comes_after_the_tones_have_gone_down(good_run):
+    _, drive, _, job = good_run
+    biases = _told(drive, BiasChosen)
+    assert [b.axis_deg for b in biases] == [0.0, 60.0, 0.0]
+    for bias in biases:
+        assert bias.seconds == SECONDS
+        assert 0.5 < bias.peak_flux_fraction < 0.9
+        lowered = next(k for k, c in enumerate(drive.sent) if isinstance(c, ask.SetScale) and c.scale == bias.scale)
+        following = drive.sent[lowered:]
+        at = next(k for k, c in enumerate(following) if isinstance(c, ask.SetBias) and c.bias_v == bias.bias_v)
+        fetched = sum(isinstance(c, ask.Fetch) for c in following[:at])
+        assert fetched * BLOCK * PERIOD_S >= 1.0 / job.scale_ramp_per_s - PERIOD_S
 
 
 def test_estimates_are_told_ten_times_a_second_and_settle(good_run):
