@@ -24,9 +24,9 @@ def diagnose(files: Sequence[Path], motor: str | None = None, out: Path | None =
     With `out`, writes `report.html`, `model.json` and `diagnosis.json` there. Exit code 3 where the data cannot carry
     an answer.
     """
-    from commissioner.recordings.table import read_table
+    from commissioner.recordings.importers import contract_table
 
-    tables = [read_table(Path(path)) for path in files]
+    tables = [contract_table(Path(path)) for path in files]
     from commissioner.diagnose.points import is_points_table
 
     if all(is_points_table(list(t.columns)) and "voltage_axis_v" not in t.columns for t in tables):

@@ -80,9 +80,10 @@ def _recording(files: Sequence[Path]) -> StandstillRecording:
 
 
 def _read(path: Path) -> StandstillRecording:
-    from commissioner.recordings.table import read_table, to_standstill
+    from commissioner.recordings.importers import contract_table
+    from commissioner.recordings.table import to_standstill
 
-    return to_standstill(read_table(path))
+    return to_standstill(contract_table(path))
 
 
 def _nameplate(motor: str | None) -> Nameplate | None:

@@ -2,45 +2,54 @@
 
 Oscilloscope and logger CSV: any of comma, semicolon, tab; decimal commas; preface lines; a row of units; column names such
 as `Ia`, `i_L1`, `Strom U`, `CH1 (mA)`. MATLAB v5: vectors or columns of a matrix under such names, also inside structures.
-TDMS, MDF4 and COMTRADE are named and refused: export them as CSV or Parquet.
+TDMS, MDF 4 and COMTRADE: channels under such names or the contract's own, by their units.
 """
 
 from __future__ import annotations
 
-import csv
 import re
-import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.recordings import matlab
-from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_bytes
-from commissioner.recordings.table import Table, read_table, to_running
+from commissioner.recordings import comtrade, matlab, mdf4, tdms
+from commissioner.recordings.foreign_csv import parse_csv, read_text
+from commissioner.recordings.table import CONTRACT_COLUMNS, Table, read_table, to_running
+from commissioner.recordings.units import IN_NAME, scale_of, unit_in
 from commissioner.records import RunningRecording, Signal
 
-FOREIGN = {
-    ".tdms": "TDMS",
-    ".mf4": "MDF4",
-    ".mdf": "MDF",
-    ".cfg": "COMTRADE",
-    ".dat": "COMTRADE",
-    ".cff": "COMTRADE",
-    ".xlsx": "Excel",
-    ".xls": "Excel",
+_BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str]]]] = {
+    ".mat": lambda path: (matlab.vectors(path), {}),
+    ".tdms": tdms.channels,
+    ".mf4": lambda path: (mdf4.channels(path), {}),
+    ".cfg": comtrade.channels,
+    ".dat": comtrade.channels,
+    ".cff": comtrade.channels,
 }
-MAX_PREFACE_LINES = 200
-SCALE = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
-UNIT = re.compile(r"^[\[(]?\s*(n|u|µ|μ|m|k|M)?(s|sec|a|v|rad/s|1/min|rpm|hz)\s*[\])]?$", re.IGNORECASE)
-IN_NAME = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]\s*$|_(ms|us|s|mA|A|mV|V|kV)$")
+NOT_READ = {".mdf": "MDF 3", ".xlsx": "Excel", ".xls": "Excel"}
 PHASES = {"a": "u", "b": "v", "c": "w", "1": "u", "2": "v", "3": "w", "u": "u", "v": "v", "w": "w", "r": "u", "t": "w"}
 
 
 def read_running(path: Path) -> RunningRecording:
     """The recording in `path`, whatever its format; DataRefused names the column that could not be found."""
     return to_running(import_table(path))
+
+
+def contract_table(path: Path) -> Table:
+    """The table of a file whose columns or channels bear the contract's names, in any format that is read."""
+    reader = _BINARY.get(path.suffix.lower())
+    if reader is None or not path.is_file():
+        return read_table(path)
+    columns, metadata = reader(path)
+    table = _ours(columns, metadata, str(path))
+    if table is None:
+        raise DataRefused(
+            f"{path}: its channels do not bear the contract's names", step="recognise columns", value=_some(columns),
+            limit="time_s, segment, axis_deg, voltage_axis_v, current_u_a, current_v_a", remedy="rename the channels",
+        )  # fmt: skip
+    return table
 
 
 def import_table(path: Path) -> Table:
@@ -54,16 +63,17 @@ def import_table(path: Path) -> Table:
             remedy="check the path",
         )
     suffix = path.suffix.lower()
-    if suffix in FOREIGN:
+    if suffix in NOT_READ:
         raise DataRefused(
-            f"{path}: {FOREIGN[suffix]} files are not read",
+            f"{path}: {NOT_READ[suffix]} files are not read",
             step="read recording",
             value=suffix,
-            limit="CSV, CSV.gz, Parquet, MATLAB v5",
+            limit="CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4, COMTRADE",
             remedy="export the recording as CSV or Parquet",
         )
-    if suffix == ".mat":
-        return recognise(matlab.vectors(path), {}, str(path))
+    if suffix in _BINARY:
+        columns, metadata = _BINARY[suffix](path)
+        return _ours(columns, metadata, str(path)) or recognise(_in_si(columns), metadata, str(path))
     try:
         table = read_table(path)
     except DataRefused as refusal:
@@ -76,138 +86,33 @@ def import_table(path: Path) -> Table:
         return _foreign_csv(path, refusal)
 
 
+def _ours(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], source: str) -> Table | None:
+    """The columns as they stand, where their names are the contract's."""
+    bare = {name.rpartition(".")[2].split(" [")[0]: values for name, values in columns.items()}
+    named = {name: values for name, values in bare.items() if name in CONTRACT_COLUMNS}
+    sizes = {values.size for values in named.values()}
+    if len(sizes) != 1 or not any(name.startswith("current_") for name in named):
+        return None
+    period = metadata.get("sample_period_s")
+    if "time_s" not in named and isinstance(period, float):
+        named["time_s"] = np.arange(sizes.pop(), dtype=np.float64) * period
+    return Table(named, metadata, source) if "time_s" in named else None
+
+
+def _in_si(columns: Mapping[str, Signal]) -> dict[str, Signal]:
+    """Each channel by the unit in its name."""
+    return {name: scale_of(unit_in(name)) * values for name, values in columns.items()}
+
+
 def _foreign_csv(path: Path, refusal: DataRefused) -> Table:
     """The file read as somebody else's CSV; where that fails too, what was wrong with it as a table stands."""
     if path.suffix.lower() == ".parquet":
         raise refusal
     try:
-        columns, metadata = parse_csv(_text(path), str(path))
+        columns, metadata = parse_csv(read_text(path), str(path))
     except DataRefused:
         raise refusal from None
     return recognise(columns, metadata, str(path))
-
-
-def _text(path: Path) -> str:
-    try:
-        data = bounded_bytes(path, MAX_FOREIGN_BYTES)
-    except (OSError, EOFError, zlib.error) as error:
-        raise _unreadable(path, str(error)) from error
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
-        try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    raise _unreadable(path, "the text encoding is not known")
-
-
-def parse_csv(text: str, source: str) -> tuple[dict[str, Signal], dict[str, float | str]]:
-    """Columns by their header (with the unit row's scale applied) and `key: value` lines of the preface."""
-    lines = text.splitlines()
-    separator, first = _layout(lines, source)
-    comma = separator != "," and _has_decimal_commas(lines[first : first + 50])
-    header, units = _header(lines, first, separator)
-    values = _numbers(lines[first:], separator, comma, len(header), source)
-    scales = [_scale(unit) for unit in units]
-    columns = {name: values[:, k] * scales[k] for k, name in enumerate(header) if name}
-    return columns, _preface(lines[:first])
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator), [])
-
-
-def _layout(lines: list[str], source: str) -> tuple[str, int]:
-    """The separator, and the first of at least three lines that hold the same number (2 or more) of numbers."""
-    for start in range(min(MAX_PREFACE_LINES, len(lines))):
-        for separator in (";", "\t", ",", " "):
-            counts = [_count_numbers(line, separator) for line in lines[start : start + 3]]
-            if len(counts) == 3 and min(counts) == max(counts) >= 2:
-                return separator, start
-    raise DataRefused(
-        f"{source}: no rows of numbers were found",
-        step="read recording",
-        value=lines[0][:60] if lines else "",
-        limit="two or more columns of numbers",
-        remedy="export time, three currents and three voltages as CSV",
-    )
-
-
-def _count_numbers(line: str, separator: str) -> int:
-    """Number of cells if every filled cell is a number, else 0."""
-    cells = [cell.strip() for cell in _cells(line, separator)]
-    filled = [cell for cell in cells if cell]
-    if not filled or not all(_is_number(cell, separator != ",") for cell in filled):
-        return 0
-    return len(cells) if separator != " " else len(filled)
-
-
-def _is_number(cell: str, commas: bool) -> bool:
-    try:
-        float(cell.replace(",", ".") if commas else cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _has_decimal_commas(lines: list[str]) -> bool:
-    return any("," in line for line in lines)
-
-
-def _header(lines: list[str], first: int, separator: str) -> tuple[list[str], list[str]]:
-    """Column names and their units: from the row above the numbers, and the one above it where that one holds units."""
-    width = len(_cells(lines[first], separator))
-    above = [_cells(line, separator) for line in lines[max(0, first - 2) : first]]
-    above = [[cell.strip().lstrip("#").strip() for cell in row] for row in above if len(row) == width]
-    if not above:
-        return [f"column_{k}" for k in range(width)], [""] * width
-    if len(above) == 2 and all(not cell or UNIT.match(cell) for cell in above[1]):
-        return above[0], above[1]
-    return above[-1], [_unit_in(name) for name in above[-1]]
-
-
-def _unit_in(name: str) -> str:
-    found = IN_NAME.search(name)
-    return (found.group(1) or found.group(2) or "") if found else ""
-
-
-def _scale(unit: str) -> float:
-    """Factor to SI: 1e-3 for mA, 2 pi / 60 for rpm; 1 where no unit is recognised."""
-    found = UNIT.match(unit.strip())
-    if not found:
-        return 1.0
-    if found.group(2).lower() in {"rpm", "1/min"}:
-        return float(np.pi / 30)
-    prefix = found.group(1) or ""
-    return SCALE.get(prefix, SCALE.get(prefix.lower(), 1.0))
-
-
-def _numbers(lines: list[str], separator: str, comma: bool, width: int, source: str) -> Signal:
-    rows = []
-    for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        cells = line.replace(",", ".").split(separator) if comma else line.split(separator)
-        cells = [cell.strip() for cell in cells] if separator != " " else line.split()
-        if len(cells) < width:
-            raise DataRefused(
-                f"{source}: row {number} holds {len(cells)} columns",
-                step="read recording",
-                value=len(cells),
-                limit=width,
-                remedy="export again, without footer lines",
-            )
-        rows.append([float(cell) if _is_number(cell, False) else np.nan for cell in cells[:width]])
-    return np.array(rows, dtype=np.float64)
-
-
-def _preface(lines: list[str]) -> dict[str, float | str]:
-    metadata: dict[str, float | str] = {}
-    for line in lines:
-        key, mark, value = line.lstrip("#").partition(":")
-        if mark and value.strip() and len(key) < 60:
-            cleaned = value.strip().strip(";,\t")
-            metadata[key.strip()] = float(cleaned) if _is_number(cleaned, False) else cleaned
-    return metadata
 
 
 def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], source: str) -> Table:
@@ -226,7 +131,7 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
     kept = {name: values for name, values in kept.items() if values.size == longest}
     period = data.get("sample_period_s")
     if "time_s" not in kept and isinstance(period, float) and longest:
-        kept["time_s"] = np.arange(longest) * period
+        kept["time_s"] = np.arange(longest, dtype=np.float64) * period
     missing = _missing(kept)
     if missing:
         raise DataRefused(
@@ -283,13 +188,3 @@ def meaning_of(name: str) -> str | None:
         pair = PHASES[found.group(1)] + PHASES[found.group(2)]
         return f"voltage_{pair}_v" if pair in {"uv", "vw", "wu"} else None
     return None
-
-
-def _unreadable(path: Path, reason: str) -> DataRefused:
-    return DataRefused(
-        f"{path}: the file cannot be read",
-        step="read recording",
-        value=reason,
-        limit="CSV, CSV.gz, Parquet, MATLAB v5",
-        remedy="export the recording again, as CSV or Parquet",
-    )

@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
-from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_BYTES, too_large
+from commissioner.recordings.stretch import Stretch
 from commissioner.records import Signal
 
 MAX_DEPTH, MAX_FIELDS, MAX_MATRIX_COLUMNS = 8, 512, 64
@@ -29,25 +27,12 @@ _TYPES = {
 }  # fmt: skip
 
 
-@dataclass
-class _Bytes:
-    """A stretch of the file that can only be read within its bounds."""
+class _Bytes(Stretch):
+    """A stretch of the file with its byte order."""
 
-    data: memoryview
-    order: str
-    path: Path
-    at: int = 0
-
-    @property
-    def is_at_end(self) -> bool:
-        return self.at >= len(self.data)
-
-    def take(self, count: int) -> memoryview:
-        if count < 0 or self.at + count > len(self.data):
-            self.refuse(f"{count} bytes are claimed, {len(self.data) - self.at} are there")
-        piece = self.data[self.at : self.at + count]
-        self.at += count
-        return piece
+    def __init__(self, data: memoryview, order: str, path: Path) -> None:
+        super().__init__(data, path, "MATLAB v5 (`save -v6` or `-v7`)")
+        self.order = order
 
     def element(self) -> tuple[int, _Bytes]:
         """(type, content) of the next data element; small ones hold their length in the upper half of the type."""
@@ -72,12 +57,6 @@ class _Bytes:
 
     def text(self) -> str:
         return self.numbers(_INT8).tobytes().decode("latin-1")
-
-    def refuse(self, reason: str) -> NoReturn:
-        raise DataRefused(
-            f"{self.path}: the file is not a whole MATLAB v5 file", step="read recording", value=reason,
-            limit="MATLAB v5 (`save -v6` or `-v7`)", remedy="save it again with `-v7`, or as CSV or Parquet",
-        )  # fmt: skip
 
 
 def vectors(path: Path) -> dict[str, Signal]:

@@ -196,7 +196,7 @@ def _read_parquet(path: Path) -> Table:
         raise too_large(path, path.stat().st_size, MAX_BYTES)
     numeric = numeric_columns(path, file)
     for name in file.schema_arrow.names:
-        if name in _KNOWN and name not in numeric:
+        if name in CONTRACT_COLUMNS and name not in numeric:
             raise _not_numeric(path, name, file.schema_arrow.field(name).type)
     raw = file.schema_arrow.metadata or {}
     metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
@@ -233,7 +233,7 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
         if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
             values = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
-        elif name in _KNOWN:
+        elif name in CONTRACT_COLUMNS:
             raise _not_numeric(path, name, column[0])
     return Table(columns, metadata, str(path))
 
@@ -242,7 +242,7 @@ def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
     return _refuse(path, f"column {name} is not numeric", str(seen), "numbers in SI units", "decimal points, no units")
 
 
-_KNOWN = frozenset(
+CONTRACT_COLUMNS = frozenset(
     {
         "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
         "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",

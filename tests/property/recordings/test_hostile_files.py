@@ -110,7 +110,7 @@ def test_a_matlab_file_whose_variables_unpack_to_more_than_the_limit_is_refused(
 def test_a_foreign_text_above_its_limit_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "scope.csv"
     path.write_text("t;ia;ib\n" + "0,1;2,0;3,0\n" * 1000)
-    monkeypatch.setattr("commissioner.recordings.importers.MAX_FOREIGN_BYTES", 1000)
+    monkeypatch.setattr("commissioner.recordings.foreign_csv.MAX_FOREIGN_BYTES", 1000)
     with pytest.raises(DataRefused):
         import_table(path)
 
@@ -124,7 +124,7 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
 
 
 @FEW
-@given(st.binary(max_size=400), st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms"]))
+@given(st.binary(max_size=400), st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms", ".mf4", ".cfg", ".cff"]))
 def test_random_bytes_give_a_typed_error_in_every_importer(tmp_path, data, ending):
     path = tmp_path / f"r{ending}"
     path.write_bytes(data)
