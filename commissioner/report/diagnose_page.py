@@ -108,7 +108,8 @@ def _facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _causes(document: Mapping[str, Any]) -> Section:
     if not document["causes"]:
         return Section("Causes", ["No cause passed the rules. The last table lists what would have been seen."])
-    rows, tones = [], []
+    rows: list[tuple[str, ...]] = []
+    tones: list[Tone] = []
     for cause in document["causes"]:
         sizes = "; ".join(f"{_quantity_name(k)} {quantity(v, k)}" for k, v in cause["parameters"].items())
         also = " or ".join(_spoken(n) for n in cause["equivalent"]) or "-"

@@ -142,7 +142,7 @@ def _panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Fig
     import matplotlib as mpl
     from matplotlib.figure import Figure as NewFigure
 
-    with mpl.rc_context(PLOT_STYLE):  # type: ignore[arg-type]
+    with mpl.rc_context(PLOT_STYLE):
         figure = NewFigure(figsize=(9.2, height))
         panels = figure.subplots(rows, columns, squeeze=False, **options)
     return figure, panels

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from jinja2 import Environment
 from markupsafe import Markup
@@ -19,7 +19,7 @@ INK, MUTED, RULE = "#1b2330", "#667085", "#d8dde5"
 BLUE, ORANGE, GREEN, RED, PURPLE = "#1f5fa8", "#c8641b", "#2c7a4b", "#b3261e", "#6b4fa0"
 """The figures' colours, apart in hue and in lightness (they survive grey printing and red-green blindness)."""
 
-PLOT_STYLE = {
+PLOT_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.edgecolor": MUTED,

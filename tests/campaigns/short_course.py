@@ -109,7 +109,7 @@ def _steps(script: Script, job: Job, findings: Findings) -> Generator[ask.Comman
     for axis_deg in PLAN.axes_deg[: script.tests]:
         findings.estimate, findings.is_measured = known, True
         yield _entered(State.EXCITING, Event.RESISTANCE_KNOWN)
-        yield from _test(job, findings, axis_deg, chosen, seconds, seconds)
+        yield from _test(job, findings, axis_deg, chosen, seconds, seconds, is_look=True)  # without the closing bias
         findings.tests_done += 1
     yield _entered(State.JUDGING, Event.AXES_DONE)
     yield ask.Tell(VerdictReached(script.decision, "the script says so", None, None, ""))
