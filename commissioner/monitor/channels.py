@@ -22,7 +22,11 @@ Sign = tuple[int, int, int]
 Option = tuple[Order, Sign, float]
 
 SPACING_TOLERANCE_DEG = 25.0
-"""3 % negative-sequence voltage makes up to 30 % of it in the current: 17 degrees."""
+"""Besides what the voltage's own unbalance explains: its negative sequence meets the standstill impedance, so 3 % of it make
+15 % of the rated current, and half of the current of an idling motor.
+"""
+LARGEST_SPACING_DEG = 45.0
+"""Beyond it two readings of the same three phasors are equally good."""
 LAG_TOLERANCE_DEG = 45.0
 CLEARLY_BETTER_DEG = 15.0
 THIRD = 2 * np.pi / 3
@@ -66,13 +70,14 @@ def pair(
     """The order and polarity of all channels, or findings that refuse."""
     findings: list[Entry] = []
     v, i = read_triple(voltages), read_triple(currents)
-    for name, triple in (("voltage", v), ("current", i)):
-        _spacing(name, triple, findings)
+    _spacing("voltage", v, SPACING_TOLERANCE_DEG, findings)
     voltage_order, turned = _voltage_order(v.sequence, line_to_line)
     ordered = _ordered(v.sign, voltage_order)
     voltage_sign: Sign = (turned * ordered[0], turned * ordered[1], turned * ordered[2])
     star = _star([voltage_sign[k] * voltages[voltage_order[k]] for k in range(3)], line_to_line)
     reference = positive_sequence(star)
+    explained = _explained_deg(currents, star, start, frequency_hz)
+    _spacing("current", i, min(SPACING_TOLERANCE_DEG + explained, LARGEST_SPACING_DEG), findings)
     options = _options(currents, i, reference)
     expected = _expected_lag_deg(currents, star, plate, start, frequency_hz)
     chosen, lag = _choose(options, expected, v.sequence == i.sequence, v.sequence < 0, findings)
@@ -153,15 +158,23 @@ def _star(voltages: list[complex], line_to_line: bool) -> list[complex]:
     return [(uv - wu) / 3, (vw - uv) / 3, (wu - vw) / 3]
 
 
-def _spacing(name: str, triple: Triple, findings: list[Entry]) -> None:
-    if triple.deviation_deg > SPACING_TOLERANCE_DEG:
+def _explained_deg(currents: list[complex], star: list[complex], start: TCircuit, frequency_hz: float) -> float:
+    """By how much the voltages' unbalance moves the currents from 120 degrees: arcsin(|V-| / (Z- |I|)), Z- at slip 2."""
+    backward = sum(p * np.exp(-1j * k * THIRD) for k, p in enumerate(star)) / 3
+    impedance = abs(stator_impedance(start, 2 * np.pi * frequency_hz, 2.0))
+    share = abs(backward) / impedance / max(float(np.mean(np.abs(currents))), 1e-12)
+    return float(np.degrees(np.arcsin(min(share, 1.0))))
+
+
+def _spacing(name: str, triple: Triple, limit_deg: float, findings: list[Entry]) -> None:
+    if triple.deviation_deg > limit_deg:
         findings.append(
             (
                 "phase_spacing",
                 "refused",
                 f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
                 triple.deviation_deg,
-                SPACING_TOLERANCE_DEG,
+                limit_deg,
                 "check that three different phases are measured",
             )
         )

@@ -64,11 +64,27 @@ def _find_shaft(
     harmonics = max(2, min(8, int(frame.band_hz * 0.9 / search.synchronous_hz)))
     candidates = periods.shaft_candidates(spectrum, search, harmonics)
     table = tuple((f, score) for f, score, _ in candidates)
-    for frequency, _, seen in candidates[:1]:
+    for frequency, _, visible in candidates[:1]:
+        seen = tuple(
+            h
+            for h in visible
+            if _is_peak(spectrum, h * frequency) and not _on_mains_skirt(h * frequency, search.supply_hz)
+        )
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
         if powers.max() > periods.SIGNIFICANT or powers.sum() > 2 * periods.SIGNIFICANT:
             return _refined(frame, part, residual, spectrum, "shaft", frequency, seen), table
     return None, table
+
+
+def _is_peak(spectrum: PairSpectrum, frequency_hz: float) -> bool:
+    """False on the skirt of a stronger line within three cells: the shaft then turns outside the slip that was allowed."""
+    place = np.array([frequency_hz])
+    return bool(spectrum.at(place, 0.6)[0] > 0.3 * spectrum.at(place, 3.0)[0])
+
+
+def _on_mains_skirt(frequency_hz: float, supply_hz: float) -> bool:
+    """Near an even mains line (unbalance, harmonics), which is far stronger than any load's and wanders in size."""
+    return abs(frequency_hz - 2 * supply_hz * round(frequency_hz / (2 * supply_hz))) < periods.NEAR_MAINS_HZ
 
 
 def _refined(

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from commissioner.monitor import tracking
-from commissioner.monitor.averaging import Lines
-from commissioner.monitor.combs import Found, mean_supply
+from commissioner.monitor.averaging import Lines, residual_current
+from commissioner.monitor.combs import SUPPLY_ORDERS, Found, mean_supply
 from commissioner.monitor.supply import TurningFrame
 
+DRIFT_KNOWN = 0.1
+"""Relative error of the drift found beyond a fixed ratio to the mains: coefficients below three deviations were dropped."""
 UNSEEN = 0.01
 """Share of a recording cut at its end: the mean frequency of the rest differs by that share of its wander."""
 
@@ -25,16 +27,19 @@ def whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: Li
     ratio = 2 * np.pi * shaft.frequency_hz / mean_supply(frame, part)
     speed, std = ratio * supply, 2 * np.pi * shaft.frequency_std_hz
     std = float(np.hypot(std, UNSEEN * ratio * np.ptp(frame.supply_rad_per_s)))
+    ends = frame.time_s[[part.start, min(part.stop, frame.time_s.size) - 1]]
+    moved = 0.0 if shaft.drift is None else float(np.diff(shaft.drift(ends))[0] / np.diff(ends)[0])
     if part.start == 0 and part.stop >= frame.time_s.size:
-        return speed, std
+        return speed + moved, float(np.hypot(std, DRIFT_KNOWN * moved))
     time = frame.time_s
-    phase = ratio * (frame.supply_angle_rad + frame.slip_phase_rad)
+    phase = ratio * (frame.supply_angle_rad + frame.slip_phase_rad) + moved * time
     blocks = int(np.clip(np.ptp(time) / 0.8, 16, 256))
-    orders = sorted(set(shaft.harmonics_seen) | {1, 2}, key=lambda h: -_power(lines, h))[:3]
-    demodulated = tracking.demodulate(frame.current_a - frame.current_a.mean(), time, phase, orders, blocks)
+    orders = sorted(shaft.harmonics_seen or (1,), key=lambda h: -_power(lines, h))[:3]
+    residual = residual_current(frame, everything, [], SUPPLY_ORDERS)
+    demodulated = tracking.demodulate(residual, time, phase, orders, blocks)
     drift = tracking.track(demodulated, int(np.clip(np.ptp(time) / 4, 2, 16)))
     turned = float(drift(time[-1:])[0] - drift(time[:1])[0]) / float(np.ptp(time))
-    return speed + turned, float(np.hypot(std, 0.02 * abs(turned)))
+    return speed + moved + turned, float(np.hypot(std, DRIFT_KNOWN * (abs(turned) + abs(moved))))
 
 
 def _power(lines: Lines, order: int) -> float:

@@ -11,12 +11,27 @@ from commissioner.monitor.supply import TurningFrame
 
 LARGEST_FREQUENCY_WANDER = 0.004
 """Of the mean, within the stretch analysed: the grid's own drift is ten times smaller."""
+LARGEST_SWING_RAD = 0.03
+"""rms of the voltage's angle around its smooth course, up to `SWING_BAND_HZ`: a feeder's drop under a pulsing load makes a
+tenth of it. Beyond it the supply's own frequency pulses, and what repeats in the speed is the supply's.
+"""
+SWING_BAND_HZ = 15.0
 LEAST_TURNS = 30
 LEAST_LOAD_PERIODS = 8
 
 
 def frequency_wander(frame: TurningFrame, part: slice) -> Finding:
-    """How far the supply frequency moves inside the segment."""
+    """How far the supply frequency moves inside the segment, slowly (grid, ramps) or to and fro (a controlled inverter)."""
+    swing = _swing(frame, part)
+    if swing > LARGEST_SWING_RAD:
+        return Finding(
+            "frequency_wander",
+            "refused",
+            f"the supply's angle swings by {swing:.2g} rad rms around its course: its frequency is not steady",
+            swing,
+            LARGEST_SWING_RAD,
+            "record at a steady set point of the inverter, without speed control or slip compensation",
+        )
     frequency = frame.supply_rad_per_s[part]
     share = float(np.ptp(frequency) / frequency.mean())
     kind = "refused" if share > LARGEST_FREQUENCY_WANDER else "note"
@@ -29,6 +44,15 @@ def frequency_wander(frame: TurningFrame, part: slice) -> Finding:
         LARGEST_FREQUENCY_WANDER,
         "record at a steady set point",
     )
+
+
+def _swing(frame: TurningFrame, part: slice) -> float:
+    """rms angle of the segment's voltage in its own frame, averaged over 1 / (2 `SWING_BAND_HZ`), its slow course removed."""
+    step = max(1, round(0.5 / (SWING_BAND_HZ * frame.sample_period_s)))
+    voltage = frame.voltage_v[part]
+    blocks = voltage.size // step
+    angle = np.angle(voltage[: blocks * step].reshape(blocks, step).mean(axis=1) * np.conj(voltage.mean()))
+    return float(np.std(angle))
 
 
 def too_little(frame: TurningFrame, part: slice, found: Found) -> Finding | None:
