@@ -27,21 +27,21 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     signal.signal(signal.SIGTERM, _terminated)
     try:
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
-        sys.exit(code)
+        if code != INTERRUPTED:
+            sys.exit(code)
+        error: CommissionerError = _stopped()
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
     except typer.Exit as stop:
-        if stop.exit_code != INTERRUPTED:
-            sys.exit(stop.exit_code)
-        error: CommissionerError = _stopped(str(stop.__cause__ or ""))
+        sys.exit(stop.exit_code)
     except TyperException as usage:
         if not as_json and hasattr(usage, "show"):
             usage.show()
             sys.exit(UsageError.exit_code)
         error = _usage(usage, arguments)
-    except (KeyboardInterrupt, typer.Abort) as stop:
-        error = _stopped(str(stop))
+    except (KeyboardInterrupt, typer.Abort):
+        error = _stopped()
     except CommissionerError as failure:
         error = failure
     except OSError as failure:
@@ -74,9 +74,9 @@ def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     )
 
 
-def _stopped(by: str) -> CommissionerError:
+def _stopped() -> CommissionerError:
     return Aborted(
-        "stopped by the operator", step="wait", value=by or "Ctrl-C", limit="no stop", remedy="start again when ready"
+        "stopped by the operator", step="wait", value="Ctrl-C, SIGTERM or no", limit="no stop", remedy="start again when ready"
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.cli import screen
 from commissioner.errors import DataRefused
-from commissioner.run.archive import read_blocks, read_saved
+from commissioner.run.archive import damaged, read_blocks, read_saved
 from commissioner.run.catalogue import RunSummary, find_run, read_runs
 
 if TYPE_CHECKING:
@@ -74,7 +74,9 @@ def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
     check_ending(out)
     source = Path(summary.folder)
     nameplate = read_saved(source, "request.json", "nameplate")["nameplate"]
-    plate = {key: value for key, value in dict(nameplate).items() if value is not None}
+    if not isinstance(nameplate, dict):
+        raise damaged(source, "request.json", f"nameplate {nameplate!r}")
+    plate = {key: value for key, value in nameplate.items() if value is not None}
     recording = assemble(read_blocks(source / "blocks.bin"), plate, summary.run)
     if recording is None:
         raise DataRefused(

@@ -1,0 +1,107 @@
+"""Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
+
+import json
+import os
+import signal
+import subprocess
+
+import pytest
+import typer
+
+from commissioner.cli.app import app
+from commissioner.cli.failures import run_to_exit
+from commissioner.errors import DriveFault
+from tests.support.command_line import COMMAND
+
+ONE_RUN = "20260101-000000-simulated"
+
+
+def leave(capsys, *arguments, of=app):
+    """(exit code, the document on stdout) of a call in this process."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with pytest.raises(SystemExit) as left:
+            run_to_exit(of, [*map(str, arguments), "--json"])
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    return left.value.code or 0, json.loads(capsys.readouterr().out)
+
+
+def raising(error):
+    made = typer.Typer()
+
+    @made.command()
+    def verb(as_json: bool = typer.Option(False, "--json")):
+        raise error
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "outcome"),
+    [
+        (DriveFault("it tripped", step="enable", remedy="look"), 5, "faulted"),
+        (KeyboardInterrupt(), 4, "aborted"),
+        (typer.Abort(), 4, "aborted"),
+        (PermissionError(13, "Permission denied", "/somewhere/file"), 2, "usage"),
+        (OSError(28, "No space left on device"), 5, "faulted"),
+        (MemoryError(), 3, "rejected"),
+        (ZeroDivisionError("a defect"), 5, "faulted"),
+    ],
+)
+def test_whatever_is_raised_is_one_document_with_its_exit_code(capsys, error, code, outcome):
+    left, document = leave(capsys, of=raising(error))
+    assert (left, document["outcome"]) == (code, outcome)
+    assert {"kind", "what", "step", "value", "limit", "remedy"} <= document["error"].keys()
+    assert document["reason"] and document["error"]["step"] and document["error"]["remedy"]
+
+
+@pytest.fixture
+def archive(tmp_path):
+    """A run folder with nothing sound in it."""
+    folder = tmp_path / ONE_RUN
+    folder.mkdir()
+    (folder / "journal.jsonl").write_text('{"n": 0, "utc": "x", "kind": "job", "record": 3}\n')
+    return folder
+
+
+@pytest.mark.parametrize("name", ["request.json", "snapshot.json"])
+@pytest.mark.parametrize("content", ["nonsense", "{}", "[1]", '{"url": 5, "profile": "simulated", "nameplate": 7}'])
+@pytest.mark.parametrize("verb", [("runs", "show"), ("runs", "report"), ("runs", "export"), ("replay",), ("restore",)])
+def test_a_damaged_archive_is_refused_by_name(capsys, archive, name, content, verb):
+    (archive / name).write_text(content)
+    target = [archive / "x.csv"] if verb == ("runs", "export") else []
+    code, document = leave(capsys, *verb, "last", *target, "--runs", archive.parent)
+    assert code == (0 if verb == ("runs", "show") else 3), document
+    assert code == 0 or "defect" not in document["reason"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("simulate", "motor_2kw2", "--out", "x.txt"),
+        ("simulate", "motor_2kw2", "--out", "x.csv", "--seconds", "-1"),
+        ("simulate", "motor_2kw2", "--out", "x.csv", "--seconds", "1e9"),
+        ("simulate", "motor_2kw2", "--out", "x.csv", "--axes", "nan"),
+        ("identify", "x.csv", "--write-back"),
+        ("identify", "x.csv", "--write-back", "--drive", "tcp://127.0.0.1:1", "--profile", "danfoss_fc302"),
+    ],
+)
+def test_a_call_that_cannot_be_right_is_a_usage_error(capsys, arguments):
+    code, document = leave(capsys, *arguments)
+    assert (code, document["outcome"]) == (2, "usage")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
+    """The verb waits at the pipe that it was given for its input."""
+    os.mkfifo(tmp_path / "pipe")
+    script = COMMAND[-1].replace("main()", "import commissioner.cli.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()")
+    call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
+    process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with (tmp_path / "pipe").open("w"):  # opens once the verb reads
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 4, err
+    assert json.loads(out)["outcome"] == "aborted" and "Traceback" not in err

@@ -1,0 +1,88 @@
+"""A disk that takes no more: the drive is let go, the run ends with the reason, and nothing is left open."""
+
+import errno
+
+import pytest
+
+from commissioner.errors import WriteBackFailed
+from commissioner.procedure.findings import RunEnded
+from commissioner.run.archive import RunFolder
+from commissioner.run.runner import Runner
+from commissioner.safety import commands as ask
+
+
+class FullFolder(RunFolder):
+    """A run folder on a disk that fills up at one kind of record."""
+
+    full_at = ""
+    is_full = False
+
+    def journal(self, kind, record, *, durable=False):
+        self.is_full = self.is_full or kind == self.full_at
+        if self.is_full:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        super().journal(kind, record, durable=durable)
+
+
+class Drive:
+    """Stands for the inverter; counts what it is told."""
+
+    def __init__(self):
+        self.disarmed = 0
+
+    def disarm(self):
+        self.disarmed += 1
+        return "blocked"
+
+    def write_circuit(self, *_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    folder = FullFolder.create(tmp_path, "full")
+    yield folder
+    folder.close()
+
+
+def perform(drive, folder, course):
+    return Runner(drive, folder, bounds=None, watch=None, present=lambda record: None).perform(course)
+
+
+@pytest.mark.parametrize("full_at", ["record", "disarmed", "run_ended"])
+def test_the_drive_is_let_go_and_the_run_ends_at_whatever_record_the_disk_fills_up(folder, full_at):
+    folder.full_at, drive = full_at, Drive()
+
+    class Record:
+        """Journalled as `record`."""
+
+    def course():
+        yield ask.Tell(Record())
+        return RunEnded("commissioned", "done", 0.0)
+
+    ended = perform(drive, folder, course())
+    assert drive.disarmed == 1
+    if full_at == "record":
+        assert (ended.outcome, ended.error["step"]) == ("faulted", "archive")
+        assert "No space left" in ended.reason
+        assert "--runs" in ended.error["remedy"]
+
+
+def test_a_defect_on_a_full_disk_still_lets_the_drive_go(folder):
+    folder.full_at, drive = "defect", Drive()
+
+    def course():
+        yield ask.Wait(0.0)
+        raise ZeroDivisionError("a defect")
+
+    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
+    ended = runner.perform(course())
+    assert drive.disarmed == 1 and ended.outcome == "faulted" and "ZeroDivisionError" in ended.reason
+
+
+def test_a_disk_that_fills_up_while_writing_back_says_what_the_drive_may_hold(folder):
+    runner = Runner(Drive(), folder, bounds=None, watch=None, present=lambda record: None)
+    runner._snapshot = object()
+    with pytest.raises(WriteBackFailed, match="old or its new parameters") as caught:
+        runner._write(ask.WriteParameters(None, None))
+    assert "restore" in caught.value.remedy
