@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 import commissioner
 from commissioner.errors import ConfigurationError, UsageError
+from commissioner.link.drive_document import (
+    DriveFile,
+    ItemTable,
+    LinkTable,
+    ParametersTable,
+    StoreTable,
+    WatchdogTable,
+    WindowTable,
+    explained,
+)
 from commissioner.registers.convention import CONVENTIONS, QUANTITIES
 from commissioner.registers.profile import (
     WINDOW_FLAGS,
@@ -30,129 +39,6 @@ from commissioner.settings import read_toml
 
 DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"
 
-Word = Annotated[int, Field(ge=0, le=0xFFFF)]
-Bit = Annotated[int, Field(ge=0, le=15)]
-Count = Annotated[int, Field(ge=1, le=125)]
-Seconds = Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Capability = Literal["excite", "stream", "write_back", "restore"]
-HeaderField = Literal[
-    "session_id:u16", "first_index:u32", "count:u16", "channel_mask:u16", "flags:u16", "dc_link_raw:i16", "crc16:u16"
-]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class _Drive(_Table):
-    name: Annotated[str, Field(min_length=1)]
-    kind: Literal["commissioning_map", "commercial"]
-    capabilities: list[Capability]
-    status_decoder: Literal["cia402", "bits", "none"]
-    source: str = ""
-
-
-class _Link(_Table):
-    address_base: Literal[0, 1]
-    max_read_registers: Count
-    max_write_registers: Annotated[int, Field(ge=1, le=123)]
-    word_order: Literal["big", "little"]
-    has_read_write_multiple: bool
-    turnaround_s: Seconds
-    device_id: Annotated[int, Field(ge=1, le=247)]
-    write_pause_s: Seconds = 0.0
-
-
-class _Identity(_Table):
-    magic: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
-    map_version: Word | None = None
-    drive_type: str | None = None
-    firmware_min: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
-    firmware_max: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
-
-
-class _Watchdog(_Table):
-    register_name: Annotated[str, Field(alias="register")]
-    min_ms: Annotated[float, Field(ge=0, le=1e6)]
-    max_ms: Annotated[float, Field(gt=0, le=1e6)]
-    default_ms: Annotated[float, Field(ge=0, le=1e6)] | None = None
-    fed_by: str
-    action: str
-
-
-class _Store(_Table):
-    endurance_writes: Annotated[int, Field(ge=1)] | None = None
-    writes: list[Annotated[list[Word], Field(min_length=2, max_length=2)]] = []
-    coil: Word | None = None
-
-
-class _Item(_Table):
-    address: Word
-    type: Literal["u16", "i16", "u32", "i32", "f32", "ascii"]
-    length: Annotated[int, Field(ge=1, le=125)] = 1
-    scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
-    unit: str = ""
-    convention: str = ""
-    quantity: str = ""
-    access: Literal["r", "w", "rw"]
-    needs_stop: bool = False
-    volatile: bool = False
-    min: Finite | None = None
-    max: Finite | None = None
-    word_order: Literal["big", "little"] | None = None
-    source: str = ""
-
-
-class _Window(_Table):
-    address: Word
-    header: Annotated[list[HeaderField], Field(min_length=7, max_length=7)]
-    data_registers: Annotated[int, Field(ge=4, le=125)]
-    crc: Literal["modbus"]
-    flag_running: Word
-    flag_clipped: Word
-    flag_overrun: Word
-    flag_voltage_clamped: Word
-    flag_ended: Word
-
-
-class _Parameters(_Table):
-    order: Annotated[list[str], Field(min_length=1)]
-    staged_crc: str | None = None
-    settle_s: Seconds = 0.0
-
-
-class _Commands(_Table):
-    commit: Word | None = None
-    store: Word | None = None
-
-
-class _Limits(_Table):
-    dc_link_min_v: Finite | None = None
-    dc_link_max_v: Finite | None = None
-    heatsink_max_degc: Finite | None = None
-    winding_max_degc: Finite | None = None
-
-
-class DriveFile(_Table):
-    """The document as it may be written."""
-
-    drive: _Drive
-    link: _Link
-    identity: _Identity = _Identity()
-    items: dict[str, _Item]
-    watchdog: _Watchdog | None = None
-    window: _Window | None = None
-    parameters: _Parameters | None = None
-    store: _Store | None = None
-    commands: _Commands = _Commands()
-    status_bits: dict[str, Bit] = {}
-    interlock_bits: dict[str, Bit] = {}
-    faults: dict[str, str] = {}
-    exceptions: dict[str, str] = {}
-    limits: _Limits = _Limits()
-    unknown: dict[str, str] = {}
-
 
 def load_profile(name_or_path: str | Path) -> DriveProfile:
     """The drive named in `config/drives`, or in a file. UsageError: no such drive; ConfigurationError: bad file."""
@@ -165,7 +51,7 @@ def build(document: Mapping[str, Any], file: str) -> DriveProfile:
     try:
         model = DriveFile.model_validate(dict(document))
     except ValidationError as error:
-        raise _explained(error, file) from error
+        raise explained(error, file) from error
     return check_consistency(_profile(model, file))
 
 
@@ -209,16 +95,14 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
     )
 
 
-def _link(table: _Link) -> LinkLimits:
+def _link(table: LinkTable) -> LinkLimits:
     return LinkLimits(**table.model_dump(exclude={"address_base", "word_order"}))
 
 
-def _item(name: str, table: _Item, link: _Link, file: str) -> Item:
+def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     key = f"items.{name}"
     if table.address < link.address_base:
         raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
-    if table.length > 1 and table.type != "ascii" and table.type not in ("f32", "u16", "i16", "u32", "i32"):
-        raise ConfigurationError(file=file, key=f"{key}.length", value=table.length, expected="1")
     for what, value, known in (
         ("convention", table.convention, CONVENTIONS), ("quantity", table.quantity, QUANTITIES)
     ):
@@ -239,11 +123,11 @@ def _item(name: str, table: _Item, link: _Link, file: str) -> Item:
     )
 
 
-def _watchdog(table: _Watchdog) -> Watchdog:
+def _watchdog(table: WatchdogTable) -> Watchdog:
     return Watchdog(register=table.register_name, **table.model_dump(exclude={"register_name"}))
 
 
-def _window(table: _Window, file: str) -> WindowLayout:
+def _window(table: WindowTable, file: str) -> WindowLayout:
     header = tuple((name, kind) for name, kind in (entry.split(":") for entry in table.header))
     if len(set(header)) != len(header) or header[-1][0] != "crc16":
         raise ConfigurationError(
@@ -253,11 +137,11 @@ def _window(table: _Window, file: str) -> WindowLayout:
     return WindowLayout(table.address, header, table.data_registers, flags)
 
 
-def _parameters(table: _Parameters) -> ParameterGroup:
+def _parameters(table: ParametersTable) -> ParameterGroup:
     return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s)
 
 
-def _store(table: _Store) -> Store:
+def _store(table: StoreTable) -> Store:
     return Store(table.endurance_writes, tuple((a, v) for a, v in table.writes), table.coil)
 
 
@@ -277,35 +161,3 @@ def _by_code(table: Mapping[str, str], section: str, file: str) -> dict[int, str
         raise ConfigurationError(
             file=file, key=section, value=", ".join(table), expected="codes as whole numbers: 5 or 0x05"
         ) from error
-
-
-def _explained(error: ValidationError, file: str) -> ConfigurationError:
-    first = error.errors()[0]
-    location = [str(part) for part in first["loc"]]
-    value = None if first["type"] == "missing" else first["input"]
-    return ConfigurationError(file=file, key=".".join(location), value=value, expected=_expected(first))
-
-
-def _expected(problem: Any) -> str:
-    if problem["type"] == "missing":
-        return "this key is needed; see config/drives/simulated.toml for a complete file"
-    if problem["type"] == "extra_forbidden":
-        return "no such key; known here: " + ", ".join(_keys_at(problem["loc"][:-1]))
-    return str(problem["msg"])
-
-
-def _keys_at(location: tuple[object, ...]) -> list[str]:
-    model: type[BaseModel] = DriveFile
-    for part in location:
-        if str(part) in model.model_fields:
-            model = _table_in(model.model_fields[str(part)].annotation) or model
-    return sorted(model.model_fields)
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """The table model inside an annotation such as `X`, `X | None` or `dict[str, X]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    if get_origin(annotation) in (UnionType, Union, dict):
-        return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
-    return None

@@ -1,0 +1,165 @@
+"""A drive file as it may be written: its tables, keys and types. Strict: what is unknown, mistyped or missing is named."""
+
+from __future__ import annotations
+
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from commissioner.errors import ConfigurationError
+
+Word = Annotated[int, Field(ge=0, le=0xFFFF)]
+Bit = Annotated[int, Field(ge=0, le=15)]
+Count = Annotated[int, Field(ge=1, le=125)]
+Seconds = Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Capability = Literal["excite", "stream", "write_back", "restore"]
+HeaderField = Literal[
+    "session_id:u16", "first_index:u32", "count:u16", "channel_mask:u16", "flags:u16", "dc_link_raw:i16", "crc16:u16"
+]
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class DriveTable(Table):
+    name: Annotated[str, Field(min_length=1)]
+    kind: Literal["commissioning_map", "commercial"]
+    capabilities: list[Capability]
+    status_decoder: Literal["cia402", "bits", "none"]
+    source: str = ""
+
+
+class LinkTable(Table):
+    address_base: Literal[0, 1]
+    max_read_registers: Count
+    max_write_registers: Annotated[int, Field(ge=1, le=123)]
+    word_order: Literal["big", "little"]
+    has_read_write_multiple: bool
+    turnaround_s: Seconds
+    device_id: Annotated[int, Field(ge=1, le=247)]
+    write_pause_s: Seconds = 0.0
+
+
+class IdentityTable(Table):
+    magic: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
+    map_version: Word | None = None
+    drive_type: str | None = None
+    firmware_min: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
+    firmware_max: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
+
+
+class WatchdogTable(Table):
+    register_name: Annotated[str, Field(alias="register")]
+    min_ms: Annotated[float, Field(ge=0, le=1e6)]
+    max_ms: Annotated[float, Field(gt=0, le=1e6)]
+    default_ms: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    fed_by: str
+    action: str
+
+
+class StoreTable(Table):
+    endurance_writes: Annotated[int, Field(ge=1)] | None = None
+    writes: list[Annotated[list[Word], Field(min_length=2, max_length=2)]] = []
+    coil: Word | None = None
+
+
+class ItemTable(Table):
+    address: Word
+    type: Literal["u16", "i16", "u32", "i32", "f32", "ascii"]
+    length: Annotated[int, Field(ge=1, le=125)] = 1
+    scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    unit: str = ""
+    convention: str = ""
+    quantity: str = ""
+    access: Literal["r", "w", "rw"]
+    needs_stop: bool = False
+    volatile: bool = False
+    min: Finite | None = None
+    max: Finite | None = None
+    word_order: Literal["big", "little"] | None = None
+    source: str = ""
+
+
+class WindowTable(Table):
+    address: Word
+    header: Annotated[list[HeaderField], Field(min_length=7, max_length=7)]
+    data_registers: Annotated[int, Field(ge=4, le=125)]
+    crc: Literal["modbus"]
+    flag_running: Word
+    flag_clipped: Word
+    flag_overrun: Word
+    flag_voltage_clamped: Word
+    flag_ended: Word
+
+
+class ParametersTable(Table):
+    order: Annotated[list[str], Field(min_length=1)]
+    staged_crc: str | None = None
+    settle_s: Seconds = 0.0
+
+
+class CommandsTable(Table):
+    commit: Word | None = None
+    store: Word | None = None
+
+
+class LimitsTable(Table):
+    dc_link_min_v: Finite | None = None
+    dc_link_max_v: Finite | None = None
+    heatsink_max_degc: Finite | None = None
+    winding_max_degc: Finite | None = None
+
+
+class DriveFile(Table):
+    """The document as it may be written."""
+
+    drive: DriveTable
+    link: LinkTable
+    identity: IdentityTable = IdentityTable()
+    items: dict[str, ItemTable]
+    watchdog: WatchdogTable | None = None
+    window: WindowTable | None = None
+    parameters: ParametersTable | None = None
+    store: StoreTable | None = None
+    commands: CommandsTable = CommandsTable()
+    status_bits: dict[str, Bit] = {}
+    interlock_bits: dict[str, Bit] = {}
+    faults: dict[str, str] = {}
+    exceptions: dict[str, str] = {}
+    limits: LimitsTable = LimitsTable()
+    unknown: dict[str, str] = {}
+
+
+def explained(error: ValidationError, file: str) -> ConfigurationError:
+    first = error.errors()[0]
+    location = [str(part) for part in first["loc"]]
+    value = None if first["type"] == "missing" else first["input"]
+    return ConfigurationError(file=file, key=".".join(location), value=value, expected=_expected(first))
+
+
+def _expected(problem: Any) -> str:
+    if problem["type"] == "missing":
+        return "this key is needed; see config/drives/simulated.toml for a complete file"
+    if problem["type"] == "extra_forbidden":
+        return "no such key; known here: " + ", ".join(_keys_at(problem["loc"][:-1]))
+    return str(problem["msg"])
+
+
+def _keys_at(location: tuple[object, ...]) -> list[str]:
+    model: type[BaseModel] = DriveFile
+    for part in location:
+        if str(part) in model.model_fields:
+            model = _table_in(model.model_fields[str(part)].annotation) or model
+    return sorted(model.model_fields)
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    """The table model inside an annotation such as `X`, `X | None` or `dict[str, X]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if get_origin(annotation) in (UnionType, Union, dict):
+        return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
+    return None
