@@ -27,6 +27,8 @@ LEAST_GAIN = 80.0
 LEAST_SHARE = 0.03
 SPIKE = 9.0
 MOST_IN_A_ROW = 3
+START = 50
+"""Samples in which a pulse is flux left from before, not a loss."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def _pulse(residual: Array, segment: Segment, model: Model, noise: Noise) -> int
     impulse[0] = 1.0
     power = np.cumsum(lfilter(zeros, poles, impulse) ** 2)[::-1]
     gain = lfilter(zeros, poles, along[::-1])[::-1] ** 2 / power / variance
-    at = int(np.argmax(gain[:-20]))
+    at = START + int(np.argmax(gain[START:-20]))
     return at if gain[at] > LEAST_GAIN else None
 
 

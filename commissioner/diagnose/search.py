@@ -42,6 +42,8 @@ GUARD = 2e-5
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
 CLASS_GUARD = 1e-2
 """Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
+HOPELESS = 0.4
+"""A candidate that promises less than this share of what its guard wants is not refitted."""
 SAME_ORDER, SAME_ORDER_GUARD = frozenset({"rotor_skin_effect", "iron_loss"}), 0.1
 """Two networks that terminals hardly tell apart: the weaker is only named beside the other where it is no trifle."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
@@ -99,14 +101,14 @@ def search(
     unknown_starts = starts_of(record)
     if unknown_starts:
         nominal = fit(nominal.model.with_terms(unknown_starts), record, bare, noise, rounds=8, tolerance=1.0)
-    losses: tuple[Loss, ...] = ()
-    if "lost_samples" not in excluded:
-        record, nominal, losses = _mended(record, nominal, bare, noise, report)
     if len(record.segments) > 1:
         record = with_flux_before(record, nominal.model, bare)
         nominal = fit(nominal.model.with_terms(CARRY), record, bare, noise, rounds=6, tolerance=1.0)
         record = with_flux_before(record, nominal.model, bare)
         nominal = fit(nominal.model, record, bare, noise, rounds=6, tolerance=1.0)
+    losses: tuple[Loss, ...] = ()
+    if "lost_samples" not in excluded:
+        record, nominal, losses = _mended(record, nominal, bare, noise, report)
     if check is not None:
         check(nominal, record)
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
@@ -219,9 +221,11 @@ class _Search:
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
         ranked = [s for s in screening.ranked() if s.name not in refused]
-        promising = [s for s in ranked if s.delta_chi2 > 0.7 * s.threshold]
-        best = self._large_delay(current, refused)
         losses = {n: loss_without(current, n) for n in {t.effect for t in current.model.terms if t.effect}}
+        promising = [
+            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * _guard(losses, s.name))
+        ]
+        best = self._large_delay(current, refused)
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
