@@ -19,7 +19,8 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
     if not yes and not as_json:
         screen.out.print(f"The parameters that [bold]{summary.run}[/] found will be written into the drive and stored.")
         typer.confirm("Write?", abort=True)
-    done = restore(summary, drive)
+    with screen.busy("writing and reading back"):
+        done = restore(summary, drive)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
@@ -38,7 +39,8 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
 def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
     """Decide the run again from its archive; exit 3 where a decision comes out otherwise."""
     summary = find_run(runs, run)
-    done = replay(Path(summary.folder))
+    with screen.busy("deciding again"):
+        done = replay(Path(summary.folder))
     if as_json:
         screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
                      "difference": done.difference})  # fmt: skip

@@ -13,7 +13,9 @@ from commissioner.settings import load_motor, load_procedure
 
 def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_json: bool) -> None:
     """Prints every check; raises CheckFailed (exit 3) where one fails."""
-    inspection = inspect_drive(drive, profile, load_motor(motor), load_procedure(procedure))
+    nameplate, plan = load_motor(motor), load_procedure(procedure)
+    with screen.busy("asking the drive"):
+        inspection = inspect_drive(drive, profile, nameplate, plan)
     failed = [result for result in inspection.checks if not result.has_passed]
     document: dict[str, Any] = {
         "outcome": "rejected" if failed else "passed",

@@ -28,7 +28,8 @@ def identify(files: Sequence[Path], *, motor: str | None, estimator: str, as_jso
     """Identify a motor from standstill recordings, with the estimators a live run uses."""
     from commissioner.identify.analysis import identify as analyse
 
-    document: dict[str, Any] = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
+    with screen.busy("identifying"):
+        document: dict[str, Any] = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
     if as_json:
         screen.emit(document | {"flux_guard": _flux_reached(document), "written": []})
     else:
@@ -62,9 +63,11 @@ def identify_and_write(
             remedy="add both; `commissioner check` shows whether they fit",
         )  # fmt: skip
     screen.require_yes(yes, as_json=as_json)
-    plan, recording = load_procedure(procedure), _recording(files)
-    plate = _nameplate(motor) or nameplate_from(recording.metadata)
-    found = analyse(recording, plate, estimator)  # type: ignore[arg-type]
+    plan = load_procedure(procedure)
+    with screen.busy("identifying"):
+        recording = _recording(files)
+        plate = _nameplate(motor) or nameplate_from(recording.metadata)
+        found = analyse(recording, plate, estimator)  # type: ignore[arg-type]
     if not as_json:
         show(found.as_json(), [str(path) for path in files])
     if not yes:

@@ -28,7 +28,7 @@ def monitor(
 
     Raises DataRefused (exit 3) where the recording cannot carry an answer; the JSON then still says what was learned.
     """
-    from commissioner.cli.screen import emit
+    from commissioner.cli.screen import busy, emit
     from commissioner.monitor.chain import Refused, Wishes, observe
     from commissioner.monitor.indicators import pulses, trendable
     from commissioner.monitor.reference import against_encoder
@@ -40,7 +40,8 @@ def monitor(
     recording = read_running(file)
     plate = plate_of(recording.metadata, str(file), motor)
     wishes = Wishes(load_hz, inertia, start_from(start) if start else None)
-    seen = observe(recording, plate, wishes)
+    with busy("looking for speed and load"):
+        seen = observe(recording, plate, wishes)
     if isinstance(seen, Refused):
         refuse(seen, file, refused_document(seen), as_json)
         return

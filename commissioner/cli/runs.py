@@ -58,7 +58,8 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
     summary = find_run(folder, name)
     report = Path(summary.folder) / "report.html"
     if not report.is_file():
-        make_report(summary)
+        with screen.busy("making the report"):
+            make_report(summary)
     if as_json:
         screen.emit({"run": summary.run, "report": str(report)})
     else:

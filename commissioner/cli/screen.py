@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from commissioner.errors import CommissionerError, UsageError
@@ -32,6 +34,15 @@ def require_yes(yes: bool, *, as_json: bool) -> None:
             "nobody can be asked with --json", step="confirm", value="--json without --yes", limit="--yes",
             remedy="add --yes once you have made sure that the drive may be energised or written",
         )  # fmt: skip
+
+
+@contextmanager
+def busy(doing: str) -> Iterator[None]:
+    """A moving bar and the time gone by on stderr, while something takes longer than a person likes to wait."""
+    columns = (TextColumn("    {task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        progress.add_task(doing, total=None)
+        yield
 
 
 def failure(error: CommissionerError) -> None:

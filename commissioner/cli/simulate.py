@@ -24,7 +24,7 @@ def simulate(
     The command is that of the recording `like`, or a six-tone multisine at two levels on `axes`. `plain` leaves the
     named effects out.
     """
-    from commissioner.cli.screen import emit, err
+    from commissioner.cli.screen import busy, emit, err
     from commissioner.diagnose import play as player
     from commissioner.recordings.table import check_ending, write_table
 
@@ -38,7 +38,8 @@ def simulate(
         segments = player.command(made, facts, plan, seconds, seed)
     else:
         segments, facts = _command_of(like, facts)
-    columns = player.play(made, layout, facts, segments, lines, noise_a, seed)
+    with busy("playing"):
+        columns = player.play(made, layout, facts, segments, lines, noise_a, seed)
     keys = {k: v for k, v in plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
     write_table(out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     summary = {
