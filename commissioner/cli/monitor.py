@@ -82,7 +82,7 @@ def refuse(seen: Refused, file: Path, document: dict[str, Any], as_json: bool) -
         remedy=reason.remedy,
     )
     if as_json:
-        emit(document | {"error": error.as_dict()})
+        emit(document | {"reason": error.what, "error": error.as_dict()})
         raise typer.Exit(error.exit_code)
     for finding in seen.findings:
         if not finding.stops:

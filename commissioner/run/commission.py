@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commissioner.errors import CommissionerError
+from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive_file import load_profile
 from commissioner.link.facts import Action, Intent
 from commissioner.link.inverter import Inverter
@@ -27,7 +27,7 @@ from commissioner.run.archive import RunFolder, archive_lost, plain, read_journa
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.operator_stop import OperatorStop
-from commissioner.run.runner import Course, Present, Runner
+from commissioner.run.runner import Course, Present, Runner, ended_by
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def carry_out(
     stop: OperatorStop,
 ) -> RunEnded:
     """The steps over the order's link, each refusal and failure as the end of a run. The job is journalled as `kind`;
-    a `stop` asked for before it began ends the run, too."""
+    a `stop` asked for before it began ends the run, too. A UsageError before the first request is raised, too."""
     profile = order.profile
     try:
         with open_drive(order.url, profile, order.plan) as port:
@@ -118,9 +118,11 @@ def carry_out(
                 folder.journal("link", port.stats.as_dict())
             return ended
     except CommissionerError as error:
+        ended = ended_by(error, 0.0)
         folder.journal("error", error.as_dict(), durable=True)
-        ended = RunEnded(error.outcome, error.what, 0.0, error.as_dict())
         folder.journal("run_ended", ended, durable=True)
+        if isinstance(error, UsageError):
+            raise
         return ended
 
 

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
+from commissioner.errors import Aborted, CommissionerError, DriveFault, UsageError, WriteBackFailed
 from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
@@ -292,7 +292,13 @@ class Runner:
     def _failed(self, error: CommissionerError | None) -> RunEnded:
         assert error is not None
         self._note("error", error.as_dict())
-        return RunEnded(error.outcome, error.what, self.energised_s, error.as_dict())
+        return ended_by(error, self.energised_s)
+
+
+def ended_by(error: CommissionerError, energised_s: float) -> RunEnded:
+    """The end that an error makes of a run; a call that cannot be right aborts one that has begun."""
+    outcome = "aborted" if isinstance(error, UsageError) else error.outcome
+    return RunEnded(outcome, error.what, energised_s, error.as_dict())
 
 
 def kind_of(record: object) -> str:

@@ -17,12 +17,14 @@ def test_a_run_over_tls_leaves_no_certificate_or_key_in_its_folder(tmp_path):
     for file in files.values():
         file.write_text("top secret")
     url = "tls://127.0.0.1:1?" + "&".join(f"{name}={file}" for name, file in files.items())
-    done = commission(
-        url, "simulated", load_motor("motor_2kw2"), load_procedure(), write_back=False, runs=tmp_path / "runs",
-        present=lambda record: None,
-    )  # fmt: skip
-    assert done.ended.outcome == "usage"
-    archived = {file.name: file.read_bytes() for file in done.folder.iterdir()}
+    with pytest.raises(UsageError, match="TLS files"):
+        commission(
+            url, "simulated", load_motor("motor_2kw2"), load_procedure(), write_back=False, runs=tmp_path / "runs",
+            present=lambda record: None,
+        )  # fmt: skip
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert summarise(folder).outcome == "aborted"
+    archived = {file.name: file.read_bytes() for file in folder.iterdir()}
     assert b"tls://127.0.0.1:1" in archived["request.json"]
     for content in archived.values():
         for secret in (b"top secret", b"cert-of-ours", b"key-of-ours"):
