@@ -17,7 +17,10 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
 
     summary = find_run(runs, run)
     if not yes and not as_json:
-        screen.out.print(f"The parameters that [bold]{summary.run}[/] found will be written into the drive and stored.")
+        screen.out.print(
+            f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
+            "stored. Make sure that it is the same drive."
+        )
         typer.confirm("Write?", abort=True)
     with screen.busy("writing and reading back"):
         done = restore(summary, drive)
