@@ -20,7 +20,8 @@ SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
 CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 MOST_LEAK_RATIO = 0.15
-STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6)
+STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
+"""Radii of stops and, negative, scales of exponential operators, over the largest iron flux."""
 
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:

@@ -40,6 +40,7 @@ from commissioner.diagnose.kinds import (
     STOP,
     VOLTAGE_MOD,
 )
+from commissioner.diagnose.memory import susceptibility
 from commissioner.diagnose.spline import curve, saturating, spline_weights
 from commissioner.diagnose.trajectory import leg_loss
 
@@ -146,7 +147,7 @@ def sensitivities(
         if wants_iron or has_iron:
             jm, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
         for s in range(stops):
-            f = stop_gain[s] / stop_radius[s]
+            f = stop_gain[s] / abs(stop_radius[s])
             ja += f * stop_states[t, s, 0]
             jb += f * stop_states[t, s, 1]
         # (3)
@@ -235,7 +236,8 @@ def sensitivities(
                 qa, qb = -over * fia - leak_ratio * ea, -over * fib - leak_ratio * eb
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
             elif kind == STOP:
-                fja, fjb = stop_states[t, n, 0] / stop_radius[n], stop_states[t, n, 1] / stop_radius[n]
+                f = 1.0 / abs(stop_radius[n])
+                fja, fjb = f * stop_states[t, n, 0], f * stop_states[t, n, 1]
             elif kind == BRANCH:
                 qa, qb = states[t, 4 + 2 * n], states[t, 5 + 2 * n]
                 fwa, fwb = -(waa * qa + wab * qb), -(wab * qa + wbb * qb)
@@ -284,25 +286,22 @@ def sensitivities(
             for s in range(stops):
                 if stop_gain[s] == 0.0:
                     continue
-                r = stop_radius[s]
-                f = stop_gain[s] / r
-                ya = stop_states[last, s, 0] + pa - ra
-                yb = stop_states[last, s, 1] + pb - rb
-                length = np.sqrt(ya * ya + yb * yb)
-                naa, nab, nbb = 1.0, 0.0, 1.0
-                if length > r:
-                    ua, ub = ya / length, yb / length
-                    naa, nab, nbb = r / length * (1.0 - ua * ua), -r / length * ua * ub, r / length * (1.0 - ub * ub)
+                f = stop_gain[s] / abs(stop_radius[s])
+                naa, nab, nbb, haa, hab, hbb = susceptibility(
+                    stop_states[last, s, 0], stop_states[last, s, 1], pa - ra, pb - rb, 0.0, 0.0, stop_radius[s]
+                )
                 still[s, 0], still[s, 1], still[s, 2] = naa, nab, nbb
                 jaa += f * naa
                 jab += f * nab
                 jbb += f * nbb
                 for p in range(count):
-                    qa, qb = dz[s, 0, p] - dflux[0, p], dz[s, 1, p] - dflux[1, p]
+                    ya, yb = dz[s, 0, p], dz[s, 1, p]
+                    qa, qb = -dflux[0, p], -dflux[1, p]
                     if kinds[p] == NU:
                         qa += sa
                         qb += sb
-                    dz[s, 0, p], dz[s, 1, p] = naa * qa + nab * qb, nab * qa + nbb * qb
+                    dz[s, 0, p] = haa * ya + hab * yb + naa * qa + nab * qb
+                    dz[s, 1, p] = hab * ya + hbb * yb + nab * qa + nbb * qb
                     fj[0, p] += f * dz[s, 0, p]
                     fj[1, p] += f * dz[s, 1, p]
 

@@ -4,7 +4,7 @@ States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged ro
 all as (alpha, beta) pairs. With fluxes as states every nonlinearity is explicit:
 
     psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
-    j      = G(|psi_0|) psi_0 + sum h_k z_k / r_k   extra magnetizing current, z_k stop operator of radius r_k (2)
+    j      = G(|psi_0|) psi_0 + sum h_k z_k / r_k   extra magnetizing current, z_k memory operator of scale r_k (2)
     i_s    = (1/L_sigma + A_sigma) psi_sigma + e + nu j,                  psi_sigma = psi_s - psi_R          (3)
     e      = S(|phi|) phi,   phi = psi_s - kappa psi_R          extra current of the saturating leakage path (3a)
     i      = (i_s + g v) / (1 + g R_s)              iron-loss conductance g across d psi_s/dt                (4)
@@ -27,6 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from commissioner.diagnose.memory import remembered, susceptibility
 from commissioner.diagnose.spline import curve, saturating, spline_weights
 
 SQRT3 = np.sqrt(3.0)
@@ -48,7 +49,7 @@ def _slope(
     base, legs, iron, leak, has_legs, legs_top, legs_knee, iron_top, leak_top,
     stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
 ):
-    """Right-hand side (1)-(7) at x into k[stage]; terminal current and its slope into out[0:4], stops into out[4:]."""
+    """Right-hand side (1)-(7) at x into k[stage]; terminal current and its slope into out[0:4]."""
     rs, gs, gm, nu, g, kappa = base[0], base[2], base[3], base[4], base[5], base[12]
     ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
     branches = branch_gain.shape[0]
@@ -60,15 +61,10 @@ def _slope(
     if iron.shape[0] > 0:
         _, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
     for s in range(stops):
-        r = stop_radius[s]
-        ya = z[s, 0] + pa - z_ref[0]
-        yb = z[s, 1] + pb - z_ref[1]
-        length = np.sqrt(ya * ya + yb * yb)
-        f = r / length if length > r else 1.0
-        out[4 + 2 * s] = ya * f
-        out[5 + 2 * s] = yb * f
-        ja += stop_gain[s] * ya * f / r
-        jb += stop_gain[s] * yb * f / r
+        ya, yb = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s])
+        f = stop_gain[s] / abs(stop_radius[s])
+        ja += f * ya
+        jb += f * yb
     # (3)
     sa = x[0] - x[2]
     sb = x[1] - x[3]
@@ -117,14 +113,12 @@ def _slope(
     dja = jaa * qa + jab * qb
     djb = jab * qa + jbb * qb
     for s in range(stops):
-        r = stop_radius[s]
-        ya = z[s, 0] + pa - z_ref[0]
-        yb = z[s, 1] + pb - z_ref[1]
-        length = np.sqrt(ya * ya + yb * yb)
-        along = (ya * qa + yb * qb) / (length * length) if length > r else 0.0
-        f = stop_gain[s] / max(length, r)
-        dja += f * (qa - along * ya)
-        djb += f * (qb - along * yb)
+        naa, nab, nbb, _, _, _ = susceptibility(
+            z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], qa, qb, stop_radius[s]
+        )
+        f = stop_gain[s] / abs(stop_radius[s])
+        dja += f * (naa * qa + nab * qb)
+        djb += f * (nab * qa + nbb * qb)
     ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
     fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
     out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja) * shrink
@@ -169,7 +163,7 @@ def propagate(
     slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
     x, y, k = np.zeros(order), np.zeros(order), np.zeros((4, order))
     z, z_ref = np.zeros((stops, 2)), np.zeros(2)
-    wts, out = np.zeros((5, 8)), np.zeros(4 + 2 * stops)
+    wts, out = np.zeros((5, 8)), np.zeros(4)
     legs_now = np.zeros(legs.shape[0])
     nu, rs, r_r = base[4], base[0], base[1]
     x[0:4] = initial_state
@@ -221,12 +215,7 @@ def propagate(
             pa = (1.0 - nu) * x[2] + nu * x[0]
             pb = (1.0 - nu) * x[3] + nu * x[1]
             for s in range(stops):
-                ya = z[s, 0] + pa - z_ref[0]
-                yb = z[s, 1] + pb - z_ref[1]
-                length = np.sqrt(ya * ya + yb * yb)
-                f = stop_radius[s] / length if length > stop_radius[s] else 1.0
-                z[s, 0] = ya * f
-                z[s, 1] = yb * f
+                z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s])
             z_ref[0] = pa
             z_ref[1] = pb
         last_a = now_a

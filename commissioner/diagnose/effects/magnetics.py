@@ -56,11 +56,13 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     "magnetic_hysteresis", "Hysteresis of the iron", sign=1, family="odd", sizes=_hysteresis_sizes,
     signature="a loop that does not depend on rate; broad odd lines falling slowly with order",
     confounders=("magnetizing_saturation", "dead_time", "rotor_skin_effect"),
-    source="vector stop operators (Prandtl-Ishlinskii): M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996",
+    source="stop operators: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996; exponential: P. R. Dahl, 1968",
     split_by="repeat the lowest tone at several amplitudes",
 )
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
-    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k the stop operator of the iron flux with fixed radius r_k.
+    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
+
+    ones) with fixed scales r_k.
 
     `split` as with saturation.
     """
