@@ -62,7 +62,7 @@ class LiveView:
             case told.ExcitationChosen():
                 volts = sum(amplitude for amplitude, _, _ in record.tones)
                 tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)
-                what = "first look at the motor: " if record.is_look else ""
+                what = "first look: " if record.is_look else ""
                 self._line(f"    {what}{record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
             case told.BiasChosen():
                 self._close()

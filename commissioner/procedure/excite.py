@@ -30,7 +30,8 @@ LOOK_STD = 0.15
 AXIS_SECONDS = 12.0
 """Energised on one axis at most, staircase and all, for rotor time constants up to 0.5 s."""
 SHORTEST = 0.6
-"""Of its planned time: what a first test keeps where look and staircase have taken the rest of the axis' time."""
+"""Of its planned time: what a first test keeps where look and staircase have taken the rest of the axis' time; where not
+even that is left beside a bias, the bias is left out."""
 FIRST_LOOK = 0.3
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
@@ -44,11 +45,13 @@ def excite(job: Job, findings: Findings) -> Step:
         look_s = FIRST_LOOK * seconds
         yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
         yield from _look(job, findings)
-    left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - bias_seconds(job) - 1.0 / job.scale_ramp_per_s
+    left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - 1.0 / job.scale_ramp_per_s
+    has_bias = left_s - bias_seconds(job) >= SHORTEST * seconds
+    left_s -= bias_seconds(job) if has_bias else 0.0
     seconds = min(seconds, max(left_s, SHORTEST * seconds))
     longest_s = max(seconds, left_s)
     chosen = _design(job, findings, seconds)
-    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s)
+    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, has_bias=has_bias)
     findings.excitations.append(chosen)
     findings.tests_done += 1
     if findings.tests_done == len(job.plan.tests_deg):
@@ -110,6 +113,7 @@ def _test(
     longest_s: float,
     *,
     is_look: bool = False,
+    has_bias: bool = False,
 ) -> Generator[Command, Any, None]:
     """One energised multitone session: raise the amplitude as the guard permits, end when the time is up and settled.
 
@@ -146,7 +150,7 @@ def _test(
         if under_test.is_time_to_tell():
             yield Tell(under_test.update(reading))
     finished = under_test.finished(is_look=is_look)
-    if not is_look:
+    if has_bias:
         yield from under_bias(job, findings, STEP, axis_deg, chosen.excitation, under_test)
     yield SetScale(0.0)
     yield from ramp_down(findings, STEP, axis_deg, 1.0 / job.scale_ramp_per_s)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
+from commissioner.procedure.steps import Findings
 from commissioner.run import replay as replaying
 from commissioner.run.archive import RunFolder, read_blocks, read_journal
 from commissioner.run.replay import replay
@@ -39,7 +40,7 @@ def test_the_golden_run_is_decided_again(golden):
     journal = read_journal(golden / "journal.jsonl")
     job = next(line["record"] for line in journal if line["kind"] == "job")
     archived = [line for line in journal if line["kind"] in replaying._DECISIONS]
-    replayed = list(replaying._decide_again(replaying._job(job), journal, golden))
+    replayed = list(replaying._decide_again(replaying._job(job), Findings(), journal, golden))
     assert [line["kind"] for line in archived] == [line["kind"] for line in replayed]
     for old, new in zip(archived, replayed, strict=True):
         assert_alike(old["record"], new["record"], old["kind"])
