@@ -9,6 +9,7 @@ import numpy as np
 
 from commissioner.monitor import channels, clock, columns, levels
 from commissioner.monitor.findings import Audited, Finding, Fundamental
+from commissioner.monitor.sensors import trust_of
 from commissioner.monitor.supply import (
     SupplyAngle,
     Vector,
@@ -56,14 +57,26 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> A
     findings += [Finding(*entry) for entry in pairing.findings]
     if pairing.is_refused:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
-    i, v = _vectors(currents, voltages, pairing, recording.voltages_are_line_to_line)
+    straight_i = [sign * currents[k] for k, sign in zip(pairing.current_order, pairing.current_sign, strict=True)]
+    straight_v = [sign * voltages[k] for k, sign in zip(pairing.voltage_order, pairing.voltage_sign, strict=True)]
+    i, v = _vectors(straight_i, straight_v, recording.voltages_are_line_to_line)
     supply = follow_supply(v, period, raw_frequency)
+    trust = trust_of(straight_i, straight_v, supply, period)
     fundamental = measure_fundamental(i, v, supply, period, pairing.runs_backwards)
     levels.switched_voltage(v, fundamental, findings)
     clock.hidden_jitter(v, supply, fundamental, period, findings)
     levels.plausible_size(fundamental, plate, findings)
     return Audited(
-        low, float(recording.time_s[low]), period, i, v, supply, fundamental, tuple(findings), pairing.channel_map
+        low,
+        float(recording.time_s[low]),
+        period,
+        i,
+        v,
+        supply,
+        fundamental,
+        tuple(findings),
+        pairing.channel_map,
+        trust,
     )
 
 
@@ -103,11 +116,7 @@ def _phasors(
     )
 
 
-def _vectors(
-    currents: list[Signal], voltages: list[Signal], pairing: channels.Pairing, line_to_line: bool
-) -> tuple[Vector, Vector]:
-    ordered_i = [sign * currents[k] for k, sign in zip(pairing.current_order, pairing.current_sign, strict=True)]
-    ordered_v = [sign * voltages[k] for k, sign in zip(pairing.voltage_order, pairing.voltage_sign, strict=True)]
-    star = phase_voltages(*ordered_v) if line_to_line else (ordered_v[0], ordered_v[1], ordered_v[2])
-    i, v = space_vector(*ordered_i), space_vector(*star)
+def _vectors(currents: list[Signal], voltages: list[Signal], line_to_line: bool) -> tuple[Vector, Vector]:
+    star = phase_voltages(*voltages) if line_to_line else (voltages[0], voltages[1], voltages[2])
+    i, v = space_vector(*currents), space_vector(*star)
     return i - i.mean(), v - v.mean()

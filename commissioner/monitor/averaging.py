@@ -9,7 +9,7 @@ phases may follow a shaft whose speed wanders.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,8 @@ class Lines:
     current_influence: Vector
     voltage_influence: Vector
     supply_rad_per_s: float
+    asymmetry: float = 0.0
+    """Share of the mean that unlike sensors turn into a negative sequence."""
 
 
 def synchronous_average(signal: Vector, sample_period_s: float, period_s: float) -> Vector:
@@ -204,13 +206,13 @@ def free_orders(
 
 def keep(lines: Lines, wanted: NDArray[np.bool_]) -> Lines:
     """Only the lines marked `wanted` `(k,)`."""
-    return Lines(
-        lines.comb[wanted],
-        lines.order[wanted],
-        lines.rate_rad_per_s[wanted],
-        lines.current_a[wanted],
-        lines.voltage_v[wanted],
-        lines.current_influence[:, wanted],
-        lines.voltage_influence[:, wanted],
-        lines.supply_rad_per_s,
+    return replace(
+        lines,
+        comb=lines.comb[wanted],
+        order=lines.order[wanted],
+        rate_rad_per_s=lines.rate_rad_per_s[wanted],
+        current_a=lines.current_a[wanted],
+        voltage_v=lines.voltage_v[wanted],
+        current_influence=lines.current_influence[:, wanted],
+        voltage_influence=lines.voltage_influence[:, wanted],
     )

@@ -17,12 +17,13 @@ from commissioner.monitor.estimate import estimate
 from commissioner.monitor.findings import Audited, Finding
 from commissioner.monitor.fit import Fitted, Problem, Start
 from commissioner.monitor.mean_speed import whole_record_speed
-from commissioner.monitor.members import members_of, with_wobble
+from commissioner.monitor.members import members_of, pole_count, with_wobble
 from commissioner.monitor.periods import Periodicity, ShaftSearch
 from commissioner.monitor.proof import Proof, prove
 from commissioner.monitor.slow_slip import slip_phase
 from commissioner.monitor.steadiness import frequency_wander, too_little
 from commissioner.monitor.supply import TurningFrame, quietest, turning_frame
+from commissioner.monitor.systematic import with_sensors
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_power
@@ -71,6 +72,7 @@ class Observation:
     segment_speed_rad_per_s: float
     mean_torque_nm: float
     mean_torque_std: float
+    mean_torque_sensor_std: float
     proof: Proof
     findings: tuple[Finding, ...]
     inertia_kg_m2: float | None
@@ -122,6 +124,11 @@ def observe(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None
     trouble = too_little(frame, part, found)
     if trouble is not None:
         return Refused(audited, trouble, (*audited.findings, trouble))
+    poles = pole_count(found, found.spectrum, plate.pole_pairs, wishes.load_frequencies_hz)
+    if poles is not None:
+        audited = replace(audited, findings=(*audited.findings, poles))
+        if poles.stops:
+            return Refused(audited, poles, audited.findings)
     inertia = wishes.inertia_kg_m2 if wishes.inertia_kg_m2 is not None else plate.inertia_kg_m2
     return _invert(audited, frame, part, search, found, start, plate, inertia)
 
@@ -154,19 +161,19 @@ def _invert(
     assert found.shaft is not None
     shaft_speed = 2 * np.pi * found.shaft.frequency_hz
     shaft_std = 2 * np.pi * found.shaft.frequency_std_hz
-    lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
+    lines = _lines(audited, frame, part, combs)
     lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
     if len(combs) > 1:
         bent = with_wobble(combs, problem, fitted, kept, shaft_speed)
         if bent is not None:
             combs = bent
-            lines = feeder.quieten(separate(frame, part, list(combs), SUPPLY_ORDERS), len(combs))
+            lines = _lines(audited, frame, part, combs)
             lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
-    solved = waveform.solve(problem, fitted, kept)
+    solved = with_sensors(waveform.solve(problem, fitted, kept), audited.sensors, lines, len(combs), problem, start)
     period = _characteristic(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
     )
-    torque, torque_std = waveform.mean_torque_nm(problem, solved)
+    torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     whole, whole_std = whole_record_speed(frame, part, found, lines)
     proof = prove(audited, frame, part, combs, problem, solved)
     return Observation(
@@ -190,10 +197,17 @@ def _invert(
         shaft_speed,
         torque,
         torque_std,
+        sensor_std,
         proof,
         (*audited.findings, frequency_wander(frame, part)),
         inertia,
     )
+
+
+def _lines(audited: Audited, frame: TurningFrame, part: slice, combs: tuple[Comb, ...]) -> Lines:
+    """All lines of the segment, the voltages at load frequencies as the feeder makes them."""
+    lines = separate(frame, part, list(combs), SUPPLY_ORDERS)
+    return feeder.quieten(replace(lines, asymmetry=audited.sensors.asymmetry), len(combs))
 
 
 def _characteristic(

@@ -24,13 +24,14 @@ STANDS_OUT = 16.0
 """Power over variance at which an order is kept against its envelope: P = (1 + 16/24)^-24 = 5e-6 on noise whose variance
 24 blocks gave."""
 BEYOND = 3
-"""Orders up to so many times the highest one are counted in what is left out."""
+"""Orders up to so many times the highest one, and those on lines of others, are counted in what is left out."""
 
 
 @dataclass(frozen=True)
 class Share:
     """`share[k]` of each harmonic is kept; `missing[k]` is the expected |error|^2 besides the noise that `share` lets through, in
-    the units of the power given; `beyond` the expected sum of |amplitude|^2 k^2 ... of the orders above the highest.
+    the units of the power given; `beyond` what orders that could not be seen (too high, or on a line of the mains) are
+    expected to hold: the sums of their powers and of power over order squared.
     """
 
     share: Signal
@@ -46,17 +47,22 @@ def shares(orders: NDArray[np.int64], power: Signal, variance: Signal) -> Share:
     clear = np.where(power > STANDS_OUT * variance, power, 0.0)
     strongest = int(orders[int(np.argmax(clear))]) if clear.any() else 1
     is_pulse = orders % strongest == 0
-    for own, unit in ((is_pulse, strongest), (~is_pulse, 1)):
+    every = np.arange(1, BEYOND * int(orders.max()) + 1)
+    unseen = every[~np.isin(every, orders)]
+    for own, unit, hidden in (
+        (is_pulse, strongest, unseen[unseen % strongest == 0]),
+        (~is_pulse, 1, unseen[unseen % strongest != 0]),
+    ):
         if own.any():
-            share[own], missing[own], after = _family(orders[own] / unit, power[own], variance[own])
-            beyond += np.array([np.sum(after[0]), np.sum(after[0] / (after[1] * unit) ** 2)])
+            share[own], missing[own], likely = _family(orders[own] / unit, power[own], variance[own], hidden / unit)
+            beyond += np.array([np.sum(likely), np.sum(likely / hidden**2)])
     stands = np.where(power > STANDS_OUT * variance, 1 - variance / np.maximum(power, 1e-300), 0.0)
     missing = np.where(stands > share, (1 - stands) ** 2 * power, missing)
     return Share(np.maximum(share, stands), missing, beyond)
 
 
-def _family(place: Signal, power: Signal, variance: Signal) -> tuple[Signal, Signal, tuple[Signal, Signal]]:
-    """(shares, missing powers, (expected powers, places) above the highest) of orders on one envelope A place^(-2a)."""
+def _family(place: Signal, power: Signal, variance: Signal, hidden: Signal) -> tuple[Signal, Signal, Signal]:
+    """(shares, missing powers, powers expected at the places `hidden`) of orders on one envelope A place^(-2a)."""
     noise = np.maximum(variance, 1e-300)
     low = np.log(1e-3 * float(np.min(noise * place**2)))
     high = np.log(10.0 * float(np.max(power + noise) * np.max(place) ** 2))
@@ -70,7 +76,5 @@ def _family(place: Signal, power: Signal, variance: Signal) -> tuple[Signal, Sig
     share = np.einsum("ad,adm->m", weight, factor)
     spread = np.einsum("ad,adm->m", weight, factor**2) - share**2
     left = np.einsum("ad,adm->m", weight, factor * noise) - share**2 * noise + np.maximum(spread, 0.0) * power
-    step = float(np.min(np.diff(place))) if place.size > 1 else 1.0
-    above = np.arange(place.max() + step, BEYOND * place.max() + 0.5 * step, step)
-    later = np.einsum("ad,adm->m", weight, np.exp(level[:, None, None] - 2 * DECAYS[:, None] * np.log(above)))
-    return share, np.maximum(left, 0.0), (later, above)
+    likely = np.einsum("ad,adm->m", weight, np.exp(level[:, None, None] - 2 * DECAYS[:, None] * np.log(hidden)))
+    return share, np.maximum(left, 0.0), likely

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from commissioner.monitor.sensors import Trust
 from commissioner.monitor.supply import SupplyAngle, Vector
 
 
@@ -65,6 +66,7 @@ class Audited:
     fundamental: Fundamental | None
     findings: tuple[Finding, ...]
     channel_map: Mapping[str, str]
+    sensors: Trust = field(default_factory=Trust)
 
     @property
     def refusal(self) -> Finding | None:

@@ -83,8 +83,8 @@ def informative(lines: Lines, mains: int) -> NDArray[np.bool_]:
     return np.array([p != mains or abs(int(k)) in strong for p, k in zip(lines.comb, lines.order, strict=True)])
 
 
-def fit(problem: Problem, start: Start) -> Fitted:
-    """Bounded trust-region least squares within a decade of the start (20)."""
+def fit(problem: Problem, start: Start, first: TCircuit | None = None) -> Fitted:
+    """Bounded trust-region least squares within a decade of the start (20); `first` is where it begins."""
     centre = logs_of(start.circuit)
     split = start.circuit.rotor_leakage_h / start.circuit.stator_leakage_h
     prior = np.array(start.log_std)
@@ -93,7 +93,12 @@ def fit(problem: Problem, start: Start) -> Fitted:
         return np.concatenate([_robust(_misfit(problem, circuit_of(logs, split))), (logs - centre) / prior])
 
     solved = least_squares(
-        residual, centre, method="trf", bounds=(centre - DECADE, centre + DECADE), x_scale=prior, max_nfev=80
+        residual,
+        centre if first is None else logs_of(first),
+        method="trf",
+        bounds=(centre - DECADE, centre + DECADE),
+        x_scale=prior,
+        max_nfev=80,
     )
     circuit = circuit_of(solved.x, split)
     data = _misfit(problem, circuit)

@@ -10,13 +10,17 @@ import numpy as np
 from commissioner.monitor.averaging import Comb
 from commissioner.monitor.combs import Found
 from commissioner.monitor.estimate import Kept, band_weights, speed_lines
+from commissioner.monitor.findings import Finding
 from commissioner.monitor.fit import Fitted, Problem
-from commissioner.monitor.periods import Periodicity
+from commissioner.monitor.periods import VISIBLE, PairSpectrum, Periodicity
 from commissioner.monitor.tracking import PhaseDrift
 
 MOST_TURNS = 6
 """A load that repeats after at most so many shaft turns is one comb with the shaft."""
 FM_MATTERS_RAD = 0.02
+MOST_PAIRS = 6
+SAME_LINE = 3e-4
+"""Of a frequency: whole-number ratios of gears and belts with teeth are met as well as that, belts that slip are not."""
 
 
 def members_of(found: Found) -> list[Periodicity]:
@@ -43,6 +47,44 @@ def members_of(found: Found) -> list[Periodicity]:
             drift=slow,
         )
     return [shaft, *independent]
+
+
+def pole_count(found: Found, spectrum: PairSpectrum, pairs: int, given_hz: tuple[float, ...]) -> Finding | None:
+    """Whether the lines ask for another number of poles than the plate's; the slip is the same for each.
+
+    A line at p / p' of the shaft's frequency is where the once-per-turn line of a motor of p' pole pairs lies. It is
+    taken for one where it is a whole part of a turn, or where the shaft's own first line is missing. If, the other way
+    round, only every second (third) order is there, a load with as many pulses per turn explains it as well: said only.
+    """
+    shaft = found.shaft
+    assert shaft is not None
+    visible = [h for h in range(1, 9) if spectrum.at(np.array([h * shaft.frequency_hz]), 0.3)[0] > VISIBLE]
+    for load in found.loads:
+        for other in range(1, MOST_PAIRS + 1):
+            near = abs(load.frequency_hz * other / (pairs * shaft.frequency_hz) - 1) < SAME_LINE
+            told = any(abs(load.frequency_hz - f) < 0.01 * f for f in given_hz)
+            if near and other != pairs and not told and (other % pairs == 0 or 1 not in visible):
+                return Finding(
+                    "pole_count",
+                    "refused",
+                    f"the load line at {load.frequency_hz:.4g} Hz is the shaft of a motor with {2 * other} poles; "
+                    f"the plate says {2 * pairs}, with which the shaft turns at {shaft.frequency_hz:.4g} Hz",
+                    2 * pairs,
+                    2 * other,
+                    "correct pole_pairs and rated_speed_rpm; if a load truly turns at that frequency, give it (--load-hz)",
+                )
+    for step in range(pairs, 1, -1):
+        if pairs % step == 0 and visible and all(h % step == 0 for h in visible):
+            return Finding(
+                "pole_count",
+                "note",
+                f"only every {step}. order of the shaft is seen: a load with {step} pulses per turn, or a motor of "
+                f"{2 * pairs // step} poles (then the speed is {step} times higher and the torque so much lower)",
+                2 * pairs,
+                2 * pairs // step,
+                "compare poles and speed with the plate of this very motor",
+            )
+    return None
 
 
 def with_wobble(

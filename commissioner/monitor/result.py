@@ -39,7 +39,9 @@ def as_document(
         "outcome": "done",
         "refused_because": None,
         "mean_speed_rad_per_s": quantity(observation.mean_speed_rad_per_s, observation.mean_speed_std),
-        "mean_torque_nm": quantity(observation.mean_torque_nm, observation.mean_torque_std),
+        "mean_torque_nm": quantity(observation.mean_torque_nm, observation.mean_torque_std)
+        | {"std_from_sensors": observation.mean_torque_sensor_std},
+        "sensors": _sensors(observation.audited),
         "slip": observation.slip,
         "segment": _segment(observation),
         "parameters": _parameters(observation.fitted),
@@ -191,6 +193,18 @@ def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> dict[str,
             {"code": f.code, "kind": f.kind, "what": f.what, "value": f.value, "limit": f.limit, "remedy": f.remedy}
             for f in findings
         ],
+    }
+
+
+def _sensors(audited: Audited) -> dict[str, object]:
+    """What was taken for the sensors' own errors: part of every std, and never seen in one recording."""
+    trust = audited.sensors
+    return {
+        "gain_std": trust.gain_std,
+        "current_to_voltage_skew_std_s": trust.skew_std_s,
+        "asymmetry": trust.asymmetry,
+        "sentence": "Gain and delay common to a group of sensors do not show in a recording; each std holds their share. "
+        "The asymmetry is measured: sums that should be zero.",
     }
 
 

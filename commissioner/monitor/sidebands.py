@@ -23,8 +23,6 @@ deviation); no torque makes it. Mixed eccentricity shows 50 dB below the current
 stator and an oval rotor, 0.8 % of the gap each: their product's half, 75 dB below."""
 LINE_MODEL_ERROR = 0.015
 """Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
-SENSOR_ASYMMETRY = 0.001
-"""Difference between the gains of three sensors: that share of the mean appears as a negative sequence."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ def band_error(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, mean
     drop = np.abs(lines.voltage_v) + leak * np.abs(lines.current_a)
     wrong = LINE_MODEL_ERROR * drop
     twice = np.abs(np.abs(lines.rate_rad_per_s / lines.supply_rad_per_s) - 2.0) < 1e-6
-    wrong = np.where(twice, np.hypot(wrong, SENSOR_ASYMMETRY * drop[0]), wrong).astype(np.complex128)
+    wrong = np.where(twice, np.hypot(wrong, lines.asymmetry * drop[0]), wrong).astype(np.complex128)
     still = np.zeros((1, lines.order.size), dtype=np.complex128)
     _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, still, wrong[None, :])
     gap = _gap_voltages(circuit, lines, mean_speed_rad_per_s)

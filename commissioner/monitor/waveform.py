@@ -41,6 +41,8 @@ class Waveform:
     speed_std: Signal
     torque_std: Signal
     load_torque_std: Signal | None
+    noise_rms: tuple[float, float, float]
+    """Speed, torque, load torque: the part of the deviations that is drawn anew in each recording, rms over the period."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Solved:
     kept: Kept
     changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
     """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
+    sensor_changes: int = 0
+    """So many of them, the last ones, are the sensors'."""
 
 
 def solve(problem: Problem, fitted: Fitted, kept: Kept) -> Solved:
@@ -160,7 +164,16 @@ def evaluate(
         spread[0],
         spread[1],
         load_std,
+        _noise_rms(value, moved[: lines.current_influence.shape[0]], inertia or 0.0),
     )
+
+
+def _noise_rms(
+    value: tuple[Signal, Signal, Signal], moved: list[tuple[Signal, Signal, Signal]], inertia: float
+) -> tuple[float, float, float]:
+    speed, torque = (sum(np.mean((m[k] - value[k]) ** 2) for m in moved) for k in range(2))
+    load = sum(np.mean((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2) for m in moved)
+    return float(np.sqrt(speed)), float(np.sqrt(torque)), float(np.sqrt(load))
 
 
 def _at(
@@ -174,8 +187,8 @@ def _at(
     return speed.mean_rad_per_s + 2 * both[:, 0].real, torque, 2 * both[:, 1].real
 
 
-def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float]:
-    """Mean electromagnetic torque over all combs' phases, and its standard deviation."""
+def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float, float]:
+    """Mean electromagnetic torque over all combs' phases, its standard deviation, and the sensors' part of that."""
     on, lines = problem.on, problem.lines
 
     def mean(circuit: TCircuit, flux: Vector, current: Vector) -> float:
@@ -183,7 +196,8 @@ def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float]:
 
     value = mean(solved.circuit, solved.state.flux_wb, lines.current_a)
     moved = [mean(circuit, flux, current) - value for circuit, _, flux, current in solved.changes]
-    return value, float(np.sqrt(np.sum(np.square(moved))))
+    sensors = moved[len(moved) - solved.sensor_changes :]
+    return value, float(np.sqrt(np.sum(np.square(moved)))), float(np.sqrt(np.sum(np.square(sensors))))
 
 
 __all__ = ["Lines", "Solved", "Torus", "Waveform", "evaluate", "mean_torque_nm", "solve", "speed_on"]
