@@ -31,12 +31,13 @@ BEYOND = 3
 class Share:
     """`share[k]` of each harmonic is kept; `missing[k]` is the expected |error|^2 besides the noise that `share` lets through, in
     the units of the power given; `beyond` what orders that could not be seen (too high, or on a line of the mains) are
-    expected to hold: the sums of their powers and of power over order squared.
+    expected to hold: the sums of their powers and of power over order squared. `strongest` is the pulses' order.
     """
 
     share: Signal
     missing: Signal
     beyond: Signal
+    strongest: int = 1
 
 
 def shares(orders: NDArray[np.int64], power: Signal, variance: Signal) -> Share:
@@ -58,7 +59,7 @@ def shares(orders: NDArray[np.int64], power: Signal, variance: Signal) -> Share:
             beyond += np.array([np.sum(likely), np.sum(likely / hidden**2)])
     stands = np.where(power > STANDS_OUT * variance, 1 - variance / np.maximum(power, 1e-300), 0.0)
     missing = np.where(stands > share, (1 - stands) ** 2 * power, missing)
-    return Share(np.maximum(share, stands), missing, beyond)
+    return Share(np.maximum(share, stands), missing, beyond, strongest)
 
 
 def _family(place: Signal, power: Signal, variance: Signal, hidden: Signal) -> tuple[Signal, Signal, Signal]:

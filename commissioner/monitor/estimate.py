@@ -32,6 +32,8 @@ class Kept:
     share: Signal
     speed_variance: float
     acceleration_variance: float
+    between_pulses: float = 0.0
+    """Of the acceleration's, the part in the shaft's orders between multiples of the strongest: what makes pulses unlike."""
 
 
 def estimate(
@@ -50,7 +52,7 @@ def estimate(
 def trim(lines: Lines, mains: int, circuit: TCircuit, pairs: int, speed: float) -> tuple[Lines, Kept]:
     """Each comb's orders that carry something, as long as their two side bands agree on a real speed."""
     wanted = np.ones(lines.comb.size, dtype=np.bool_)
-    drawn, speed_variance, acceleration_variance = [], 0.0, 0.0
+    drawn, speed_variance, acceleration_variance, between = [], 0.0, 0.0, 0.0
     for comb in range(mains):
         own = keep(lines, (lines.comb == comb) | (lines.comb < 0))
         if own.order.size == 1:
@@ -65,9 +67,11 @@ def trim(lines: Lines, mains: int, circuit: TCircuit, pairs: int, speed: float) 
         missing = made.missing + np.where(is_kept, 0.0, made.share**2 * (variance + power) * orders**2)
         rate = float(own.rate_rad_per_s[positive][0]) / int(orders[0])
         speed_variance += 2 * float(np.sum(missing / orders**2) + made.beyond[1])
+        if comb == 0:
+            between = 2 * rate**2 * float(np.sum(missing[orders % made.strongest != 0]))
         acceleration_variance += 2 * rate**2 * float(np.sum(missing) + made.beyond[0])
     share = np.concatenate(drawn) if drawn else np.zeros(0)
-    return keep(lines, wanted), Kept(share, speed_variance, acceleration_variance)
+    return keep(lines, wanted), Kept(share, speed_variance, acceleration_variance, between)
 
 
 def _harmonics(own: Lines, circuit: TCircuit, pairs: int, speed: float) -> tuple[Signal, Signal]:

@@ -56,10 +56,13 @@ def _headline(seen: Observation, verdict: Verdict | None) -> str:
 def _facts(seen: Observation) -> list[tuple[str, str]]:
     return [
         ("mean speed", f"{seen.mean_speed_rad_per_s * RPM:.3f} ± {max(seen.mean_speed_std * RPM, 5e-4):.3f} 1/min"),
-        ("mean torque", f"{seen.mean_torque_nm:.3f} ± {seen.mean_torque_std:.3f} N m"),
+        (
+            "mean torque",
+            f"{seen.mean_torque_nm:.2f} ± {seen.mean_torque_std:.2f} N m ({seen.mean_torque_sensor_std:.2f} from sensors)",
+        ),
         ("slip", f"{100 * seen.slip:.3f} %"),
         ("supply", f"{seen.lines.supply_rad_per_s / 6.283185307179586:.4f} Hz"),
-        ("currents re-simulated to", f"{seen.proof.relative_rms:.1%}"),
+        ("currents re-simulated to", f"{seen.proof.relative_rms:.1%} rms"),
     ]
 
 
@@ -168,7 +171,9 @@ def _trend(verdict: Verdict, history: History, seen: Observation, indicators: Se
         "Against this machine's past",
         [
             picture(
-                figures.trend(history, indicators), "Healthy recordings, those judged since, and this one (last point)."
+                figures.trend(history, indicators, verdict),
+                "Healthy recordings, those judged since, and this one (last point), with two standard deviations of a recording. "
+                "Shaded: the range outside which an indicator alarms.",
             ),
             Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
         ],
@@ -195,11 +200,14 @@ def _motor(seen: Observation, document: dict[str, Any]) -> Section:
 
 def _audit(seen: Observation) -> Section:
     tones: list[Tone] = ["warn" if f.kind == "corrected" else "plain" for f in seen.findings]
+    trust = seen.audited.sensors
     channels = "; ".join(f"{phase}: {channel}" for phase, channel in seen.audited.channel_map.items())
     return Section(
         "What was found in the recording",
         [
             Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
             f"Channels as used: {channels}.",
+            f"Sensors are trusted to {trust.gain_std:.1%} in gain and {trust.skew_std_s * 1e6:.0f} us between currents and voltages; "
+            f"their sums, which should be zero, show {trust.asymmetry:.1%} of difference between channels.",
         ],
     )
