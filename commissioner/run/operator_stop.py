@@ -1,4 +1,4 @@
-"""What the operator's Ctrl-C, or the system's SIGTERM, means to a run."""
+"""What the operator's Ctrl-C, a closed terminal, or the system's SIGTERM means to a run."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import threading
 from types import FrameType
 from typing import Any
 
+STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
 
 class OperatorStop:
-    """Ctrl-C and SIGTERM, taken as a wish that the runner grants between two commands; never in the middle of one.
+    """Signals, taken as a wish that the runner grants between two commands; never in the middle of one.
 
     So a second Ctrl-C cannot interrupt the de-energising that the first one asked for. May be entered again inside
     itself.
@@ -20,7 +22,7 @@ class OperatorStop:
         self._before: list[list[tuple[int, Any]]] = []
 
     def __enter__(self) -> OperatorStop:
-        numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+        numbers = STOPS if threading.current_thread() is threading.main_thread() else ()
         self._before.append([(number, signal.signal(number, self._ask)) for number in numbers])
         return self
 

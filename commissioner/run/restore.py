@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from commissioner.link.url import TlsUrl, parse_url
 from commissioner.records import WrittenParameter
 from commissioner.run.archive import RunFolder, read_saved
 from commissioner.run.catalogue import RunSummary
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.replay import read_snapshot
 
 
@@ -49,15 +51,10 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             limit="an address with ca=, cert= and key=", remedy="give the drive's whole address with --drive",
         )  # fmt: skip
     snapshot = read_snapshot(folder)
-    journal = RunFolder(folder)
-    try:
+    with closing(RunFolder(folder)) as journal, OperatorStop():  # a set is never left half written for a Ctrl-C
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
-        try:
+        with closing(port):
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             report = inverter.restore(snapshot)
-        finally:
-            port.close()
         journal.journal("snapshot_restored", report, durable=True)
-    finally:
-        journal.close()
     return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)
