@@ -2,9 +2,8 @@
 run.
 
 Per axis: staircase -> R_s and inverter error; online observer over every stretch -> start values; batch fit with the
-extensions the data ask for (delay, inverter error, saturating iron; Bayesian information criterion). All axes share one
-inverter. Observer once more with what the batch fit found taken off; agreement and whiteness. Then the axes are
-combined.
+extensions the data ask for (delay, inverter error, saturating iron). All axes share one inverter. Observer once more
+with what the batch fit found taken off; agreement and whiteness. Then the axes are combined.
 """
 
 from __future__ import annotations

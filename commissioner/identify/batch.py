@@ -15,6 +15,7 @@ from commissioner.motor.circuit import Gamma, InverseGamma, Quantity
 from commissioner.records import Signal
 
 TABLE_ROWS = 2049
+PRICE = 4.0
 LEG_DOUBT, LEG_DOUBT_PER_KNEE = 0.0015, 0.15
 """What the drawn leg error may be off from the real one, of its plateau, at least and per knee over largest current: the
 nearer the knee is to the currents of the test, the less the tail is told from a resistance. It goes into R_s."""
@@ -72,9 +73,10 @@ class BatchFit:
         return Gamma(r_s, r_r, l_l, l_0)
 
     def criterion(self) -> float:
-        """Bayesian information criterion: N ln(SSE/N) + p ln N."""
+        """N ln(SSE/N) + 4 p: of nested models the larger where what it adds is beyond two standard errors. What a stricter
+        one (Bayes: p ln N) leaves out biases the rest by up to three or four of theirs."""
         n = self.samples
-        return n * math.log(self.sum_of_squares / n + 1e-300) + self.free_parameters * math.log(n)
+        return n * math.log(self.sum_of_squares / n + 1e-300) + PRICE * self.free_parameters
 
     def inverse_gamma_at(self, flux_wb: float) -> tuple[InverseGamma, Matrix]:
         """The secant machine at this peak stator flux and its (4, 4) covariance."""
@@ -140,11 +142,10 @@ def extended(fit: BatchFit, model: ModelChoice) -> Matrix:
     theta = np.zeros(model.size)
     theta[:SHARED] = fit.theta[:SHARED]
     theta[DELAY] *= float(model.with_delay)
-    old, new = fit.model.extra_powers, model.extra_powers
-    common = min(old, new)
     ratio = model.flux_scale_wb / fit.model.flux_scale_wb
-    powers = np.array([ratio ** (2 * m + 3) for m in range(common)])
-    theta[SHARED : SHARED + common] = fit.theta[SHARED : SHARED + common] * powers
+    for m, n in enumerate(model.exponents):
+        if n in fit.model.exponents:
+            theta[SHARED + m] = fit.theta[SHARED + fit.model.exponents.index(n)] * ratio**n
     leg = fit.inverter()
     if leg is not None and model.leg:
         theta[model.leg_slice] = model.leg.coefficients(leg)

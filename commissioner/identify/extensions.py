@@ -13,11 +13,12 @@ from commissioner.errors import DataRefused
 from commissioner.identify.batch import BatchFit, Segment, extended
 from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_law import LegLaw
-from commissioner.identify.model import CIRCUIT, Matrix, ModelChoice, start_theta
+from commissioner.identify.model import CIRCUIT, IRON, Matrix, ModelChoice, start_theta
 from commissioner.identify.resistance import InverterError, knee_shape
 from commissioner.motor.circuit import InverseGamma
 
-EXTRA_POWERS = 4
+BETTER = 4.0
+"""What a criterion must gain for another model to be tried from there."""
 BLIND_LOSSES = (0.1, 0.4)
 COARSE, MOST_COARSE_STEPS = 0.03, 20
 """While models are compared: steps, in standard errors, that count as none, and how many are tried."""
@@ -26,13 +27,15 @@ COARSE, MOST_COARSE_STEPS = 0.03, 20
 def select_model(
     segments: Sequence[Segment], period_s: float, starts: Sequence[InverseGamma], leg: InverterError | None
 ) -> BatchFit:
-    """Greedy choice by the Bayesian criterion: whichever of delay, inverter error, saturation and drift helps most is
+    """Greedy choice by the fit's criterion: whichever of delay, inverter error, saturation and drift helps most is
     added, then the next, and what has become superfluous is dropped. A staircase's inverter error is in from the start;
     without one it is unknown, and the fit begins with none, a small and a large one, from every start."""
     law = LegLaw(max(float(np.max(np.abs(s.current_a))) for s in segments))
     rms_v = max(float(np.std(s.voltage_v)) for s in segments)
     legs = [leg] if leg else [None, *(knee_shape(share * rms_v, law.corner_a, 2.0) for share in BLIND_LOSSES)]
-    begun = _those_simulated([partial(_begin, segments, period_s, start, each, law) for start in starts for each in legs])
+    begun = _those_simulated(
+        [partial(_begin, segments, period_s, start, each, law) for start in starts for each in legs]
+    )
     if not begun:
         raise DataRefused(
             "the model cannot be simulated from any start", step="identify", value=f"{len(starts)} starts", limit="one",
@@ -45,7 +48,7 @@ def select_model(
     while True:
         m = best.model
         toggled = (
-            replace(m, extra_powers=0 if m.extra_powers else EXTRA_POWERS),
+            *(replace(m, extra_powers=n) for n in _more_or_less_iron(m.extra_powers)),
             replace(m, with_delay=not m.with_delay),
             replace(m, with_drift=not m.with_drift),
             replace(m, leg=None if m.leg and not _loses_voltage(best) else law),
@@ -53,10 +56,28 @@ def select_model(
         untried = [t for t in toggled if t not in tried]
         trials = _those_simulated([partial(_coarse, segments, period_s, start, t, extended(best, t)) for t in untried])
         tried.update(toggled)
-        better = [t for t in trials if t.criterion() < best.criterion() - 10.0 and np.all(t.theta[:4] > 0.0)]
+        better = [t for t in trials if t.criterion() < best.criterion() - BETTER and np.all(t.theta[:4] > 0.0)]
         if not better:
-            return _from_every_start(segments, period_s, starts, best)
+            return _from_every_start(segments, period_s, starts, _with_iron(segments, period_s, start, best))
         best = min(better, key=lambda t: t.criterion())
+
+
+def _more_or_less_iron(powers: int) -> tuple[int, ...]:
+    """Neighbours in `IRON`; from straight iron also the middle of it at once."""
+    steps = tuple(IRON)
+    at = steps.index(powers)
+    return (1, 4) if powers == 0 else steps[at - 1 : at] + steps[at + 1 : at + 2]
+
+
+def _with_iron(segments: Sequence[Segment], period_s: float, start: InverseGamma, best: BatchFit) -> BatchFit:
+    """Iron saturates, seen or not: behind a real inverter a trace of it stays in the model, so that what it may do to L_M
+    stays in the standard errors."""
+    if best.model.leg is None or best.model.extra_powers:
+        return best
+    model = replace(best.model, extra_powers=1, flux_scale_wb=best.peak_flux_wb)
+    return next(
+        iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model))])), best
+    )
 
 
 def _from_every_start(

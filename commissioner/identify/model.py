@@ -18,10 +18,15 @@ Matrix = NDArray[np.float64]
 CIRCUIT, DELAY, SHARED, OWN = output_error.CIRCUIT, output_error.DELAY, output_error.SHARED, output_error.OWN
 
 
+IRON = {0: (), 1: (7,), 2: (5, 9), 4: (3, 5, 7, 9), 6: (3, 5, 7, 9, 11, 13)}
+"""Powers of flux in the magnetizing current by their number: iron bends late (powers 6 to 10 fit published curves), so a
+trace of saturation is a high power."""
+
+
 @dataclass(frozen=True)
 class ModelChoice:
-    """What beyond the linear circuit is fitted: `extra_powers` odd powers (3, 5, ...) of flux in the magnetizing
-    current relative to `flux_scale_wb`, the values of the inverter's `leg` law, a delay; with drift every segment has a sensor offset of its own, else one is common."""
+    """What beyond the linear circuit is fitted: `extra_powers` powers (`IRON`) of flux in the magnetizing current
+    relative to `flux_scale_wb`, the values of the inverter's `leg` law, a delay; with drift every segment has a sensor offset of its own, else one is common."""
 
     extra_powers: int = 0
     flux_scale_wb: float = 1.0
@@ -32,6 +37,10 @@ class ModelChoice:
     @property
     def size(self) -> int:
         return SHARED + self.extra_powers + self.leg_size
+
+    @property
+    def exponents(self) -> tuple[int, ...]:
+        return IRON[self.extra_powers]
 
     @property
     def leg_size(self) -> int:
@@ -66,7 +75,7 @@ def start_theta(start: InverseGamma, model: ModelChoice, leg: InverterError | No
 def extra_current(theta: Matrix, model: ModelChoice, flux_wb: Signal) -> Signal:
     """Magnetizing current (A) beyond psi / L_0 at these stator fluxes."""
     relative = flux_wb / model.flux_scale_wb
-    return np.asarray(sum(theta[SHARED + m] * relative ** (2 * m + 3) for m in range(model.extra_powers)))
+    return np.asarray(sum(theta[SHARED + m] * relative**n for m, n in enumerate(model.exponents)))
 
 
 def secant(theta: Matrix, model: ModelChoice, flux_wb: float) -> Matrix:

@@ -21,6 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Exponents = NDArray[np.int64]
 
 CIRCUIT = 4
 DELAY = 4
@@ -73,15 +74,17 @@ def _mean_loss(table: Array, integral: Array, per_a: float, i0: float, i1: float
 
 
 @njit(cache=True)
-def _extra(theta: Array, powers: int, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
+def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
     """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
     relative = flux / flux_scale
-    x, g, slope = relative, 0.0, 0.0
-    for m in range(powers):
-        slope += theta[SHARED + m] * (2 * m + 3) * x * relative / flux_scale
-        x *= relative * relative
-        power[m] = x
-        g += theta[SHARED + m] * x
+    even, reached, g, slope = 1.0, 1, 0.0, 0.0
+    for m in range(exponents.size):
+        while reached < exponents[m]:
+            even *= relative * relative
+            reached += 2
+        power[m] = even * relative
+        g += theta[SHARED + m] * power[m]
+        slope += theta[SHARED + m] * reached * even / flux_scale
     return g, slope
 
 
@@ -99,7 +102,7 @@ def simulate(
     db1: Array,
     db2: Array,
     theta: Array,
-    extra_powers: int,
+    exponents: Exponents,
     flux_scale: float,
     basis: Array,
     basis_integral: Array,
@@ -118,14 +121,14 @@ def simulate(
     `information`, `score`.
 
     First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
-    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `basis` (rows, k) tabulates the
+    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising. `basis` (rows, k) tabulates the
     coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
     from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
     (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
     W e^2.
     """
     p = wanted.size
-    k_f = basis.shape[1]
+    k_f, extra_powers = basis.shape[1], exponents.size
     first_g, first_f = SHARED, SHARED + extra_powers
     first_own = first_f + k_f
     per_a = (basis.shape[0] - 1) / current_span
@@ -142,7 +145,7 @@ def simulate(
     dg, dg_last, push = np.zeros(p), np.zeros(p), np.zeros(p)
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
-    g, slope_g = _extra(theta, extra_powers, flux_scale, x1, power)
+    g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
     g_last = g
     i = h_s * x1 + h_r * x2 + g
     for j in range(p):
@@ -202,7 +205,7 @@ def simulate(
                 low, high = -np.inf, np.inf
                 for _ in range(_MOST_STEPS):
                     mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i)
-                    g, slope_g = _extra(theta, extra_powers, flux_scale, c1 - b1[h, 0] * mean, power)
+                    g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1[h, 0] * mean, power)
                     missed = i - free + beta * mean - g
                     if abs(missed) <= _SOLVED * (current_span + reach):
                         break
@@ -216,7 +219,7 @@ def simulate(
             old1, old2 = x1, x2
             x1, x2 = c1 - b1[h, 0] * mean, c2 - b1[h, 1] * mean
             if k_f == 0:
-                g, slope_g = _extra(theta, extra_powers, flux_scale, x1, power)
+                g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
                 i = h_s * x1 + h_r * x2 + g
             held -= mean
 

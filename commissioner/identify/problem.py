@@ -178,7 +178,7 @@ class Problem:
             db1,
             db2,
             theta,
-            model.extra_powers,
+            np.array(model.exponents, dtype=np.int64),
             model.flux_scale_wb,
             self.bases[k],
             self.integrals[k],
