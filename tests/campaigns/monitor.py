@@ -194,7 +194,8 @@ def play(scenario: dict[str, Any], seed: int) -> tuple[Observation | Refused, di
 
 
 def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str, float]:
-    """Errors in per cent: mean speed and torque of their values, waveforms (rms, means removed) of half their peak to peak.
+    """Errors in per cent: mean speed and torque of their values; waveforms (rms, means removed) of their amplitude, which is
+    half of peak to peak; beside it of the largest deviation from the mean, and of the rms.
 
     The truth's waveform is what repeats with the loads: its least-squares lines on the true phases over the segment.
     """
@@ -212,7 +213,10 @@ def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str,
     ):
         expected = _periodic(true[inside], played.time_s[inside], played.angle_rad[inside], truth, seen)
         error = own - own.mean() - expected + expected.mean()
-        out[name] = float(100 * np.sqrt(np.mean(error**2)) / (0.5 * np.ptp(expected)))
+        rms = 100 * float(np.sqrt(np.mean(error**2)))
+        out[name] = rms / float(0.5 * np.ptp(expected))
+        out[f"{name}_of_peak"] = rms / float(np.abs(expected - expected.mean()).max())
+        out[f"{name}_of_rms"] = rms / float(expected.std())
     return out
 
 
@@ -301,6 +305,13 @@ def summary(rows: list[dict[str, Any]]) -> str:
                 f"{kind:<11} {len(own):>4} {sum(r['found'] for r in own):>6} | {np.median(speed):>7.4f} /{speed.max():>7.4f} "
                 f"{rest[0]} | {rest[1]} {rest[2]} | {rest[3]} {rest[4]}"
             )
+    done = [r for r in rows if not r["refused"]]
+    for what, limit in (("ripple", 5.0), ("load", 5.0)):
+        shares = [
+            f"{sum(r[key] <= (10.0 if what == 'ripple' and r['kind'] in MULTI else limit) for r in done)} of {len(done)} ({of})"
+            for key, of in ((what, "half peak to peak"), (f"{what}_of_peak", "peak"), (f"{what}_of_rms", "rms"))
+        ]
+        lines.append(f"{what} within its limit: " + ", ".join(shares))
     return "\n".join(
         [
             *lines,

@@ -80,7 +80,9 @@ def test_a_dead_channel_is_refused_by_name() -> None:
 def test_a_third_current_follows_from_two() -> None:
     recording, plate, _ = taken("running_compressor", 1, SHORT)
     i = recording.currents_a
-    seen = inspect(replace(recording, currents_a=(i[0], np.full(i[0].size, np.nan), i[2])), plate, from_nameplate(plate))
+    seen = inspect(
+        replace(recording, currents_a=(i[0], np.full(i[0].size, np.nan), i[2])), plate, from_nameplate(plate)
+    )
     whole = inspect(recording, plate, from_nameplate(plate))
     assert [f.code for f in seen.findings if f.kind == "corrected"] == ["third_current"]
     assert abs(seen.fundamental.current_a / whole.fundamental.current_a - 1) < 1e-3
