@@ -268,7 +268,7 @@ def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
         _wait_for(lambda: any(row["event"] == "energised" for row in sim.log()))
         time.sleep(0.7)
         os.kill(run.pid, signal.SIGKILL)
-        run.wait()
+        run.communicate()
         _wait_for(
             lambda: [r for r in sim.log() if r["event"] in ("energised", "de_energised")][-1]["event"] == "de_energised"
         )
