@@ -27,8 +27,9 @@ __all__ = ["excite", "warm_up"]
 STEP = "multitone test"
 LOOK_STD = 0.15
 """A value of the first look counts where its relative standard error is below this."""
-AXIS_SECONDS = 12.0
-"""Energised on one axis at most, staircase and all, for rotor time constants up to 0.5 s."""
+AXIS_SECONDS = 11.85
+"""Energised on one axis, staircase and all, for rotor time constants up to 0.5 s: 12 s at most, and sessions end a block
+late."""
 SHORTEST = 0.6
 """Of its planned time: what a first test keeps where look and staircase have taken the rest of the axis' time; where not
 even that is left beside a bias, the bias is left out."""
