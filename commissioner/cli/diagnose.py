@@ -180,36 +180,61 @@ def _finish(document: Mapping[str, Any], out: Path | None, as_json: bool) -> Non
         raise typer.Exit(3)
 
 
-def _first_size(sizes: Mapping[str, Any]) -> str:
-    from commissioner.report.diagnose_page import quantity
-
-    return next((quantity(value, key) for key, value in sizes.items()), "")
+COLOURS = {"explained": "green", "nothing_significant": "green", "not_distinguishable": "yellow"}
+MOST_LIMITS = 6
 
 
 def _show(document: Mapping[str, Any], out: Path | None) -> None:
-    """The short human view: sentence, causes, gain, what next."""
+    """The short human view: sentence, error, causes, what would have been seen, what next."""
     from commissioner.cli.screen import out as screen
-    from commissioner.cli.screen import table
-    from commissioner.report.diagnose_page import headline
+    from commissioner.report.diagnose_page import headline, in_words, next_sentence, number
 
-    colour = {"explained": "green", "nothing_significant": "green", "not_distinguishable": "yellow"}.get(document["verdict"], "red")
-    screen.print(f"[bold {colour}]{document['verdict']}[/]  {headline(document)}")
-    if document["reason"] != headline(document):
-        screen.print(document["reason"])
-    if document["causes"]:
-        screen.print(table("", ("cause", "size", "share", "sure", "or"), [
-            (c["name"], _first_size(c["parameters"]), f"{c['gain_share']:.1%}",
-             f"{c['confidence']:.0%}", ", ".join(c["equivalent"]))
-            for c in document["causes"]
-        ], right=(2, 3)))
+    colour = COLOURS.get(document["verdict"], "red")
+    screen.print(f"[bold {colour}]{_escaped(headline(document))}[/]")
+    for sentence in in_words(document):
+        screen.print(_escaped(sentence))
     gain = document["gain"]
     if gain["rmse_before_a"] is not None:
-        floor = f", noise {gain['noise_floor_a'] * 1e3:.4g} mA" if gain["noise_floor_a"] else ""
-        screen.print(f"error {gain['rmse_before_a'] * 1e3:.4g} -> {gain['rmse_after_a'] * 1e3:.4g} mA rms on data left out{floor}")
+        before, after = (f"{number(gain[k] * 1e3)}" for k in ("rmse_before_a", "rmse_after_a"))
+        change = f"{before} -> {after} mA" if document["causes"] else f"{before} mA"
+        noise = f", noise {number(gain['noise_floor_a'] * 1e3)} mA" if gain["noise_floor_a"] else ""
+        screen.print(f"error {change} rms on data left out{noise}")
+    if document["causes"]:
+        screen.print(_table_of_causes(document))
+    elif document.get("detection_limit_sizes"):
+        screen.print(f"would have been seen: {_limits(document)}")
     for sentence in (*document.get("remarks", ()), *document.get("audit", ())):
-        screen.print(f"[dim]{sentence}[/]")
+        screen.print(f"[dim]{_escaped(sentence)}[/]")
     if document["next_experiment"]:
-        screen.print(f"next: {document['next_experiment']['do']}")
+        screen.print(f"next  {_escaped(next_sentence(document['next_experiment']))}")
     if out is not None:
-        screen.print(f"[dim]report[/] {out}")
+        screen.print(f"[dim]report[/] {_escaped(str(out))}", soft_wrap=True)
 
+
+def _escaped(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def _table_of_causes(document: Mapping[str, Any]) -> Any:
+    from commissioner.cli.screen import table
+    from commissioner.report.diagnose_page import percent, quantity, sure
+
+    def row(cause: Mapping[str, Any]) -> tuple[str, ...]:
+        size = next((quantity(value, key) for key, value in cause["parameters"].items()), "")
+        share = percent(cause["gain_share"]) if cause.get("found_by") != "audit" else "-"
+        return cause["name"], size, share, sure(cause["confidence"]), ", ".join(cause["equivalent"])
+
+    rows = [row(cause) for cause in document["causes"]]
+    header = ("cause", "size", "share", "name right", *(["or as well"] if any(r[-1] for r in rows) else []))
+    return table("", header, [r[: len(header)] for r in rows], right=(2, 3))
+
+
+def _limits(document: Mapping[str, Any]) -> str:
+    """The detection limits of the commonest causes."""
+    from commissioner.report.diagnose_page import limit_words
+
+    common = ("dead_time", "leakage_saturation", "magnetizing_saturation", "rotor_skin_effect", "sampling_delay", "sensor_offset")
+    known = [n for n in (*common, *document["detection_limit_sizes"]) if n in document["detection_limit_sizes"]]
+    return ", ".join(f"{n} from {limit_words(document, n)}" for n in dict.fromkeys(known[:MOST_LIMITS]))

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Cause, Diagnosis
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.points_diagnosis import PointsDiagnosis
+from commissioner.diagnose.search import Found
 from commissioner.motor.circuit import Quantity
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
@@ -37,6 +42,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
         "parameters_after": _quantities(seen.parameters_after),
         "below_materiality": list(seen.below_materiality),
         "detection_limits": dict(seen.detection_limits),
+        "detection_limit_sizes": limit_sizes(seen.found) if seen.found else {},
         "cannot_tell": list(NEVER_NAMEABLE) if seen.found else [],
         "line_levels_db": dict(seen.split.level_db) if seen.split else {},
         "audit": list(seen.audit.sentences),
@@ -59,6 +65,30 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "alternatives": dict(cause.rivals.items()),
         "found_by": "audit" if cause.from_audit else "fit",
     }
+
+
+def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
+    """The detection limits as engineering sizes: the first of each effect, at its most visible shape."""
+    screening, out = found.first_screening, {}
+    scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)
+    for name, score in screening.scores.items():
+        k = list(screening.columns[name])
+        powers, shapes = np.linalg.eigh(screening.projected[np.ix_(k, k)])
+        if powers[-1] <= 0.0:
+            continue
+        theta = shapes[:, -1] * np.sqrt(score.threshold / (scale * powers[-1]))
+        theta = theta if theta.sum() >= 0.0 else -theta
+        sizes = CATALOGUE[name].sizes(found.setting, {t.symbol: x * t.step for t, x in zip(score.terms, theta, strict=True)})
+        key, (value, unit) = max(_comparable(sizes), key=lambda item: abs(item[1][0]))
+        if np.isfinite(value) and value != 0.0:
+            out[name] = {key: {"value": abs(float(value)), "unit": unit}}
+    return out
+
+
+def _comparable(sizes: Sizes) -> list[tuple[str, tuple[float, str]]]:
+    """Sizes in one unit (offsets of three sensors) compare; of different units only the first measures the effect."""
+    items = list(sizes.items())
+    return items if len({unit for _, unit in sizes.values()}) == 1 else items[:1]
 
 
 def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:

@@ -17,7 +17,7 @@ def next_experiment(verdict: str, causes: Sequence[Any], record: Record) -> Mapp
         return {
             "splits": [cause.name, *cause.equivalent],
             "do": CATALOGUE[cause.name].split_by,
-            "predicted_sigma": _predicted(cause),
+            "predicted_sigma": _predicted(cause) if {"dead_time", "device_drop"} <= {cause.name, *cause.equivalent} else None,
         }
     if verdict == "unexplained":
         return {"splits": ["unknown"], "do": "repeat every segment at half amplitude and one with the shaft blocked"}

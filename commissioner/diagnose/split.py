@@ -6,10 +6,11 @@ even lines are the sums of three (odd) and two (even) excited frequencies; what 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.noise import repeats
@@ -53,29 +54,38 @@ def _segment_levels(segment: Segment, tones: list[float], period: float) -> dict
     across = (beta * np.cos(angle) - alpha * np.sin(angle))[-n:]
     window = np.blackman(n)
     spectrum = np.abs(np.fft.rfft((along - along.mean()) * window)) ** 2
-    width = 1.0 / (n * period)
-    excited = _at(spectrum, tones, width)
-    odd = _at(spectrum, [f for f in _sums(tones, 3) if _is_free(f, tones, width)], width)
-    even = _at(spectrum, [f for f in _sums(tones, 2) if _is_free(f, tones, width)], width)
     cross = np.abs(np.fft.rfft((across - across.mean()) * window)) ** 2
-    return {"excited": excited, "odd": odd, "even": even, "cross_axis": _at(cross, tones, width)}
+    bins = class_bins(tones, n, period)
+    return {k: _mean(spectrum, bins[k]) for k in ("excited", "odd", "even")} | {"cross_axis": _mean(cross, bins["excited"])}
 
 
-def _sums(tones: list[float], order: int) -> list[float]:
+def class_bins(tones: Sequence[float], samples: int, period_s: float) -> dict[str, NDArray[np.int64]]:
+    """Bins of a spectrum of so many samples by class: `excited`, and for few tones `odd` and `even` distortion."""
+    width = 1.0 / (samples * period_s)
+    frequencies = {"excited": list(tones)}
+    if len(tones) <= MOST_TONES:
+        frequencies["odd"] = [f for f in _sums(tones, 3) if _is_free(f, tones, width)]
+        frequencies["even"] = [f for f in _sums(tones, 2) if _is_free(f, tones, width)]
+    out = {}
+    for name, listed in frequencies.items():
+        index = np.unique(np.round(np.array(listed) / width).astype(np.int64))
+        out[name] = index[(index > 0) & (index <= samples // 2)]
+    return out
+
+
+def _sums(tones: Sequence[float], order: int) -> list[float]:
     out = {0.0}
     for _ in range(order):
         out = {round(abs(a + s * f), 6) for a in out for f in tones for s in (-1.0, 1.0)}
     return sorted(out)
 
 
-def _is_free(f: float, tones: list[float], width: float) -> bool:
+def _is_free(f: float, tones: Sequence[float], width: float) -> bool:
     return f > 4.0 * width and all(abs(f - t) > 4.0 * width for t in tones)
 
 
-def _at(spectrum: np.ndarray, frequencies: list[float], width: float) -> float:
-    index = np.unique(np.round(np.array(frequencies) / width).astype(int))
-    index = index[(index > 0) & (index < spectrum.shape[0])]
-    return float(np.mean(spectrum[index])) if index.size else 0.0
+def _mean(spectrum: NDArray[np.float64], bins: NDArray[np.int64]) -> float:
+    return float(np.mean(spectrum[bins])) if bins.size else 0.0
 
 
 def _drifting(record: Record) -> float:

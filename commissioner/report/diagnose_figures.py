@@ -1,73 +1,162 @@
-"""The figures of a diagnosis: error over what it may depend on, over time and axis, and its spectrum."""
+"""The figures of a diagnosis: error over what it may depend on, its spectrum, its tie to the command, causes that look alike."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
+from numpy.typing import NDArray
 
-from commissioner.diagnose.residuals import Residuals
-from commissioner.report.page import BLUE, MUTED, ORANGE, PLOT_STYLE
+from commissioner.diagnose.alike import Alike
+from commissioner.diagnose.residuals import Correlation, Residuals, Spectrum
+from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BEFORE, AFTER = "simulation as it was", "with the named causes"
+TOTAL_WIDTH = 9.4
+BAND = 2.58
+"""99 % of a normal variable."""
+CLASS_WORDS = {"excited": "excited", "odd": "odd\ndistortion", "even": "even\ndistortion", "other": "all others"}
+Array = NDArray[np.float64]
+Wanted = ParamSpec("Wanted")
 
 
-def over_quantities(seen: Residuals) -> Figure:
+def _styled(draw: Callable[Wanted, Figure]) -> Callable[Wanted, Figure]:
+    """Draws in the house style without changing matplotlib's settings for others."""
+
+    @wraps(draw)
+    def drawn(*args: Wanted.args, **keys: Wanted.kwargs) -> Figure:
+        import matplotlib as mpl
+
+        with mpl.rc_context(PLOT_STYLE):
+            return draw(*args, **keys)
+
+    return drawn
+
+
+@_styled
+def over_quantities(seen: Residuals, has_causes: bool) -> Figure:
     """Four panels: error against current, voltage, flux and slope."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(PLOT_STYLE):
-        figure = Figure(figsize=(9.4, 5.6))
-        for axes, curve in zip(figure.subplots(2, 2).flat, seen.curves, strict=True):
-            axes.plot(curve.at, curve.before_a * 1e3, color=ORANGE, label=BEFORE)
-            axes.plot(curve.at, curve.after_a * 1e3, color=BLUE, label=AFTER)
-            if curve.spread_a.any():
-                low, high = (curve.after_a - 2 * curve.spread_a) * 1e3, (curve.after_a + 2 * curve.spread_a) * 1e3
-                axes.fill_between(curve.at, low, high, color=BLUE, alpha=0.15, linewidth=0)
-            axes.set_xlabel(curve.label)
-            axes.set_ylabel("error rms / mA" if "flux" in curve.label else "mean error / mA")
-        figure.axes[0].legend()
+    figure = _figure(5.6)
+    for axes, curve in zip(figure.subplots(2, 2).flat, seen.curves, strict=True):
+        _pair(axes, curve.at, curve.before_a * 1e3, curve.after_a * 1e3, has_causes)
+        if curve.spread_a.any():
+            low, high = (curve.after_a - 2 * curve.spread_a) * 1e3, (curve.after_a + 2 * curve.spread_a) * 1e3
+            axes.fill_between(curve.at, low, high, color=BLUE, alpha=0.15, linewidth=0)
+            axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        else:
+            axes.set_ylim(0, None)
+        axes.set_xlabel(curve.label)
+        axes.set_ylabel("size of the error / mA rms" if "flux" in curve.label else "mean error / mA")
+    figure.axes[0].legend()
     return figure
 
 
-def over_time_and_axis(seen: Residuals) -> Figure:
+@_styled
+def over_time_and_axis(seen: Residuals, has_causes: bool, noise_a: float) -> Figure:
     """Two panels: error rms over the recording's time, and for each axis."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(PLOT_STYLE):
-        figure = Figure(figsize=(9.4, 3.0))
-        left, right = figure.subplots(1, 2, width_ratios=(2, 1))
-        left.plot(seen.time_s, seen.time_before_a * 1e3, ".", color=ORANGE, label=BEFORE)
-        left.plot(seen.time_s, seen.time_after_a * 1e3, ".", color=BLUE, label=AFTER)
-        left.set(xlabel="time / s", ylabel="error rms / mA", ylim=(0, None))
-        left.legend()
-        at = np.arange(seen.by_axis_deg.shape[0])
-        right.bar(at - 0.2, seen.by_axis_before_a * 1e3, 0.4, color=ORANGE)
-        right.bar(at + 0.2, seen.by_axis_after_a * 1e3, 0.4, color=BLUE)
-        right.set_xticks(at, [f"{a:.0f}°" for a in seen.by_axis_deg])
-        right.set(xlabel="axis", ylabel="error rms / mA")
+    figure = _figure(2.9)
+    left, right = figure.subplots(1, 2, width_ratios=(2, 1), sharey=True)
+    _pair(left, seen.time_s, seen.time_before_a * 1e3, seen.time_after_a * 1e3, has_causes, ".")
+    left.set(xlabel="time / s", ylabel="size of the error / mA rms")
+    left.axhline(noise_a * 1e3, color=MUTED, linestyle="--", label="noise")
+    at = np.arange(seen.by_axis_deg.shape[0])
+    width = 0.4 if has_causes else 0.6
+    right.bar(at - (0.2 if has_causes else 0.0), seen.by_axis_before_a * 1e3, width, color=ORANGE)
+    if has_causes:
+        right.bar(at + 0.2, seen.by_axis_after_a * 1e3, width, color=BLUE)
+    right.axhline(noise_a * 1e3, color=MUTED, linestyle="--")
+    right.set_xticks(at, [f"{a:.0f}°" for a in seen.by_axis_deg])
+    right.set_xlim(-0.8, at.size - 0.2)
+    right.set(xlabel="axis")
+    left.set_ylim(0, 1.25 * 1e3 * float(max(seen.time_before_a.max(), seen.time_after_a.max(), noise_a)))
+    left.legend(ncols=3, loc="upper left")
     return figure
 
 
-def spectrum(seen: Residuals, tones_hz: tuple[float, ...]) -> Figure:
-    """Lines of the error before and after, with the excited frequencies marked and the noise level."""
-    import matplotlib as mpl
+@_styled
+def spectrum(seen: Spectrum, tones_hz: Sequence[float], has_causes: bool) -> Figure:
+    """Lines of the error with the excited frequencies marked and the noise; beside it the classes of frequency."""
+    figure = _figure(3.3)
+    axes, bars = figure.subplots(1, 2, width_ratios=(2.2, 1))
+    axes.loglog(seen.frequency_hz, seen.before_a * 1e3, color=ORANGE, linewidth=0.7, label=BEFORE)
+    if has_causes:
+        axes.loglog(seen.frequency_hz, seen.after_a * 1e3, color=BLUE, linewidth=0.7, label=AFTER)
+    axes.loglog(seen.frequency_hz, seen.noise_a * 1e3, color=INK, linestyle="--", linewidth=1.0, label="noise")
+    for tone in tones_hz:
+        axes.axvline(tone, color=MUTED, linewidth=0.5, alpha=0.5, zorder=0)
+    top = 1e3 * float(max(seen.before_a.max(), seen.noise_a.max()))
+    axes.set_ylim(0.1e3 * float(seen.noise_a.min()), 8.0 * top)
+    axes.set(xlabel="frequency / Hz (thin lines: excited)", ylabel="line of the error / mA rms")
+    axes.legend(loc="upper right", ncols=3)
+    names = [k for k in CLASS_WORDS if k in seen.by_class]
+    at = np.arange(len(names))
+    shift = 0.2 if has_causes else 0.0
+    before, after = ([seen.by_class[n][k] for n in names] for k in (0, 1))
+    bars.bar(at - shift, before, 0.4, color=ORANGE)
+    if has_causes:
+        bars.bar(at + shift, after, 0.4, color=BLUE)
+    bars.axhline(1.0, color=INK, linestyle="--", linewidth=1.0)
+    bars.set_yscale("log")
+    bars.set_ylim(0.3, 3.0 * max(*before, *after, 1.0))
+    bars.yaxis.set_major_formatter("{x:g}")
+    bars.set_xticks(at, [CLASS_WORDS[n] for n in names], fontsize=7.5)
+    bars.set_xlim(-0.7, at.size - 0.3)
+    bars.set(ylabel="error, times the noise")
+    return figure
+
+
+@_styled
+def correlation(seen: Correlation, has_causes: bool) -> Figure:
+    """Error against the command a while earlier, with the band that noise alone stays in."""
+    figure = _figure(2.7)
+    axes = figure.subplots()
+    axes.axhspan(-BAND, BAND, color=MUTED, alpha=0.25, linewidth=0, label="noise alone stays here 99 % of the time")
+    _pair(axes, seen.lag_s * 1e3, seen.before, seen.after, has_causes)
+    largest = float(np.abs(np.concatenate([seen.before, seen.after])).max())
+    if largest > 10.0 * BAND:
+        axes.set_yscale("symlog", linthresh=BAND)
+        axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(-max(2.0 * largest, 2.0 * BAND), max(4.0 * largest, 2.0 * BAND))
+    axes.set(xlabel="how long the current's error comes after the voltage / ms", ylabel="tie to the voltage,\ntimes the noise")
+    axes.legend(ncols=3, loc="upper right")
+    return figure
+
+
+@_styled
+def look_alikes(seen: Alike, named: Sequence[str]) -> Figure:
+    """Heat map, row: the cause at work, column: the cause it may be taken for. Found causes are bold."""
+    count = len(seen.names)
+    figure = _figure(min(1.9 + 0.27 * count, 6.0), width=min(3.4 + 0.38 * count, TOTAL_WIDTH))
+    axes = figure.subplots()
+    axes.imshow(seen.share, cmap="Blues", vmin=0.0, vmax=1.15, aspect="auto")
+    words = [n.replace("_", " ") for n in seen.names]
+    axes.set_xticks(range(count), words, rotation=40, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(count), words)
+    for label, name in zip([*axes.get_xticklabels(), *axes.get_yticklabels()], seen.names * 2, strict=True):
+        label.set(color=INK, fontsize=8.0, fontweight="bold" if name in named else "normal")
+    for row, column in np.argwhere(seen.share >= 0.1):
+        share = float(seen.share[row, column])
+        text = "" if row == column else f"{100.0 * share:.0f}"
+        axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color="white" if share > 0.6 else INK)
+    axes.grid(False)
+    axes.set(xlabel="could be taken for ... (%)", ylabel="cause at work")
+    return figure
+
+
+def _pair(axes: Axes, x: Array, before: Array, after: Array, has_causes: bool, style: str = "-") -> None:
+    """The error before in orange and, where causes were named, after in blue."""
+    axes.plot(x, before, style, color=ORANGE, label=BEFORE)
+    if has_causes:
+        axes.plot(x, after, style, color=BLUE, label=AFTER)
+
+
+def _figure(height: float, width: float = TOTAL_WIDTH) -> Figure:
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(PLOT_STYLE):
-        figure = Figure(figsize=(9.4, 3.2))
-        axes = figure.subplots()
-        shown = seen.spectrum_hz > 0
-        axes.loglog(seen.spectrum_hz[shown], seen.spectrum_before_a[shown] * 1e3, color=ORANGE, linewidth=0.6, label=BEFORE)
-        axes.loglog(seen.spectrum_hz[shown], seen.spectrum_after_a[shown] * 1e3, color=BLUE, linewidth=0.6, label=AFTER)
-        axes.axhline(seen.spectrum_noise_a * 1e3, color=MUTED, linestyle="--", label="noise")
-        for tone in tones_hz:
-            axes.axvline(tone, color=MUTED, linewidth=0.5, alpha=0.5)
-        axes.set(xlabel="frequency / Hz (thin lines: excited)", ylabel="line of the error / mA rms")
-        axes.legend(loc="upper right")
-    return figure
+    return Figure(figsize=(width, height))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from commissioner.diagnose.alike import Alike, look_alikes
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.residuals import residuals
+from commissioner.diagnose.residuals import Residuals, residuals
 from commissioner.report import diagnose_figures as figures
-from commissioner.report.page import Page, Section, Table, Tone, picture
+from commissioner.report.page import Page, Picture, Section, Table, Tone, picture
 
 TONES: Mapping[str, Tone] = {
     "explained": "good", "nothing_significant": "good", "not_distinguishable": "warn", "unexplained": "bad", "refused": "bad",
 }
+SURE = 0.8
+"""Names below this probability are marked."""
 NAMES = (
     ("stator_resistance_ohm", "stator resistance R_s", 1.0, "ohm"), ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "ohm"),
     ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
@@ -32,33 +36,76 @@ HEADLINES = {
 
 
 def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
-    """One self-contained page, in the order: headline, causes, error plots, spectrum, parameters, limits, data."""
-    sections = [Section("In one sentence", [_in_words(seen.reason), *seen.remarks])]
+    """One self-contained page: headline, where the error is, its frequencies, causes, what cannot be told, parameters, data."""
+    words = [*in_words(document), *_shares(document), *seen.remarks]
+    sections = [Section("In words", words)] if words else []
     if seen.found is not None and seen.noise is not None:
-        left = residuals(seen.found.record, seen.found.layout, seen.found.nominal.model, seen.found.fit.model, seen.noise)
         tones = seen.split.tones_hz if seen.split else ()
+        models = (seen.found.nominal.model, seen.found.fit.model)
+        left = residuals(seen.found.record, seen.found.layout, *models, seen.noise, tones)
+        has = bool(seen.found.accepted)
         sections += [
-            _causes(document), _next(document),
-            Section("Where the simulation is wrong", [
-                "Each curve is the mean error of the simulated current. An S-shape over current points to the inverter, a "
-                "parabola to a sensor, a rise with flux to saturation, a slope over di/dt to a delay. After naming the "
-                "causes the curves should lie on zero.",
-                picture(figures.over_quantities(left), "Mean error against current, voltage, flux and slope. Shaded: two "
-                        "standard errors."),
-                picture(figures.over_time_and_axis(left), "Size of the error over time and for each tested axis. A rise over "
-                        "time points to heating or drifting clocks, a difference between axes to unequal sensors or asymmetry."),
-                picture(figures.spectrum(left, tones), "Lines of the error. Errors only at excited frequencies are linear "
-                        "(delay, skin effect, iron loss); lines between them are distortion.", raster=True),
-            ]),
-            _classes(document), _parameters(document), _limits(document, _units(seen)),
+            _where(left, has, seen.noise.floor_a), _frequencies(left, has, tones, document), _causes(document),
+            _untold(document, look_alikes(seen.found.first_screening, seen.found.accepted)), _next(document),
+            _limits(document), _parameters(document),
         ]
-    sections.append(Section("The data", [*(seen.audit.sentences or ("Nothing unusual was found in the file.",))]))
+    sections.append(Section("The data", [*(document["audit"] or ("Nothing unusual was found in the file.",))]))
     return Page(
         title=f"Diagnosis: {name}", headline=headline(document), tone=TONES[seen.verdict.value], facts=_facts(document),
         sections=sections,
-        footer="Sizes are SI, per phase of the star equivalent; ± is one standard deviation. Shares do not add up to "
-        "100 % where causes resemble each other.",
+        footer="Sizes are SI, per phase of the star equivalent. ± is one standard error: in 19 of 20 cases the true value is "
+        "within twice of it. rms: root mean square, the effective value.",
     )
+
+
+def _shares(document: Mapping[str, Any]) -> list[str]:
+    """The headline's share per cause."""
+    made = [f"{_spoken(c['name'])} {percent(c['gain_share'])}" for c in document["causes"] if c["found_by"] == "fit"]
+    if not made:
+        return []
+    return [
+        f"Share of the error's power that goes when the cause is put in the simulation, and comes back without it: {', '.join(made)}."
+        + (" Shares need not add up to 100 %, because causes partly do the same." if len(made) > 1 else "")
+    ]
+
+
+def _where(left: Residuals, has_causes: bool, noise_a: float) -> Section:
+    after = " With the causes named (blue) it should lie on zero." if has_causes else ""
+    return Section("Where the simulation is wrong", [
+        "The curves are measured minus simulated current. An S-shape over current points to the inverter, a "
+        "parabola to a sensor, a rise with flux to saturation, a slope over di/dt to a delay." + after,
+        picture(figures.over_quantities(left, has_causes), "Error against current, voltage, flux and steepness of the current. "
+                "Shaded: what the noise leaves open. A curve within the shade is no error."),
+        picture(figures.over_time_and_axis(left, has_causes, noise_a), "Size of the error over time and for each tested axis. "
+                "A rise over time points to heating or drifting clocks, unequal axes to unequal sensors or an unequal machine."),
+    ])
+
+
+def _frequencies(left: Residuals, has_causes: bool, tones: Sequence[float], document: Mapping[str, Any]) -> Section:
+    return Section("At which frequencies", [
+        picture(figures.spectrum(left.spectrum, tones, has_causes), "Errors at excited frequencies alone are linear (delay, skin "
+                "effect, iron loss). Odd distortion lines come from inverter and saturation, even ones from a curved sensor or a DC "
+                "bias. Bars at 1 (dashed) are pure noise.", raster=True),
+        picture(figures.correlation(left.correlation, has_causes), "How far the error follows the voltage that was applied a "
+                "little earlier. Inside the grey band nothing linear is left to model; distortion does not show here."),
+        *_classes(document),
+    ])
+
+
+def _untold(document: Mapping[str, Any], alike: Alike) -> Section:
+    """Heat map of causes that resemble each other here, and what terminals never tell."""
+    parts: list[str | Table | Picture] = []
+    tied = [" or ".join(_spoken(n) for n in (c["name"], *c["equivalent"])) for c in document["causes"] if c["equivalent"]]
+    if tied:
+        parts.append(f"Of the causes found, these data leave open: {'; '.join(tied)}.")
+    if len(alike.names) > 1:
+        parts.append(picture(figures.look_alikes(alike, [c["name"] for c in document["causes"]]), "Which causes look alike in this "
+                     "recording: how much of the row's error the column could imitate. Dark off the diagonal (98 and more): "
+                     "only another experiment tells the two apart. Bold: found here."))
+    if alike.alone:
+        parts.append(f"Like no other cause in this recording: {', '.join(map(_spoken, alike.alone))}.")
+    never = [f"Never told apart at the terminals of a motor at standstill: {s.replace(' | ', ', or ')}." for s in document["cannot_tell"]]
+    return Section("What these data cannot tell apart", [*parts, *never])
 
 
 def headline(document: Mapping[str, Any]) -> str:
@@ -83,11 +130,14 @@ def _quantity_name(key: str) -> str:
     return _spoken(key)
 
 
-def _in_words(reason: str) -> str:
-    """The reason with the names of causes as people say them."""
+def in_words(document: Mapping[str, Any]) -> list[str]:
+    """The reason where the headline does not say it already, with the names of causes as people say them."""
+    if document["verdict"] not in ("unexplained", "refused") or document["kind"] == "points":
+        return []
+    reason = str(document["reason"])
     for name in CATALOGUE:
         reason = reason.replace(name, _spoken(name))
-    return reason
+    return [reason]
 
 
 def _facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -101,65 +151,130 @@ def _facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     if gain["noise_floor_a"]:
         facts.append(("noise of the measurement", f"{gain['noise_floor_a'] * 1e3:.4g} mA rms"))
     if gain["held_out"] is not None and document["causes"]:
-        facts.append(("of the error explained on data not used in the fit", f"{gain['held_out']:.2%}"))
+        facts.append(("of the error explained on data not used in the fit", percent(gain["held_out"])))
     return facts
 
 
 def _causes(document: Mapping[str, Any]) -> Section:
     if not document["causes"]:
-        return Section("Causes", ["No cause passed the rules. The last table lists what would have been seen."])
+        return Section("Causes", ["No cause was found. What would have been seen is listed further down."])
     rows: list[tuple[str, ...]] = []
     tones: list[Tone] = []
     for cause in document["causes"]:
         sizes = "; ".join(f"{_quantity_name(k)} {quantity(v, k)}" for k, v in cause["parameters"].items())
-        also = " or ".join(_spoken(n) for n in cause["equivalent"]) or "-"
+        is_fit = cause["found_by"] == "fit"
         rows.append((
-            _spoken(cause["name"]), sizes, f"{cause['gain_share']:.1%}", f"{cause['strength_over_noise']:.3g}",
-            f"{cause['confidence']:.0%}", also,
+            _spoken(cause["name"]), sizes or "-", percent(cause["gain_share"]) if is_fit else "-",
+            f"{cause['strength_over_noise']:.2g} x" if is_fit else "-", sure(cause["confidence"]),
+            _best_alternative(cause), limit_words(document, cause["name"]) if is_fit else "-",
         ))
-        tones.append("warn" if cause["equivalent"] or cause["confidence"] < 0.8 else "good")
+        tones.append("warn" if cause["equivalent"] or cause["confidence"] < SURE else "good")
     meanings = [f"{_spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].signature}." for c in document["causes"]]
     return Section("Causes", [
         Table(
-            ("cause", "size", "share of the error", "its error over the noise", "probability that the name is right", "could as well be"),
-            rows, tones,
+            ("cause", "size", "share of the error", "its error, times the noise", "probability that the name is right",
+             "best alternative", "seen from"),
+            rows, tones, caption="Best alternative: the other cause that would explain the data nearly as well. Seen from: the "
+            "smallest size that these data would have shown.",
         ),
         *meanings,
     ])
 
 
+def _best_alternative(cause: Mapping[str, Any]) -> str:
+    """The cause that fits as well, or the next best one and how much worse it does."""
+    if cause["equivalent"]:
+        return f"{' or '.join(_spoken(n) for n in cause['equivalent'])}, fits as well"
+    worse = {n: loss for n, loss in cause["alternatives"].items() if loss > 0}
+    if not worse or not cause["delta_chi2"]:
+        return "none near"
+    name, loss = min(worse.items(), key=lambda item: item[1])
+    kept = 1.0 - loss / cause["delta_chi2"]
+    return f"{_spoken(name)}, explains {percent(kept)} of it" if kept > 0.0 else "none near"
+
+
+def limit_words(document: Mapping[str, Any], name: str) -> str:
+    """Smallest size these data would have shown, in the unit that the cause's size has; `-` where there is none."""
+    for key, entry in document["detection_limit_sizes"].get(name, {}).items():
+        value, unit = entry["value"], entry["unit"]
+        if unit == "1" and key not in PLAIN_NUMBERS:
+            value, unit = 100.0 * value, "%"
+        prefix = 0
+        while unit in ("A", "V", "Wb", "S", "s") and value < 0.1 and prefix < 3:
+            value, prefix = 1000.0 * value, prefix + 1
+        return f"{number(value, 2)} {('', 'm', 'u', 'n')[prefix]}{unit}".removesuffix(" 1")
+    return "-"
+
+
+def sure(confidence: float) -> str:
+    """Nothing is certain."""
+    return "over 99 %" if confidence > 0.99 else f"{100.0 * confidence:.0f} %"
+
+
+def percent(share: float) -> str:
+    """Never 100 % where something is left, never 0 % where something is."""
+    if 0.9995 <= share < 1.0:
+        return "over 99.9 %"
+    return "under 0.1 %" if 0.0 < share < 0.001 else f"{100.0 * share:.1f} %"
+
+
 PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})
 
 
+def number(value: float, digits: int = 4) -> str:
+    """So many significant digits, no exponent between 1e-4 and 1e6."""
+    if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def with_spread(value: float, std: float | None, unit: str) -> str:
+    """`1.694 ± 0.021 us`: both to two digits of the standard error; four digits of the value where that is unknown."""
+    tail = f" {unit}" if unit else ""
+    if not std or not math.isfinite(std):
+        return f"{value:.4g}{tail}"
+    places = min(1 - math.floor(math.log10(std)), 8)
+    if max(abs(value), std) < 1e-4 or abs(value) >= 1e6 or places > 6:
+        return f"{value:.3g} ± {std:.2g}{tail}"
+    return f"{round(value, places):.{max(places, 0)}f} ± {round(std, places):.{max(places, 0)}f}{tail}"
+
+
 def quantity(entry: Mapping[str, Any], key: str = "") -> str:
-    """`1.69 ± 0.02 us`; shares as `11.6 ± 0.4 %`."""
+    """`1.694 ± 0.021 us`; shares as `11.60 ± 0.40 %`."""
     if entry["unit"] == "1" and key not in PLAIN_NUMBERS:
-        entry = {"value": 100.0 * entry["value"], "std": 100.0 * (entry["std"] or 0.0), "unit": "%"}
-    spread = f" ± {entry['std']:.2g}" if entry["std"] else ""
-    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"{entry['value']:.4g}{spread}{unit}"
+        return with_spread(100.0 * entry["value"], 100.0 * (entry["std"] or 0.0), "%")
+    return with_spread(entry["value"], entry["std"], "" if entry["unit"] == "1" else entry["unit"])
+
+
+def next_sentence(plan: Mapping[str, Any]) -> str:
+    """What to record next, what for, and how clearly it would show."""
+    what = " from ".join(_spoken(n) for n in plan["splits"])
+    aim = "To find the cause that is in no list" if plan["splits"] == ["unknown"] else f"To tell {what}"
+    clear = plan.get("predicted_sigma")
+    times = "more than 100" if clear and clear > 100 else f"about {clear:.0f}" if clear else ""
+    promise = f" The difference would be {times} times its own uncertainty (10 are plenty)." if times else ""
+    return f"{aim}: {plan['do']}.{promise}"
 
 
 def _next(document: Mapping[str, Any]) -> Section:
     plan = document["next_experiment"]
-    if not plan:
-        return Section("What to measure next", ["Nothing is left open by these data."])
-    what = " from ".join(_spoken(n) for n in plan["splits"])
-    sure = plan.get("predicted_sigma")
-    promise = f" It would show the difference at {sure:.0f} standard deviations." if sure else ""
-    return Section("What to measure next", [f"To tell {what}: {plan['do']}.{promise}"])
+    return Section("What to measure next", [next_sentence(plan) if plan else "Nothing is left open by these data."])
 
 
-def _classes(document: Mapping[str, Any]) -> Section:
+def _classes(document: Mapping[str, Any]) -> list[str | Table | Picture]:
+    """Model-free levels; an infinitely weak class is left out."""
     words = {
-        "excited": "excited lines", "odd": "odd distortion lines", "even": "even distortion lines",
-        "cross_axis": "axis that gets no voltage", "drifting": "difference between repeats",
+        "odd": "odd distortion lines", "even": "even distortion lines",
+        "cross_axis": "axis that gets no voltage", "drifting": "difference between repeats of one test",
     }
-    rows = [(words[k], f"{v:.1f} dB") for k, v in document["line_levels_db"].items()]
-    return Section("Before any model: how the current splits by frequency class", [
-        Table(("class", "power relative to the excited lines"), rows,
-              caption="Odd: inverter, saturation. Even: sensor parabola, DC bias. Difference between repeats: noise, heating, drift."),
-    ])
+    rows = [(words[k], f"{v:.0f} dB") for k, v in document["line_levels_db"].items() if k in words and v > -250.0]
+    if not rows:
+        return []
+    return [Table(
+        ("in the measured current, before any model", "power relative to the excited lines"), rows,
+        caption="20 dB less is a tenth of the current. The difference between repeats is noise, heating or drift.",
+    )]
 
 
 def _parameters(document: Mapping[str, Any]) -> Section:
@@ -169,8 +284,8 @@ def _parameters(document: Mapping[str, Any]) -> Section:
         if before and after:
             change = after["value"] / before["value"] - 1.0
             rows.append((
-                title, f"{before['value'] * scale:.5g} ± {before['std'] * scale:.2g} {unit}",
-                f"{after['value'] * scale:.5g} ± {after['std'] * scale:.2g} {unit}", f"{change:+.2%}",
+                title, with_spread(before["value"] * scale, before["std"] * scale, unit),
+                with_spread(after["value"] * scale, after["std"] * scale, unit), f"{100.0 * change:+.2f} %",
             ))
     return Section("Motor parameters", [
         Table(("", "fitted without the causes", "fitted with the causes", "moved by"), rows),
@@ -178,30 +293,31 @@ def _parameters(document: Mapping[str, Any]) -> Section:
     ])
 
 
-def _units(seen: Diagnosis) -> dict[str, str]:
-    """Unit of every effect's detection limit: that of its first number."""
-    return {} if seen.found is None else {n: x.terms[0].unit for n, x in seen.found.first_screening.scores.items()}
-
-
-def _limits(document: Mapping[str, Any], units: Mapping[str, str]) -> Section:
+def _limits(document: Mapping[str, Any]) -> Section:
     found = {c["name"] for c in document["causes"]}
     rows = [
-        (_spoken(k), f"{limit:.2g} {units.get(k, '1')}".removesuffix(" 1"), CATALOGUE[k].split_by)
-        for k, limit in document["detection_limits"].items() if k not in found
+        (_spoken(k), limit_words(document, k), CATALOGUE[k].split_by)
+        for k in document["detection_limits"] if k not in found
     ]
-    never = [f"Never visible from the terminals at standstill: {sentence}." for sentence in document["cannot_tell"]]
     below = document["below_materiality"]
     small = [f"Seen, but too small to matter or not separable from the shape of a named cause: {', '.join(map(_spoken, below))}."] if below else []
-    return Section("What was looked for and not found, and what cannot be told", [
-        *small, Table(("looked for", "these data would have shown it from", "what would show it better"), rows), *never,
+    return Section("Looked for and not found", [
+        *small, Table(("looked for", "these data would have shown it from", "what would show it better"), rows),
     ])
+
+
+def _chance(p: float) -> str:
+    """`1 in 5000`; a technician reads no exponents."""
+    if p < 1e-6:
+        return "under 1 in a million"
+    return f"1 in {number(1.0 / p, 2)}" if p < 0.2 else f"{100.0 * p:.0f} %"
 
 
 def points_page(document: Mapping[str, Any], name: str) -> Page:
     """The page of a points table."""
     rows = [
         (_spoken(c["name"]), "; ".join(f"{_quantity_name(k)} {quantity(v, k)}" for k, v in c["parameters"].items()),
-         f"{c['gain_share']:.1%}", f"{c['p_value']:.1e}")
+         percent(c["gain_share"]), _chance(c["p_value"]))
         for c in document["causes"]
     ]
     gain = document["gain"]
@@ -209,17 +325,18 @@ def points_page(document: Mapping[str, Any], name: str) -> Page:
         title=f"Diagnosis of {document.get('test', 'test')} points: {name}",
         headline=document["reason"], tone=TONES[document["verdict"]],
         facts=[
-            ("error, constant parameters", f"{gain['relative_error_before']:.2%}"),
-            ("error, with the named causes", f"{gain['relative_error_after']:.2%}"),
+            ("error, constant parameters", percent(gain["relative_error_before"])),
+            ("error, with the named causes", percent(gain["relative_error_after"])),
             ("measured on", "points left out of the fit"),
         ],
         sections=[
             Section("Causes", [
-                Table(("cause", "size", "share of the error removed", "chance of this by scatter"), rows)
+                Table(("cause", "size", "share of the error removed", "chance that scatter made it up"), rows)
                 if rows else "No cause passed the rules.",
             ]),
             _parameters(document),
         ],
-        footer="Steady-state points; line values rms, per-phase star equivalent.",
+        footer="Steady-state points; line values are effective values (rms), parameters per phase of the star equivalent. ± is one "
+        "standard error: in 19 of 20 cases the true value is within twice of it.",
     )
 

@@ -1,0 +1,137 @@
+"""What a technician reads in a diagnosis: numbers, causes that look alike, the error's tie to the command."""
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.alike import look_alikes
+from commissioner.diagnose.document import refused_document
+from commissioner.diagnose.fit import Normal
+from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.record import TO_PHASES, Facts, Record, Segment
+from commissioner.diagnose.residuals import residuals
+from commissioner.diagnose.screen import Score, Screening
+from commissioner.report import diagnose_figures as figures
+from commissioner.report.diagnose_page import headline, limit_words, next_sentence, number, percent, quantity, sure
+from commissioner.report.page import picture
+
+PERIOD, SAMPLES, SIGMA = 2.5e-4, 4000, 0.01
+TONES = (4.0, 20.0, 90.0)
+TRUE = (2.0, 1.5, 0.01, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"value": 1.69412, "std": 0.0213, "unit": "us"}, "1.694 ± 0.021 us"),
+        ({"value": 0.11623, "std": 0.00402, "unit": "1"}, "11.62 ± 0.40 %"),
+        ({"value": 123456.0, "std": 1234.0, "unit": "rad/s"}, "123500 ± 1200 rad/s"),
+        ({"value": 0.5, "std": None, "unit": "A"}, "0.5 A"),
+        ({"value": 3.1e-7, "std": 1e-9, "unit": "F"}, "3.1e-07 ± 1e-09 F"),
+    ],
+)  # fmt: skip
+def test_a_size_has_the_digits_of_its_error(entry, words):
+    assert quantity(entry) == words
+
+
+def test_numbers_have_no_tails_and_nothing_is_certain():
+    assert number(0.00012345) == "0.0001234" and number(27.1234567) == "27.12" and number(0.0, 2) == "0"
+    assert percent(0.99999) == "over 99.9 %" and percent(0.0002) == "under 0.1 %" and percent(0.446) == "44.6 %"
+    assert sure(1.0) == "over 99 %" and sure(0.83) == "83 %"
+
+
+def test_a_detection_limit_is_read_in_the_unit_of_its_size():
+    limits = {"sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}}, "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}}}
+    document = {"detection_limit_sizes": limits}
+    assert limit_words(document, "sensor_offset") == "71 uA"
+    assert limit_words(document, "dc_link_sag") == "0.12 %"
+    assert limit_words(document, "clipping") == "-"
+
+
+def test_a_next_experiment_promises_only_what_was_predicted():
+    plan = {"splits": ["sampling_delay", "sensor_lag"], "do": "excite higher lines", "predicted_sigma": None}
+    assert next_sentence(plan) == "To tell sampling delay from sensor lag: excite higher lines."
+    assert "more than 100 times" in next_sentence(plan | {"predicted_sigma": 843.2})
+
+
+def test_a_refusal_has_a_headline():
+    assert "cannot carry" in headline(refused_document("too short", "recording"))
+
+
+def screening(gram):
+    """Three causes of one number each with these products of their directions."""
+    names = ("sampling_delay", "sensor_lag", "remanence")
+    terms = [Term(n, n, "1", 0, 0, 1.0) for n in names]
+    scores = {n: Score(n, 1.0, 1, np.ones(1), (t,)) for n, t in zip(names, terms, strict=True)}
+    zero = np.zeros((1, 1))
+    normal = Normal(zero, zero, zero, zero)
+    return Screening(scores, np.array(gram), np.ones(3), {n: (k,) for k, n in enumerate(names)}, normal)
+
+
+def test_causes_that_look_alike_are_shown_together_and_others_stand_alone():
+    seen = look_alikes(screening([[4.0, 0.0, 1.98], [0.0, 1.0, 0.0], [1.98, 0.0, 1.0]]))
+    assert set(seen.names) == {"sampling_delay", "remanence"} and seen.alone == ("sensor_lag",)
+    assert seen.share[0, 1] == pytest.approx(0.99**2) and np.all(np.diag(seen.share) == 1.0)
+
+
+def test_a_named_cause_is_shown_though_it_stands_alone():
+    seen = look_alikes(screening(np.eye(3)), ["remanence"])
+    assert seen.names == ("remanence",) and len(seen.alone) == 3
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Residuals of a true and of a wrong model (R_R 20 % off) on a multisine with white noise and one masked stretch."""
+    from commissioner.diagnose.plant import predict
+
+    time = PERIOD * np.arange(SAMPLES)
+    voltage = sum(5.0 * np.sin(2 * np.pi * f * time + k) for k, f in enumerate(TONES))
+    good = np.ones(SAMPLES, bool)
+    good[1000:1010] = False
+    random = np.random.default_rng(4)
+    facts = Facts(PERIOD, 5.0, 1500.0, 0.8, 5.0, 4000.0, 540.0, 3)
+    segments = []
+    for k, axis in enumerate((0.0, 60.0)):
+        segment = Segment(k, 0, axis, time + 2.0 * k, voltage, np.zeros((3, SAMPLES)), good, np.ones(SAMPLES))
+        current = predict(Model(TRUE), Record((segment,), facts), 0, NO_DICTIONARY).currents_a
+        noisy = current + SIGMA * random.standard_normal(current.shape)
+        noisy[:, ~good] = 99.0
+        segments.append(Segment(k, 0, axis, time + 2.0 * k, voltage, noisy, good, np.ones(SAMPLES)))
+    flat = np.array([1.0, 1000.0])
+    noise = Noise(np.full(3, SIGMA), flat, np.ones((3, 2)), "test", True, 0.01, True)
+    wrong = Model((TRUE[0], 1.2 * TRUE[1], TRUE[2], TRUE[3]))
+    return residuals(Record(tuple(segments), facts), NO_DICTIONARY, wrong, Model(TRUE), noise, TONES)
+
+
+def test_noise_alone_stays_in_the_correlation_band_and_a_wrong_resistance_does_not(seen):
+    tie = seen.correlation
+    assert np.mean(np.abs(tie.after) < figures.BAND) > 0.9
+    assert np.sqrt(np.mean(tie.after**2)) < 1.8
+    assert np.abs(tie.before).max() > 20.0
+
+
+def test_the_error_of_a_wrong_resistance_is_at_the_excited_lines_and_noise_is_one_everywhere(seen):
+    by_class = seen.spectrum.by_class
+    assert by_class["excited"][0] > 10.0 and by_class["odd"][0] < 3.0
+    assert by_class["other"][1] == pytest.approx(1.0, abs=0.05)
+    assert by_class["excited"][1] < 2.5
+
+
+def test_masked_samples_make_no_error(seen):
+    assert seen.time_after_a.max() < 1.2 * SIGMA
+    assert seen.by_axis_after_a == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize("has_causes", [True, False])
+def test_without_causes_only_the_error_as_it_is_is_drawn(seen, has_causes):
+    figure = figures.correlation(seen.correlation, has_causes)
+    labels = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
+    assert (figures.AFTER in labels) == has_causes
+    assert picture(figures.spectrum(seen.spectrum, TONES, has_causes), "x").markup.startswith("<svg")
+
+
+def test_dense_tones_leave_excited_lines_and_others(seen):
+    from commissioner.diagnose.split import class_bins
+
+    bins = class_bins(np.arange(1.0, 60.0, 2.0), SAMPLES, PERIOD)
+    assert set(bins) == {"excited"} and bins["excited"].size == 30
