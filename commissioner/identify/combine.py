@@ -9,6 +9,7 @@ coefficients are significant.
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -109,20 +110,11 @@ _GROUPS: dict[Cause, tuple[int, ...]] = {Cause.SENSOR_GAIN: (4, 5), Cause.ANISOT
 
 
 def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[Matrix]) -> list[Finding]:
-    """Add causes one at a time, the most significant first, as long as they improve chi-square beyond chance."""
-    chosen: list[Cause] = []
-    chi_square, degrees, _, _ = _fit(axes, logs, covariances, chosen)
-    while True:
-        gains = []
-        for cause, columns in _GROUPS.items():
-            if cause in chosen or (cause is Cause.HEATING and not _order_is_visible(axes)):
-                continue
-            trial, _, _, _ = _fit(axes, logs, covariances, [*chosen, cause])
-            gains.append((float(chi2.sf(max(chi_square - trial, 0.0), len(columns))), cause, trial))
-        if not gains or min(gains, key=lambda g: g[0])[0] > SIGNIFICANCE / len(_GROUPS):
-            break
-        _, cause, chi_square = min(gains, key=lambda g: g[0])
-        chosen.append(cause)
+    """Of all sets of causes the one that lowers chi-square most beyond chance. Causes added one at a time and never taken
+    back name a sensor beside every large anisotropy."""
+    possible = [c for c in _GROUPS if c is not Cause.HEATING or _order_is_visible(axes)]
+    sets = [list(s) for n in range(len(possible) + 1) for s in itertools.combinations(possible, n)]
+    chosen = min(sets, key=lambda s: _fit(axes, logs, covariances, s)[0] + sum(_price(c) for c in s))
     chi_square, degrees, solution, covariance = _fit(axes, logs, covariances, chosen)
     findings = [_finding(c, axes, logs, covariances, chosen, solution, covariance) for c in chosen]
     chance = float(chi2.sf(chi_square, degrees)) if degrees > 0 else 1.0
@@ -130,6 +122,11 @@ def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[M
         rest = math.sqrt(chi_square / degrees)
         findings.append(Finding(Cause.UNEXPLAINED, rest * FLOOR, FLOOR, chance))
     return findings
+
+
+def _price(cause: Cause) -> float:
+    """What a cause must take off chi-square to be named."""
+    return float(chi2.isf(SIGNIFICANCE / len(_GROUPS), len(_GROUPS[cause])))
 
 
 def _order_is_visible(axes: Sequence[AxisEstimate]) -> bool:

@@ -46,6 +46,7 @@ def test_equal_axes_give_no_findings():
     [
         ({"gain": 0.01}, Cause.SENSOR_GAIN),
         ({"anisotropy": 0.02}, Cause.ANISOTROPY),
+        ({"anisotropy": 0.05}, Cause.ANISOTROPY),
         ({"heat": 0.02}, Cause.HEATING),
     ],
 )
