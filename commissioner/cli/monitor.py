@@ -114,7 +114,7 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
             )
         )
     else:
-        rows.append(("load torque", "not given: the inertia is unknown (inertia_kg_m2 or --inertia)"))
+        rows.append(("load torque", document["waveforms"]["load_torque"]))
     rows.append(("currents re-simulated to", f"{seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)"))
     out.print(table("", ("", ""), rows))
     out.print(

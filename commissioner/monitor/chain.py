@@ -230,7 +230,7 @@ def _characteristic(
     phases = {p: np.interp(instants, time, comb.phase_rad) for p, comb in enumerate(combs)}
     if len(combs) == 1:
         phases = {0: 2 * np.pi * np.arange(count) / count + float(np.interp(middle, time, combs[0].phase_rad))}
-    made = waveform.evaluate(problem, solved, instants, phases, inertia)
+    made = waveform.without_unknown_load(waveform.evaluate(problem, solved, instants, phases, inertia))
     return replace(made, time_s=made.time_s + audited.start_s)
 
 

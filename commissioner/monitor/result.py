@@ -64,7 +64,7 @@ def as_document(
         "waveforms": {
             "speed_rms_std_rad_per_s": float(np.sqrt(np.mean(period.speed_std**2))),
             "electromagnetic_torque_rms_std_nm": float(np.sqrt(np.mean(period.torque_std**2))),
-            "load_torque": load or "not given: the inertia is unknown",
+            "load_torque": load or why_no_load_torque(observation),
             "starts_at_s": float(period.time_s[0]),
             "shaft_angle": "counted from the first row; its origin is arbitrary without an encoder",
             "contains": "what repeats with the loads; ripple at multiples of the supply frequency is left out",
@@ -80,6 +80,13 @@ def as_document(
         "audit": audit_document(observation.audited, observation.findings),
         "quantities": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
     }
+
+
+def why_no_load_torque(observation: Observation) -> str:
+    """Words for an answer without load torque."""
+    if observation.inertia_kg_m2 is None:
+        return "not given: the inertia is unknown (inertia_kg_m2 or --inertia)"
+    return "not given: its uncertainty is larger than its movement within the period"
 
 
 def refused_document(refused: Refused) -> dict[str, object]:

@@ -6,7 +6,7 @@ Load torque (1): tau_l = tau_e - J d omega_r / dt, the derivative taken line by 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from commissioner.records import Signal
 
 @dataclass(frozen=True)
 class Waveform:
-    """At `(n,)` instants; the load torque is None where the inertia is unknown. Standard deviations likewise."""
+    """At `(n,)` instants; the load torque is None where the inertia is unknown or the data cannot carry it. Standard deviations likewise."""
 
     time_s: Signal
     shaft_angle_rad: Signal
@@ -166,6 +166,15 @@ def evaluate(
         load_std,
         _noise_rms(value, moved[: lines.current_influence.shape[0]], inertia or 0.0),
     )
+
+
+def without_unknown_load(made: Waveform) -> Waveform:
+    """No load torque where its uncertainty is larger than its own movement: such a curve would show noise."""
+    if made.load_torque_nm is None or made.load_torque_std is None:
+        return made
+    if np.sqrt(np.mean(made.load_torque_std**2)) < np.std(made.load_torque_nm):
+        return made
+    return replace(made, load_torque_nm=None, load_torque_std=None)
 
 
 def _noise_rms(

@@ -7,6 +7,7 @@ from typing import Any
 
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.indicators import Indicator, Pulses
+from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend import History, Verdict
 from commissioner.report import monitor_figures as figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
@@ -67,7 +68,7 @@ def _facts(seen: Observation) -> list[tuple[str, str]]:
 
 
 def _shaft(seen: Observation) -> Section:
-    known = "" if seen.inertia_kg_m2 else " The inertia is unknown, so the load torque is not given."
+    known = "" if seen.period.load_torque_nm is not None else f" Load torque: {why_no_load_torque(seen)}."
     return Section(
         "What the shaft does within the period",
         [

@@ -206,11 +206,12 @@ def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str,
         "torque": 100 * (seen.mean_torque_nm / played.electromagnetic_torque_nm[inside].mean() - 1),
     }
     load = seen.period.load_torque_nm
-    assert load is not None
-    for name, true, own in (
-        ("ripple", played.speed_rad_per_s, seen.period.speed_rad_per_s),
-        ("load", played.load_torque_nm, load),
-    ):
+    waveforms = [("ripple", played.speed_rad_per_s, seen.period.speed_rad_per_s)]
+    if load is None:  # withheld: counted as outside every limit
+        out |= dict.fromkeys(("load", "load_of_peak", "load_of_rms"), float("nan"))
+    else:
+        waveforms.append(("load", played.load_torque_nm, load))
+    for name, true, own in waveforms:
         expected = _periodic(true[inside], played.time_s[inside], played.angle_rad[inside], truth, seen)
         error = own - own.mean() - expected + expected.mean()
         rms = 100 * float(np.sqrt(np.mean(error**2)))
