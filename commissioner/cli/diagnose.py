@@ -224,7 +224,7 @@ def _table_of_causes(document: Mapping[str, Any]) -> Any:
     def row(cause: Mapping[str, Any]) -> tuple[str, ...]:
         size = next((quantity(value, key) for key, value in cause["parameters"].items()), "")
         share = percent(cause["gain_share"]) if cause.get("found_by") != "audit" else "-"
-        return cause["name"], size, share, sure(cause["confidence"]), ", ".join(cause["equivalent"])
+        return cause["name"], size, share, sure(cause["confidence"]), ", ".join(n.replace("_", " ") for n in cause["equivalent"])
 
     rows = [row(cause) for cause in document["causes"]]
     header = ("cause", "size", "share", "name right", *(["or as well"] if any(r[-1] for r in rows) else []))

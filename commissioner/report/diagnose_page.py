@@ -100,12 +100,13 @@ def _untold(document: Mapping[str, Any], alike: Alike) -> Section:
         parts.append(f"Of the causes found, these data leave open: {'; '.join(tied)}.")
     if len(alike.names) > 1:
         parts.append(picture(figures.look_alikes(alike, [c["name"] for c in document["causes"]]), "Which causes look alike in this "
-                     "recording: how much of the row's error the column could imitate. Dark off the diagonal (98 and more): "
+                     "recording: how much of the row's error the column could imitate. Dark beside the diagonal (96 and more): "
                      "only another experiment tells the two apart. Bold: found here."))
     if alike.alone:
         parts.append(f"Like no other cause in this recording: {', '.join(map(_spoken, alike.alone))}.")
-    never = [f"Never told apart at the terminals of a motor at standstill: {s.replace(' | ', ', or ')}." for s in document["cannot_tell"]]
-    return Section("What these data cannot tell apart", [*parts, *never])
+    never = "; ".join(s.replace(" | ", ", or ") for s in document["cannot_tell"])
+    parts.append(f"Never told apart at the terminals of a motor at standstill: {never}.")
+    return Section("What these data cannot tell apart", parts)
 
 
 def headline(document: Mapping[str, Any]) -> str:

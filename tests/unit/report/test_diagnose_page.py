@@ -8,7 +8,7 @@ from commissioner.diagnose.document import refused_document
 from commissioner.diagnose.fit import Normal
 from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.record import TO_PHASES, Facts, Record, Segment
+from commissioner.diagnose.record import Facts, Record, Segment
 from commissioner.diagnose.residuals import residuals
 from commissioner.diagnose.screen import Score, Screening
 from commissioner.report import diagnose_figures as figures
