@@ -3,6 +3,6 @@
 Features in the order of `evidence.claim_features`; the first weight is the constant.
 """
 
-WEIGHTS: tuple[float, ...] = (1.5, 0.5, -1.0, 1.5, 0.3, 0.5, 0.3)
+WEIGHTS: tuple[float, ...] = (-1.1, -0.297, -1.6, 1.3, 0.188, 0.0127, -0.0119)
 UNKNOWN_NOISE_FACTOR = 0.8
 """Applied where the noise could not be measured: what looks like the floor may be structure."""

@@ -30,7 +30,7 @@ from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.search import EXPLORED_SAMPLES, Found, search
+from commissioner.diagnose.search import EXPLORED_SAMPLES, SAME_ORDER, Found, search
 from commissioner.diagnose.split import Split, split_lines
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
@@ -40,7 +40,10 @@ COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.5
 """Named as a cause: steps beyond a share of the rated peak current that make a quarter of the noise power."""
 TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+LEAST_CONFIDENCE = 0.5
+"""Below it a name is more likely wrong than right, and is not given."""
 IRON_CORNER_HZ = 400.0
+SAME_ORDER_TIE = 0.1
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -96,6 +99,8 @@ class Diagnosis:
     split: Split | None = None
     explained_share: float = 0.0
     remarks: tuple[str, ...] = ()
+    unsure: tuple[Cause, ...] = ()
+    """Fitted, and more likely wrong than right as names: what they explain counts as left."""
 
 
 def diagnose(
@@ -135,6 +140,9 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise) for name in found.accepted]
     causes = _without_truncation(causes, audit)
     causes += _audit_causes(audit, found, noise, {c.name for c in causes})
+    unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE)
+    causes = [c for c in causes if c not in unsure]
+    rest = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
     count = float(found.fit.normal.count.sum())
     structured = max(found.nominal.chi2 - count, 0.0)
     share = 1.0 - min(rest.sigma**2 * count / max(structured, rest.sigma**2 * count, 1.0), 1.0)
@@ -143,7 +151,8 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
         rest, _parameters(found.nominal), _parameters(found.fit), _limits(found), experiment,
-        model_document(found, causes), found, split_lines(record), share, _remarks(noise, record, found.is_complete),
+        model_document(found, [*causes, *unsure]), found, split_lines(record), share,
+        _remarks(noise, record, found.is_complete, unsure), unsure,
     )
 
 
@@ -154,7 +163,7 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     if name == "rotor_skin_effect" and _is_iron_like(found):
         fixed = ("iron_loss",)
-    close = tuple(r for r, loss in rivals.items() if loss < TIE_CHI2)
+    close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain))
     features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=1e6), total)
     sure = confidence(features, calibration.WEIGHTS)
     if not noise.is_known:
@@ -163,6 +172,11 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
         float(np.sqrt(gain / count)), gain, sure, (*fixed, *(c for c in close if c not in fixed)), rivals, tuple(features),
     )
+
+
+def _share_open(name: str, rival: str) -> float:
+    """Share of a gain within which two networks of the same order are the same to the terminals, whatever fits better."""
+    return SAME_ORDER_TIE if {name, rival} == SAME_ORDER else 0.0
 
 
 def _is_iron_like(found: Found) -> bool:
@@ -298,8 +312,11 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
     return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")
 
 
-def _remarks(noise: Noise, record: Record, is_complete: bool) -> tuple[str, ...]:
+def _remarks(noise: Noise, record: Record, is_complete: bool, unsure: Sequence[Cause]) -> tuple[str, ...]:
     out = [] if is_complete else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
+    if unsure:
+        names = ", ".join(f"{c.name} ({c.strength_sigma:.2g} times the noise)" for c in unsure)
+        out.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {names}.")
     if not noise.is_known:
         out.append(
             "No repeated segment, no repeated period, no zero-voltage stretch and no third sensor: the noise had to be "

@@ -1,4 +1,4 @@
-"""Weights of the confidence from blind rows: `python -m tests.hidden_effects.calibrate rows.json`.
+"""Weights of the confidence from blind rows: `python -m tests.hidden_effects.calibrate rows.json ...`.
 
 Logistic regression with a small ridge; five folds by case, so that no case judges itself. Rows must be of another release
 than those the protocol reports (`--release 0`). Prints the tuple for `commissioner/diagnose/calibration.py`.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,8 +37,9 @@ def confidence(w: np.ndarray, features: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 / (1.0 + np.exp(-(w[0] + features @ w[1:]))))
 
 
-def main(path: Path) -> None:
-    cases = [claims([json.loads(line)]) for line in path.read_text().splitlines()]
+def main(paths: Sequence[Path]) -> None:
+    rows = [json.loads(line) for path in paths for line in path.read_text().splitlines()]
+    cases = [claims([row]) + claims([row], "unsure") for row in rows]
     fold = np.array([k % FOLDS for k, case in enumerate(cases) for _ in case])
     said = [claim for case in cases for claim in case]
     features = np.array([f for _, _, f in said])
@@ -53,4 +55,4 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main([Path(name) for name in sys.argv[1:]])

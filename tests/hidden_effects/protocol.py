@@ -57,13 +57,16 @@ def _diagnosed(row: Row, case: Case, recording: Any) -> Any:
     row["verdict"], row["reason"] = seen.verdict.value, seen.reason
     row["left_sigma"] = seen.left.sigma if seen.left else None
     row["held_out"] = seen.held_out.share if seen.held_out else None
-    row["causes"] = [
-        {"name": c.name, "equivalent": list(c.equivalent), "confidence": c.confidence, "gain_share": c.gain_share,
-         "strength": c.strength_sigma, "features": list(c.features), "from_audit": c.from_audit,
-         "sizes": {k: list(v) for k, v in c.sizes.items()}}
-        for c in seen.causes
-    ]  # fmt: skip
+    row["causes"], row["unsure"] = ([_claim(c) for c in some] for some in (seen.causes, seen.unsure))
     return seen
+
+
+def _claim(cause: Any) -> Row:
+    return {
+        "name": cause.name, "equivalent": list(cause.equivalent), "confidence": cause.confidence,
+        "gain_share": cause.gain_share, "strength": cause.strength_sigma, "features": list(cause.features),
+        "from_audit": cause.from_audit, "sizes": {k: list(v) for k, v in cause.sizes.items()},
+    }  # fmt: skip
 
 
 def _open_key(row: Row, case: Case, scenario: Any, seen: Any, recording: Any) -> None:

@@ -166,11 +166,11 @@ def _distributions(rows: Sequence[Row]) -> list[Line]:
     return out
 
 
-def claims(rows: Sequence[Row]) -> list[tuple[float, bool, list[float]]]:
-    """(confidence, class correct, features) of every cause named by a fit."""
+def claims(rows: Sequence[Row], part: str = "causes") -> list[tuple[float, bool, list[float]]]:
+    """(confidence, class correct, features) of every cause named by a fit; `part` "unsure": of those kept back."""
     return [
         (c["confidence"], not r["excluded"] and is_class_correct(c, hidden(r)), c["features"])
-        for r in rows for c in r["causes"] if not c["from_audit"]
+        for r in rows for c in r.get(part, []) if not c["from_audit"]
     ]  # fmt: skip
 
 
