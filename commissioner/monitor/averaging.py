@@ -142,7 +142,7 @@ def residual_current(frame: TurningFrame, part: slice, combs: list[Comb], supply
         for h, row in enumerate(_powers(phase, max(amplitude, default=0)), start=1):
             if h in amplitude:
                 left = left - amplitude[h] * row - amplitude[-h] * np.conj(row)
-    return left
+    return np.asarray(left, dtype=np.complex128)
 
 
 def _columns(phases: list[Signal], orders: list[tuple[int, ...]], drift: Signal) -> Signal:

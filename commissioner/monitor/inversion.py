@@ -80,7 +80,7 @@ def torus(lines: Lines, points_per_comb: int = 8) -> Torus:
         [int(np.flatnonzero((lines.comb == lines.comb[k]) & (lines.order == -lines.order[k]))[0]) for k in positive],
         dtype=np.int64,
     )
-    project = np.linalg.solve(np.conj(basis.T) @ basis, np.conj(basis.T))
+    project = np.asarray(np.linalg.solve(np.conj(basis.T) @ basis, np.conj(basis.T)), dtype=np.complex128)
     return Torus(basis, project, positive, partner)
 
 
@@ -151,7 +151,7 @@ def rotor_state(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, spe
     slip = pole_pairs * speed_on(on, speed) - lines.supply_rad_per_s
     decay = circuit.rotor_resistance_ohm / circuit.rotor_inductance_h
     operator = np.diag(1j * lines.rate_rad_per_s + decay) - 1j * (on.project * slip) @ on.basis
-    inverse = np.linalg.inv(operator)
+    inverse = np.asarray(np.linalg.inv(operator), dtype=np.complex128)
     flux = inverse @ (decay * circuit.magnetizing_inductance_h * lines.current_a)
     return RotorState(flux, inverse)
 

@@ -172,7 +172,8 @@ def lowest_fundamental(
     Each further line below threshold costs; lines of a comb already known, and products of such a comb with `line_hz`,
     do not count.
     """
-    best, best_gain, best_seen = line_hz, -np.inf, (1,)
+    best, best_gain = line_hz, -np.inf
+    best_seen: tuple[int, ...] = (1,)
     for m in range(1, 7):
         fundamental = line_hz / m
         if fundamental < LOWEST_LOAD_HZ:

@@ -72,7 +72,7 @@ def prove(
     return Proof(
         whole,
         _periodic(basis[keep], error, measured[keep]),
-        time[keep] + audited.start_s,
+        np.asarray(time[keep] + audited.start_s, dtype=np.float64),
         measured[keep],
         simulated[keep],
     )

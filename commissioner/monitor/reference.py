@@ -6,6 +6,7 @@ import numpy as np
 
 from commissioner.monitor.chain import Observation
 from commissioner.monitor.inversion import basis_of
+from commissioner.monitor.supply import Vector
 from commissioner.records import RunningRecording, Signal
 
 
@@ -35,7 +36,7 @@ def against_encoder(observation: Observation, recording: RunningRecording) -> di
     }
 
 
-def _lines(observation: Observation, sampled: Signal, segment: Signal) -> tuple[Signal, Signal]:
+def _lines(observation: Observation, sampled: Signal, segment: Signal) -> tuple[Vector, Vector]:
     problem = observation.problem
     phases = {p: comb.phase_rad for p, comb in enumerate(observation.combs)}
     basis = basis_of(problem.lines, phases, segment.size)

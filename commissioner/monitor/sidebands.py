@@ -44,9 +44,9 @@ def band_error(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, mean
     drop = np.abs(lines.voltage_v) + leak * np.abs(lines.current_a)
     wrong = LINE_MODEL_ERROR * drop
     twice = np.abs(np.abs(lines.rate_rad_per_s / lines.supply_rad_per_s) - 2.0) < 1e-6
-    wrong = np.where(twice, np.hypot(wrong, lines.asymmetry * drop[0]), wrong).astype(np.complex128)
+    wrong = np.where(twice, np.hypot(wrong, lines.asymmetry * drop[0]), wrong)
     still = np.zeros((1, lines.order.size), dtype=np.complex128)
-    _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, still, wrong[None, :])
+    _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, still, wrong[None, :].astype(np.complex128))
     gap = _gap_voltages(circuit, lines, mean_speed_rad_per_s)
     _, gap_upper, gap_lower = moved_speed(circuit, pole_pairs, lines, on, np.zeros_like(gap), gap)
     return BandError(np.abs(upper[0]), np.abs(lower[0]), gap_upper, gap_lower)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 
 from commissioner.monitor.inversion import flux_lines
-from commissioner.monitor.supply import KNOT_SPACING_S, TurningFrame
+from commissioner.monitor.supply import KNOT_SPACING_S, TurningFrame, Vector
 from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
 
@@ -40,8 +40,8 @@ def slip_phase(frame: TurningFrame, circuit: TCircuit) -> Signal:
     knots = np.concatenate([[frame.time_s[0]] * 4, inner, [frame.time_s[-1]] * 4])
     slow = make_lsq_spline(time, slip - slip.mean(), knots, k=3).antiderivative()
     phase = np.asarray(slow(frame.time_s), dtype=np.float64)
-    return phase - phase.mean()
+    return np.asarray(phase - phase.mean(), dtype=np.float64)
 
 
-def _rotor_current(circuit: TCircuit, current: Signal, rotor_flux: Signal) -> Signal:
+def _rotor_current(circuit: TCircuit, current: Vector, rotor_flux: Vector) -> Vector:
     return np.asarray((rotor_flux - circuit.magnetizing_inductance_h * current) / circuit.rotor_inductance_h)

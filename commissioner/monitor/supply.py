@@ -7,6 +7,7 @@ Any smooth angle is exact for the model as long as voltage, current and omega_e 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from commissioner.records import Signal
 
 Vector = NDArray[np.complex128]
+Instants = NDArray[np.floating[Any]]
 
 TURN = np.exp(2j * np.pi / 3)
 KNOT_SPACING_S = 1.5
@@ -36,19 +38,19 @@ class SupplyAngle:
     carrier_rad_per_s: float
     deviation: BSpline
 
-    def angle_rad(self, time_s: Signal) -> Signal:
+    def angle_rad(self, time_s: Instants) -> Signal:
         return np.asarray(self.carrier_rad_per_s * time_s + self._slow(time_s, 0), dtype=np.float64)
 
-    def frequency_rad_per_s(self, time_s: Signal) -> Signal:
+    def frequency_rad_per_s(self, time_s: Instants) -> Signal:
         return np.asarray(self.carrier_rad_per_s + self._slow(time_s, 1), dtype=np.float64)
 
-    def _slow(self, time_s: Signal, derivative: int) -> Signal:
+    def _slow(self, time_s: Instants, derivative: int) -> Signal:
         """The spline; on long signals from a grid of 2 ms (it bends over 1.5 s: below 1e-7 rad off)."""
         points = int(np.ptp(time_s) / 2e-3) + 2
         if points >= time_s.size:
             return np.asarray(self.deviation(time_s, derivative))
         grid = np.linspace(time_s[0], time_s[-1], points)
-        return np.interp(time_s, grid, self.deviation(grid, derivative))
+        return np.asarray(np.interp(time_s, grid, self.deviation(grid, derivative)), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def follow_supply(voltage: Vector, sample_period_s: float, frequency_hz: float) 
     return SupplyAngle(carrier, make_lsq_spline(centre, phase, knots, k=order))
 
 
-def harmonic_phasor(signal: Signal, angle_rad: Signal, order: int = 1) -> complex:
+def harmonic_phasor(signal: Instants, angle_rad: Instants, order: int = 1) -> complex:
     """Complex amplitude of the line `order` of a real signal, over a Hann window (leakage of neighbours below 1e-4)."""
     window = np.hanning(signal.size + 2)[1:-1]
     return complex(2.0 * np.sum(window * signal * np.exp(-1j * order * angle_rad)) / window.sum())
@@ -152,7 +154,7 @@ def turning_frame(current: Vector, voltage: Vector, supply: SupplyAngle, sample_
     slow_v, _ = resample_band(v * turn, sample_period_s, band)
     cut = 0 if slow_i.size == count else int(np.ceil(0.02 / period))
     keep = slice(cut, slow_i.size - cut)
-    slow_time = np.arange(slow_i.size)[keep] * period
+    slow_time = np.asarray(np.arange(slow_i.size)[keep] * period, dtype=np.float64)
     return TurningFrame(
         slow_time,
         slow_i[keep],
