@@ -17,7 +17,10 @@ from commissioner.records import Signal, StandstillRecording
 
 STEP = "audit the recording"
 SHORTEST_S = 0.5
+LONGEST_PERIOD_S = 0.01
 LARGEST_CROSS_CURRENT = 0.25
+LARGEST_SUM = 0.06
+"""Of the current, what the three phases may add up to in step with one of them: sensors differ by a few per cent."""
 LARGEST_ROTATION = 0.7
 LEAST_POWER_FACTOR = 0.01
 MOST_STRETCHES = 200
@@ -92,6 +95,7 @@ def audit(recording: StandstillRecording) -> Audit:
         _require_on_axis(stretch)
         _require_power(stretch)
     _require_unclipped(recording)
+    _require_balanced(recording)
     remarks = tuple(
         f"segment {s.segment} holds no excitation and was used for noise and offset only"
         for s in stretches
@@ -275,6 +279,13 @@ def _require_even_steps(recording: StandstillRecording) -> None:
     steps = np.diff(recording.time_s)[inside] / recording.sample_period_s
     if steps.size == 0:
         raise _refuse("no segment holds two samples", steps.size, "consecutive samples", "number the segments")
+    if recording.sample_period_s > LONGEST_PERIOD_S:
+        raise _refuse(
+            "the samples are too far apart",
+            f"sample period {recording.sample_period_s:.4g} s",
+            f"at most {LONGEST_PERIOD_S:g} s",
+            "give time_s in seconds, and record at 1 kHz or faster",
+        )
     usual = float(np.median(steps))
     if abs(usual - 1.0) > 0.05:
         raise _refuse(
@@ -357,6 +368,23 @@ def _require_unclipped(recording: StandstillRecording) -> None:
                     "samples inside the sensor's range",
                     "lower the amplitude or widen the sensor's range, and record again",
                 )
+
+
+def _require_balanced(recording: StandstillRecording) -> None:
+    """A star point carries no current: where the three phases do not cancel, one channel is limited or wrongly scaled."""
+    if recording.current_w_a is None:
+        return
+    phases = [i - np.mean(i) for i in (recording.current_u_a, recording.current_v_a, recording.current_w_a)]
+    total = phases[0] + phases[1] + phases[2]
+    largest = max(float(np.mean(i * i)) for i in phases)
+    shares = [abs(float(np.mean(total * i))) / max(largest, 1e-300) for i in phases]
+    if max(shares) > LARGEST_SUM:
+        raise _refuse(
+            "the phase currents do not add up to zero",
+            f"{max(shares):.0%} of the current is left, in step with phase {'uvw'[int(np.argmax(shares))]}",
+            f"at most {LARGEST_SUM:.0%}",
+            "look for a clipped or wrongly scaled current channel; two sound phases are enough, leave the third out",
+        )
 
 
 def _piled_up(values: Signal) -> int | None:

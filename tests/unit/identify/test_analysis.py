@@ -217,6 +217,20 @@ def test_clipped_currents_are_refused_and_the_channel_named():
     assert "current_u_a is clipped" in str(error)
 
 
+def test_a_channel_limited_before_its_noise_or_read_in_another_scale_leaves_a_sum_of_phases():
+    good = recording()
+    top = 0.6 * float(np.max(good.current_u_a))
+    limited = np.clip(good.current_u_a, -top, top) + 0.01 * np.random.default_rng(2).standard_normal(good.time_s.size)
+    assert "add up" in str(refused(dataclasses.replace(good, current_u_a=limited)))
+    assert "add up" in str(refused(dataclasses.replace(good, current_u_a=1.1 * good.current_u_a)))
+
+
+def test_samples_a_fifth_of_a_second_apart_are_refused():
+    good = recording()
+    slow = dataclasses.replace(good, time_s=1e3 * good.time_s, sample_period_s=1e3 * good.sample_period_s)
+    assert "too far apart" in str(refused(slow))
+
+
 def test_a_quantised_slow_sine_is_not_taken_for_clipping():
     tones = [(14.0, 0.7, 0.0), (3.0, 2.3, 1.0), (2.0, 11.8, 2.0), (1.0, 40.1, 3.0)]
     good = recording(tones, axis_deg=0.0, noise=0.0)
