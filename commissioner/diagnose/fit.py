@@ -19,6 +19,7 @@ from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
+TRIFLE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -167,17 +168,21 @@ def fit(
     model: Model, record: Record, layout: Layout, noise: Noise, rounds: int = 12, tolerance: float = 0.3,
     report: Callable[[str], None] | None = None,
 ) -> Fit:
-    """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance."""
+    """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance, or
+
+    less than a trifle of what the noise does not explain: a model that lacks a cause need not fit to the last digit.
+    """
     damping = 1e-9
     normal = normal_equations(model, record, layout, model.terms, noise)
     for done in range(rounds):
+        enough = max(tolerance, TRIFLE * (normal.total_chi2 - float(normal.count.sum())))
         low, high = limits(model, layout)
         theta = model.theta
         improved = False
         for _ in range(8):
             step = bounded_step(normal.total_gram, normal.total_slope, low - theta, high - theta, damping)
             promised = 2.0 * step @ normal.total_slope - step @ normal.total_gram @ step
-            if promised < tolerance:
+            if promised < enough:
                 return Fit(model, normal, True, done)
             trial = model.moved(theta + step)
             # the tangent costs little beside the trajectory: not worth looking at chi2 first
@@ -195,6 +200,6 @@ def fit(
         damping = max(damping, 1e-9)
         if report:
             report(f"round {done}: chi2 {normal.total_chi2:.1f}")
-        if gained < tolerance:
+        if gained < enough:
             return Fit(model, normal, True, done)
     return Fit(model, normal, False, rounds)
