@@ -183,7 +183,7 @@ def advance(
     has_lost, has_extra = lost_v.size > 1, extra_a.size > 1
     loop = state[LOOP:DEVIATION].reshape(4, 4)
     deviation = state[DEVIATION:]
-    recurses = law == FAST or law == REVIEW
+    recurses = law in (FAST, REVIEW)
     seen = np.zeros(4)  # d(current)/d(theta) with the loop closed
     slope_now, slope_next = 0.0, 0.0
 
