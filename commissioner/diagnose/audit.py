@@ -272,7 +272,7 @@ def excited_lines(record: Record) -> list[float]:
 def _judge(
     record: Record, holes: Sequence[tuple[int, float, int]], clipped: dict[str, float], steps: Sequence[float]
 ) -> tuple[str | None, list[str]]:
-    out = []
+    out: list[str] = []
     if not record.segments:
         return "no stretch of the recording is long enough to fit anything", out
     if float(max(np.std(s.voltage_axis_v) for s in record.segments)) == 0.0:

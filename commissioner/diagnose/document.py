@@ -69,7 +69,8 @@ def _cause(cause: Cause) -> dict[str, Any]:
 
 def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
     """The detection limits as engineering sizes: the first of each effect, at its most visible shape."""
-    screening, out = found.first_screening, {}
+    screening = found.first_screening
+    out: dict[str, dict[str, dict[str, float | str]]] = {}
     scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)
     for name, score in screening.scores.items():
         k = list(screening.columns[name])

@@ -59,12 +59,13 @@ class Fit:
     def chi2(self) -> float:
         return self.normal.total_chi2
 
-    def set_apart(self, effect: str) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+    def set_apart(self, effect: str) -> tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]:
         """Information of all numbers, the rows of one effect's, the rows of the others, and the others' own inverse."""
         is_mine = np.array([False] * 4 + [t.effect == effect for t in self.model.terms])
         mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
         gram = self.normal.total_gram
-        return gram, mine, others, np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
+        inner = np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
+        return gram, mine, others, np.asarray(inner, dtype=np.float64)
 
 
 def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:
@@ -131,7 +132,8 @@ def _averaged(stacked: Array, good: NDArray[np.bool_], block: int) -> tuple[Arra
     """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
     n = stacked.shape[-1] // block * block
     summed = stacked[..., :n].reshape(*stacked.shape[:-1], -1, block).sum(axis=-1) / np.sqrt(block)
-    return summed, good[:n].reshape(-1, block).all(axis=1)
+    whole: NDArray[np.bool_] = np.asarray(good[:n].reshape(-1, block).all(axis=1))
+    return summed, whole
 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:

@@ -145,7 +145,7 @@ def _from_repeated_segments(record: Record) -> list[Array]:
 
 
 def _from_repeated_periods(record: Record) -> list[Array]:
-    out = []
+    out: list[Array] = []
     for segment in record.segments:
         lag = command_period(segment)
         if lag is None or segment.count < 3 * lag:
@@ -276,9 +276,9 @@ def _power_law(frequency: Array, power: Array) -> tuple[Array, Array, bool]:
 
 def _level(power: Array, quantile: float) -> float:
     """Mean of exponentially distributed powers, by quantile, then refined by the mean below five times that."""
-    rough = float(np.quantile(power, quantile)) / -np.log(1.0 - quantile)
+    rough = float(np.quantile(power, quantile)) / -float(np.log(1.0 - quantile))
     below = power[power < 5.0 * rough]
-    expected = (1.0 - np.exp(-5.0) * 6.0) / (1.0 - np.exp(-5.0))
+    expected = float((1.0 - np.exp(-5.0) * 6.0) / (1.0 - np.exp(-5.0)))
     return float(below.mean()) / expected if quantile == 0.5 else rough
 
 

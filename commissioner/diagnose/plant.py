@@ -81,7 +81,7 @@ class _Path:
     machine: tuple[Any, ...]
 
 
-def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, at_work: Array) -> _Path:
+def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64]) -> _Path:
     drive = _drive(model, segment, channels)
     every = set(at_work.tolist()) | {t.kind for t in model.terms}
     machine = _machine(model, layout, every)
@@ -125,7 +125,8 @@ def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> t
 
 
 def _tangent(
-    path: _Path, segment: Segment, channels: Array, layout: Layout, at_work: Array, indices: Array
+    path: _Path, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64],
+    indices: NDArray[np.int64],
 ) -> Array:
     wanted = set(at_work.tolist())
     out = np.empty((2, at_work.shape[0], segment.count))

@@ -87,7 +87,7 @@ def _blank(facts: Facts, segments: Sequence[tuple[float, Array]]) -> Record:
     for number, (axis, voltage) in enumerate(segments):
         n = voltage.shape[0]
         out.append(Segment(
-            number, 0, axis, start + np.arange(n) * facts.sample_period_s, voltage, np.zeros((3, n)),
+            number, 0, axis, np.asarray(start + np.arange(n) * facts.sample_period_s, dtype=np.float64), voltage, np.zeros((3, n)),
             np.ones(n, dtype=bool), np.ones(n), True, number,
         ))
         start += n * facts.sample_period_s + PAUSE_S

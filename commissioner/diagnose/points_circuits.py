@@ -159,4 +159,5 @@ def held_out(points: Points, extensions: Sequence[Extension], scale: Mapping[str
         one = points.only(k)
         current, power = _predicted(x, one, extensions, scale)
         out.append([float(current[0] / one.current_line_a[0] - 1.0), float(power[0] / one.power_w[0] - 1.0)])
-    return np.array(out) / np.array([scale["current_scatter"], scale["power_scatter"]])
+    errors: Array = np.array(out) / np.array([scale["current_scatter"], scale["power_scatter"]])
+    return errors

@@ -116,7 +116,8 @@ def _conclude(
     gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0
     plain = fit_points(points, [], scale)
     return PointsDiagnosis(
-        "locked rotor" if points.is_locked else "no load", verdict, reason, tuple(causes), rms[0], rms[1], *relative, gain,
+        "locked rotor" if points.is_locked else "no load", verdict, reason, tuple(causes), rms[0], rms[1], relative[0], relative[1],
+        gain,
         _parameters(points, plain[0], plain[1]), _parameters(points, x, covariance), dict(tested),
     )
 

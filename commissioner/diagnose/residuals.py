@@ -193,7 +193,7 @@ def _spectrum(errors: Sequence[_Errors], noise: Noise, tones_hz: Sequence[float]
     by_class = {k: (float(np.sqrt(s[0] / s[2])), float(np.sqrt(s[1] / s[2]))) for k, s in sums.items() if s[2] > 0}
     edges = np.unique(np.searchsorted(frequency, np.geomspace(frequency[0], frequency[-1], SPECTRUM_POINTS)))
     before, after, quiet = (np.maximum.reduceat(line, edges) for line in lines)
-    return Spectrum(frequency[edges], before, after, quiet, by_class)
+    return Spectrum(np.asarray(frequency[edges], dtype=np.float64), before, after, quiet, by_class)
 
 
 def _correlation(errors: Sequence[_Errors], noise: Noise, period_s: float) -> Correlation:
@@ -211,4 +211,4 @@ def _correlation(errors: Sequence[_Errors], noise: Noise, period_s: float) -> Co
         power = np.abs(command) ** 2
         power[1:-1] *= 2.0
         variance += float(power @ _axis_density(segment, noise, size, period_s)) / size
-    return Correlation(lags * period_s, *(total / np.sqrt(max(variance, 1e-300))))
+    return Correlation(np.asarray(lags * period_s, dtype=np.float64), *(total / np.sqrt(max(variance, 1e-300))))

@@ -115,7 +115,8 @@ def search(
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
     record, layout, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
-    model, accepted = nominal.model, ()
+    model = nominal.model
+    accepted: tuple[str, ...] = ()
     first: Screening | None = None
     if part.samples < 0.7 * record.samples:
         small = explored(record)
@@ -127,7 +128,7 @@ def search(
     whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record, go_on)
     start = whole.with_new_flux_before(whole.relayout(fit(model, record, layout, noise)))
     fitted, accepted, last = whole.run(start, accepted)
-    first = whole.first if first is None else first
+    first = first or whole.first or last
     if accepted and not losses and "lost_samples" not in excluded:
         mended, again, losses = _mended(whole.record, fitted, whole.layout, noise, report)
         if losses:

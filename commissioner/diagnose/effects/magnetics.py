@@ -77,7 +77,7 @@ def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     pairs: dict[str, list[float]] = {}
     for name, value in values.items():
         pairs.setdefault(name.rpartition("_")[2], []).append(value)
-    largest = max((float(np.hypot(*p)) for p in pairs.values() if len(p) == 2), default=0.0)
+    largest = max((float(np.linalg.norm(p)) for p in pairs.values() if len(p) == 2), default=0.0)
     return {"flux_wb": (largest, "Wb")}
 
 
@@ -237,7 +237,7 @@ def shaft_motion(setting: Setting) -> tuple[Term, ...]:
 def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     parts = {p: [values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin")] for p in ("leakage", "magnetizing")}
     return {
-        f"{p}_anisotropy": (float(np.hypot(*pair)), "1") for p, pair in parts.items() if any(pair) or p == "leakage"
+        f"{p}_anisotropy": (float(np.linalg.norm(pair)), "1") for p, pair in parts.items() if any(pair) or p == "leakage"
     }
 
 
