@@ -44,8 +44,10 @@ CLASS_GUARD = 1e-2
 """Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
 HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
-SAME_ORDER, SAME_ORDER_GUARD = frozenset({"rotor_skin_effect", "iron_loss"}), 0.1
-"""Two networks that terminals hardly tell apart: the weaker is only named beside the other where it is no trifle."""
+SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
+PAIR_GUARDS = {SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05}
+"""Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
+a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
@@ -329,7 +331,7 @@ def _share_left(accepted: str, name: str) -> float:
         return GUARD
     share = 0.0 if accepted in EXACT else RIGID_GUARD
     if accepted in CATALOGUE[name].confounders or name in CATALOGUE[accepted].confounders:
-        share = max(share, SAME_ORDER_GUARD if {accepted, name} == SAME_ORDER else CLASS_GUARD)
+        share = max(share, PAIR_GUARDS.get(frozenset({accepted, name}), CLASS_GUARD))
     return share
 
 
