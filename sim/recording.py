@@ -39,6 +39,7 @@ def record(scenario: Scenario, seed: int) -> tuple[Columns, dict[str, Any], dict
     plant = scenario.plant
     p, s = pack(plant, accuracy=ACCURACY)
     x = fresh_state(p)
+    coast(x, p, 0.0)  # open terminals: remanence without a stator current
     random = np.random.default_rng([seed, 7])
     stretches = [_play(segment, x, p, scenario, first=j == 0) for j, segment in enumerate(scenario.segments)]
     _set_clip(plant, s, stretches)
@@ -83,7 +84,8 @@ def _play(segment: Segment, x: np.ndarray, p: np.ndarray, scenario: Scenario, *,
 def _remagnetize(x: np.ndarray, p: np.ndarray, plant: Plant) -> None:
     """Remanence of shape `every_segment`: the iron keeps some flux through every pause."""
     if any(e.name == "remanence" and e.shape == "every_segment" for e in plant.effects):
-        x[0:2] = x[2:4] = p[[at.P_FLUX0_C, at.P_FLUX0_S]] * 0.7
+        x[2:4] = p[[at.P_FLUX0_C, at.P_FLUX0_S]] * 0.7
+        coast(x, p, 0.0)
 
 
 def command_voltage(segment: Segment, period_s: float) -> np.ndarray:
