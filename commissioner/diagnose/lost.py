@@ -25,6 +25,8 @@ MOST_EVENTS = 16
 LEAST_GAIN = 80.0
 """Delta chi2 of one event: 40 for the look over all instants (2 ln N is below 30), 40 for the rule."""
 LEAST_SHARE = 0.03
+LEAST_JUMP = 0.7
+"""Samples by which the delay must seem to jump: several jumps in a segment do not add up to a whole number anywhere."""
 SPIKE = 9.0
 MOST_IN_A_ROW = 3
 START = 50
@@ -141,8 +143,8 @@ def _delay_step(residual: Array, slope: Array) -> int | None:
     gain = after[inside] ** 2 / np.maximum(power[inside], 1e-6 * float(w.sum()))
     at = int(np.argmax(gain))
     samples = after[inside][at] / max(float(power[inside][at]), 1e-12)
-    is_whole = abs(samples - round(samples)) < 0.3 and abs(round(samples)) >= 1
-    return at + 20 if gain[at] > LEAST_GAIN and is_whole else None
+    is_jump = abs(samples) >= LEAST_JUMP
+    return at + 20 if gain[at] > LEAST_GAIN and is_jump else None
 
 
 def _repairs(segment: Segment, at: int) -> Iterator[tuple[Segment, Loss]]:
