@@ -99,7 +99,11 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     os.mkfifo(tmp_path / "pipe")
     script = COMMAND[-1].replace("main()", "import commissioner.cli.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()")
     call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
-    process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
+    try:
+        process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, before)
     with (tmp_path / "pipe").open("w"):  # opens once the verb reads, and wakes it when it closes
         process.send_signal(number)
     out, err = process.communicate(timeout=60)
