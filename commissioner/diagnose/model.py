@@ -73,10 +73,6 @@ class Layout:
                 out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
         return out
 
-    def finer(self) -> Layout:
-        """Half the step length, for the solver-error check."""
-        return replace(self, substeps=2 * self.substeps, crossing_substeps=2 * self.crossing_substeps)
-
 
 def odd_vectors(intervals: int) -> Array:
     """Rises of odd saturating functions, (intervals, intervals+3): row k climbs from 0 to 1 around knot k and stays.

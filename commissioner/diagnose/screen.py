@@ -37,9 +37,9 @@ def required_chi2(numbers: int) -> float:
 
 @dataclass(frozen=True)
 class Score:
-    """Gain `delta_chi2` an effect promises to first order, its `step` in theta units, and its direction (unit norm
+    """What an effect promises to first order: gain `delta_chi2` and `step` in theta units.
 
-    in the projected whitened space) for cosines. `limit` is the size of the first quantity that would just be found.
+    `limit` is the size of the first quantity that would just be found.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Screening:
-    """Scores by name, and the projected Gram matrix of every candidate number for cosines."""
+    """Scores by name, and the Gram matrix of every candidate number after projection: what could imitate what."""
 
     scores: Mapping[str, Score]
     projected: Array
@@ -69,17 +69,6 @@ class Screening:
 
     def ranked(self) -> list[Score]:
         return sorted(self.scores.values(), key=lambda s: -s.net)
-
-    def cosine(self, a: str, b: str) -> float:
-        """Largest cosine between a direction of `a` and the promised direction of `b` (first canonical one)."""
-        ia, ib = list(self.columns[a]), list(self.columns[b])
-        db = self.scores[b].step
-        power_b = float(db @ self.projected[np.ix_(ib, ib)] @ db)
-        if power_b <= 0:
-            return 0.0
-        cross = self.projected[np.ix_(ia, ib)] @ db
-        explained = float(cross @ np.linalg.pinv(self.projected[np.ix_(ia, ia)], rcond=1e-9, hermitian=True) @ cross)
-        return float(np.sqrt(min(max(explained / power_b, 0.0), 1.0)))
 
 
 def screen(

@@ -135,9 +135,5 @@ def _lagged(current: Array, slope: Array, lag_s: float, period_s: float) -> tupl
     if lag_s < 0.05 * period_s:
         return current - lag_s * slope, slope
     h = 1e-3 * lag_s
-    high, low = _low_pass_smooth(current, lag_s + h, period_s), _low_pass_smooth(current, lag_s - h, period_s)
-    return _low_pass_smooth(current, lag_s, period_s), -(high - low) / (2.0 * h)
-
-
-def _low_pass_smooth(signal: Array, lag_s: float, period_s: float) -> Array:
-    return _low_pass(signal, lag_s, period_s)
+    high, low = _low_pass(current, lag_s + h, period_s), _low_pass(current, lag_s - h, period_s)
+    return _low_pass(current, lag_s, period_s), -(high - low) / (2.0 * h)
