@@ -8,7 +8,7 @@ operators of fixed radius, rotor branches of fixed corner frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
