@@ -18,7 +18,8 @@ from commissioner.procedure.energised import BIAS_RAMP_PER_S, OFFSET_S, measure_
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
 from commissioner.procedure.states import Event
 from commissioner.procedure.steps import Findings, Job, Step
-from commissioner.procedure.under_bias import bias_seconds, under_bias
+from commissioner.procedure.under_bias import SECONDS as BIAS_SECONDS
+from commissioner.procedure.under_bias import under_bias
 from commissioner.procedure.under_test import UnderTest, plate_machine, warm_up
 from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetScale, Tell
 
@@ -46,13 +47,17 @@ def excite(job: Job, findings: Findings) -> Step:
         look_s = FIRST_LOOK * seconds
         yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
         yield from _look(job, findings)
-    left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - 1.0 / job.scale_ramp_per_s
-    has_bias = left_s - bias_seconds(job) >= SHORTEST * seconds
-    left_s -= bias_seconds(job) if has_bias else 0.0
+    ramp_s = 1.0 / job.scale_ramp_per_s
+    left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - ramp_s
+    bias_s = BIAS_SECONDS * job.stretch
+    if left_s - (bias_s + ramp_s) >= SHORTEST * seconds:
+        left_s -= bias_s + ramp_s
+    else:
+        bias_s = 0.0
     seconds = min(seconds, max(left_s, SHORTEST * seconds))
     longest_s = max(seconds, left_s)
     chosen = _design(job, findings, seconds)
-    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, has_bias=has_bias)
+    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, bias_s=bias_s)
     findings.excitations.append(chosen)
     findings.tests_done += 1
     if findings.tests_done == len(job.plan.tests_deg):
@@ -114,11 +119,11 @@ def _test(
     longest_s: float,
     *,
     is_look: bool = False,
-    has_bias: bool = False,
+    bias_s: float = 0.0,
 ) -> Generator[Command, Any, None]:
     """One energised multitone session: raise the amplitude as the guard permits, end when the time is up and settled.
 
-    An estimate that has not settled after `seconds` gets more time, up to `longest_s`.
+    An estimate that has not settled after `seconds` gets more time, up to `longest_s`; then `bias_s` on a DC bias.
     """
     tones = tuple((t.amplitude_v, t.frequency_hz, t.phase_rad) for t in chosen.excitation.tones)
     yield Tell(
@@ -151,8 +156,8 @@ def _test(
         if under_test.is_time_to_tell():
             yield Tell(under_test.update(reading))
     finished = under_test.finished(is_look=is_look)
-    if has_bias:
-        yield from under_bias(job, findings, STEP, axis_deg, chosen.excitation, under_test)
+    if bias_s > 0.0:
+        yield from under_bias(job, findings, STEP, axis_deg, chosen.excitation, under_test, bias_s)
     yield SetScale(0.0)
     yield from ramp_down(findings, STEP, axis_deg, 1.0 / job.scale_ramp_per_s)
     yield Disarm("test done")

@@ -18,16 +18,12 @@ SECONDS = 1.3
 """Time on the bias, for rotor time constants up to 0.5 s; before it the tones come down."""
 
 
-def bias_seconds(job: Job) -> float:
-    """What the stretch takes of a test, the tones' way down included."""
-    return SECONDS * job.stretch + 1.0 / job.scale_ramp_per_s
-
-
 def under_bias(
-    job: Job, findings: Findings, step: str, axis_deg: float, excitation: Excitation, test: UnderTest
+    job: Job, findings: Findings, step: str, axis_deg: float, excitation: Excitation, test: UnderTest, seconds: float
 ) -> Generator[Command, Any, None]:
-    """Bias on, tones down, the flux watched through the current; bias off. Left out where no bias fits, which is told."""
-    machine, seconds = findings.estimate, SECONDS * job.stretch
+    """Tones down, bias on for `seconds`, the flux watched through the current; bias off. Left out where no bias fits, which
+    is told."""
+    machine = findings.estimate
     limits = ExcitationLimits(test.limit_wb, findings.test_current_a(job), job.test_voltage_v)
     levels = findings.staircases[-1].levels
     plan = None

@@ -1,4 +1,4 @@
-"""Blind campaigns of the self-sensing half: `python -m tests.campaigns.monitor accuracy|healthy|leaks [COUNT]`.
+"""Blind campaigns of the self-sensing half: `python -m tests.campaigns.monitor accuracy|healthy|leaks [COUNT] [--machines M]`.
 
 Machines are published ones (tests/data/motors) scattered by +-20 %, loads, mains and noise are drawn from the seed; the plate is
 the machine's steady state in closed form. The answer is compared with what the simulated shaft truly did.
@@ -333,13 +333,22 @@ def main() -> int:
     parser.add_argument("count", type=int, nargs="?", default=70)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=12.0, help="length of the healthy recordings")
+    parser.add_argument(
+        "--machines",
+        type=int,
+        default=12,
+        help="among which the recordings (healthy) are shared, or beside the shipped one (leaks)",
+    )
     options = parser.parse_args()
     if options.what == "accuracy":
         print(summary(accuracy(options.count, options.first)))
     else:
         from tests.campaigns.monitor_trend import healthy, leaks
 
-        print(healthy(options.count, options.seconds) if options.what == "healthy" else leaks(options.count))
+        if options.what == "healthy":
+            print(healthy(options.count, options.seconds, options.machines, options.first))
+        else:
+            print(leaks(options.count, options.machines, options.first))
     return 0
 
 

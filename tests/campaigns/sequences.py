@@ -25,6 +25,8 @@ DRIVE_FAULTS = (
 )  # fmt: skip
 REQUESTS = {("tcp", 1): 160, ("tcp", 2): 270, ("rtu", 1): 290, ("rtu", 2): 455}
 """About how many requests a sound run of one or two tests makes."""
+BIASED_REQUESTS = {"tcp": 74, "rtu": 84}
+"""So many more for every test that ends on a DC bias."""
 WRITES = {1: 15, 2: 22}
 """Of them with function 16."""
 FAULT_COUNTS = (0, *(1,) * 8, *(2,) * 6, *(3,) * 3, *(4,) * 2)
@@ -45,10 +47,12 @@ class Sequence:
 def sequences(draw: st.DrawFn, wire: str) -> Sequence:
     """One run over `wire` (`both`: either)."""
     chosen, tests = wire if wire in WIRES else draw(st.sampled_from(WIRES)), draw(st.sampled_from([1, 1, 1, 1, 2]))
-    requests = REQUESTS[chosen, tests]
+    is_biased = draw(st.booleans())
+    requests = REQUESTS[chosen, tests] + is_biased * tests * BIASED_REQUESTS[chosen]
     script = Script(
         draw(st.sampled_from([*DECISIONS[:1] * 3, *DECISIONS[1:]])),
         tests,
+        is_biased,
         draw(st.floats(0.8, 2.5)),
         *draw(_rogue(requests)),
     )

@@ -1,6 +1,7 @@
 """A run of well under a second: the product's own steps and guard, short tests, and a verdict given from outside.
 
-The excitation comes from the design once and is then made too strong by `strength`, so that the guard has work.
+The excitation comes from the design once and is then made too strong by `strength`; the voltage that the staircase is said
+to have needed for a current, from which the DC bias is chosen, by its square: the guards have work.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 from commissioner.identify import excitation
 from commissioner.identify.excitation import DesignedExcitation, ExcitationLimits
-from commissioner.identify.resistance import IDEAL_INVERTER
+from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, Staircase, fit_staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.excite import _test
@@ -28,12 +29,13 @@ NEW_SI = (3.7, 2.2, 0.021, 0.23)
 NEW_ON_THE_WIRE = (3.7, 2.2, 21.0, 230.0)
 OLD_ON_THE_WIRE = (3.2, 1.8, 26.0, 200.0)
 DECISIONS = ("write back", "keep", "reject")
+BIAS_S = 0.3
 
 PLAN = ProcedurePlan(
     axes_deg=(0.0, 60.0),
     repeat_first=False,
     supervision=Supervision(WATCHDOG_S, 0.5, 0.01, REPLY_TIMEOUT_S),
-    limits=Limits(current_fraction=0.9, trip_fraction=1.4, flux_fraction=0.9, axis_time_s=0.75, total_time_s=3.0),
+    limits=Limits(current_fraction=0.9, trip_fraction=1.4, flux_fraction=0.9, axis_time_s=1.2, total_time_s=4.0),
     excitation=ExcitationPlan(seconds=0.3, staircase_seconds=1.0, first_scale=0.4, scale_ramp_per_s=10.0),
     acceptance=Acceptance(1.0, 2.0, 3.0, 3.0, 6.0),
 )
@@ -41,10 +43,12 @@ PLAN = ProcedurePlan(
 
 @dataclass(frozen=True)
 class Script:
-    """`decision` of the verdict; `rogue`: what a defective procedure does, before its `rogue_at`-th command."""
+    """`decision` of the verdict; whether the tests end on a DC bias; `rogue`: what a defective procedure does, before its
+    `rogue_at`-th command."""
 
     decision: str = "write back"
     tests: int = 1
+    is_biased: bool = False
     strength: float = 1.0
     rogue: str = ""
     rogue_at: int = 0
@@ -82,6 +86,11 @@ def _stronger(chosen: DesignedExcitation, factor: float) -> DesignedExcitation:
     return replace(chosen, excitation=replace(chosen.excitation, tones=tones))
 
 
+def _levels(axis_deg: float, strength: float) -> Staircase:
+    """What a staircase tells of a drive without losses, its voltages too high."""
+    return fit_staircase([DcLevel(strength**2 * NEW_SI[0] * i, i, 1e-3) for i in (1.0, 2.0, 4.0, -2.0)], axis_deg)
+
+
 def short_course(script: Script, job: Job, findings: Findings) -> Generator[ask.Command, Any, RunEnded]:
     """The commands of a short run; a rogue script puts one in that does not belong."""
     steps, reply, number = _steps(script, job, findings), None, 0
@@ -108,8 +117,10 @@ def _steps(script: Script, job: Job, findings: Findings) -> Generator[ask.Comman
     chosen, seconds = _stronger(_designed(), script.strength), PLAN.excitation.seconds
     for axis_deg in PLAN.axes_deg[: script.tests]:
         findings.estimate, findings.is_measured = known, True
+        findings.staircases.append(_levels(axis_deg, script.strength))
         yield _entered(State.EXCITING, Event.RESISTANCE_KNOWN)
-        yield from _test(job, findings, axis_deg, chosen, seconds, seconds, is_look=True)  # without the closing bias
+        bias_s = BIAS_S if script.is_biased else 0.0
+        yield from _test(job, findings, axis_deg, chosen, seconds, seconds, is_look=True, bias_s=bias_s)
         findings.tests_done += 1
     yield _entered(State.JUDGING, Event.AXES_DONE)
     yield ask.Tell(VerdictReached(script.decision, "the script says so", None, None, ""))
