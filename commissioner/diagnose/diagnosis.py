@@ -125,19 +125,19 @@ def diagnose(
         _one_state(found.fit, found.record)
     except _MixedMotors as mixed:
         return Diagnosis(Verdict.REFUSED, str(mixed), (), (), audit, noise)
-    return _conclude(found, audit, noise, report)
+    return _conclude(found, audit, noise, excluded)
 
 
-def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], None]) -> Diagnosis:
+def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str]) -> Diagnosis:
     record, layout = found.record, found.layout
     numbers = 4 + len(found.fit.model.terms)
     rest = leftover(found.fit.model, record, layout, noise, numbers)
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
     rivals = alternatives(
-        part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples
+        part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples, excluded
     )
-    causes = [_cause(found, name, rest, rivals.get(name, {}), noise) for name in found.accepted]
+    causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded) for name in found.accepted]
     causes = _without_truncation(causes, audit)
     causes += _audit_causes(audit, found, noise, {c.name for c in causes})
     unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE)
@@ -156,7 +156,9 @@ def _conclude(found: Found, audit: Audit, noise: Noise, report: Callable[[str], 
     )
 
 
-def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float], noise: Noise) -> Cause:
+def _cause(
+    found: Found, name: str, rest: Leftover, rivals: Mapping[str, float], noise: Noise, excluded: Sequence[str],
+) -> Cause:
     gain = found.gains[name]
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
@@ -170,7 +172,7 @@ def _cause(found: Found, name: str, rest: Leftover, rivals: Mapping[str, float],
         sure *= calibration.UNKNOWN_NOISE_FACTOR
     return Cause(
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
-        float(np.sqrt(gain / count)), gain, sure, (*fixed, *(c for c in close if c not in fixed)), rivals, tuple(features),
+        float(np.sqrt(gain / count)), gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded), rivals, tuple(features),
     )
 
 

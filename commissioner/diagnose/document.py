@@ -120,9 +120,23 @@ def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
         "parameters_before": _quantities(seen.parameters_before),
         "parameters_after": _quantities(seen.parameters_after),
         "tested_p_values": dict(seen.tested),
+        "points": _points(seen),
         "next_experiment": None,
         "model_file": None,
     }
+
+
+def _points(seen: PointsDiagnosis) -> list[dict[str, float]]:
+    """Every point with the relative error of its predicted current and power, left out of the fit and in it."""
+    columns = {
+        "frequency_hz": seen.points.frequency_hz, "voltage_line_v": seen.points.voltage_line_v,
+        "current_line_a": seen.points.current_line_a, "power_w": seen.points.power_w,
+    }
+    for when, errors in (("before", seen.errors_before), ("after", seen.errors_after)):
+        for how, table in (("left_out", errors.left_out), ("fitted", errors.fitted)):
+            for k, what in enumerate(("current", "power")):
+                columns[f"{what}_error_{when}_{how}"] = table[:, k]
+    return [{key: float(column[k]) for key, column in columns.items()} for k in range(seen.points.count)]
 
 
 def refused_document(reason: str, kind: str) -> dict[str, Any]:

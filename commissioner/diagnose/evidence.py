@@ -113,13 +113,17 @@ def _without_segment(one: Fit, k: int, layout: Layout) -> Model:
 
 def alternatives(
     found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
+    excluded: Sequence[str] = (),
 ) -> dict[str, dict[str, float]]:
-    """For every accepted cause: what takes its place, with the loss in chi2 scaled to the whole recording."""
+    """For every accepted cause: what of the rest (but for `excluded`) takes its place, with the loss in chi2 scaled to
+
+    the whole recording.
+    """
     out: dict[str, dict[str, float]] = {}
     for name in accepted:
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
         gain = without.chi2 - found.chi2
-        absent = [n for n in CATALOGUE if n not in accepted]
+        absent = [n for n in CATALOGUE if n not in accepted and n not in excluded]
         screening = screen(without.model, record, layout, noise, setting, absent)
         rivals: dict[str, float] = {}
         for score in screening.ranked()[:3]:

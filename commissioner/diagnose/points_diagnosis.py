@@ -30,6 +30,14 @@ class PointCause:
 
 
 @dataclass(frozen=True)
+class PointErrors:
+    """Relative errors (n, 2) of predicted current and power at every point: left out of the fit, and in it."""
+
+    left_out: Array
+    fitted: Array
+
+
+@dataclass(frozen=True)
 class PointsDiagnosis:
     """Verdict on one table. Errors are of the predicted current, rms over points left out one at a time, A."""
 
@@ -45,6 +53,9 @@ class PointsDiagnosis:
     parameters_before: Mapping[str, Quantity]
     parameters_after: Mapping[str, Quantity]
     tested: Mapping[str, float]
+    points: Points
+    errors_before: PointErrors
+    errors_after: PointErrors
 
 
 def diagnose_points(points: Points, resistance_ohm: float | None = None) -> PointsDiagnosis:
@@ -100,7 +111,7 @@ def _conclude(
     held_before, held_after = held_out(points, [], scale), held_out(points, accepted, scale)
     total = float((held_before**2).sum())
     causes = []
-    x, covariance, _ = fit_points(points, accepted, scale)
+    x, covariance, left = fit_points(points, accepted, scale)
     at = 2
     for extension in accepted:
         others = [e for e in accepted if e.name != extension.name]
@@ -111,14 +122,17 @@ def _conclude(
         at += extension.numbers
     verdict, reason = _verdict(points, causes, tested)
     unit = np.array([scale["current_scatter"], scale["power_scatter"]])
-    rms = [float(np.sqrt(np.mean((h[:, 0] * points.current_line_a) ** 2))) for h in (held_before * unit, held_after * unit)]
-    relative = [float(np.sqrt(np.mean((h * unit) ** 2))) for h in (held_before, held_after)]
-    gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0
     plain = fit_points(points, [], scale)
+    before, after = (
+        PointErrors(held * unit, fitted.reshape(2, -1).T * unit) for held, fitted in ((held_before, plain[2]), (held_after, left))
+    )
+    rms = [float(np.sqrt(np.mean((e.left_out[:, 0] * points.current_line_a) ** 2))) for e in (before, after)]
+    relative = [float(np.sqrt(np.mean(e.left_out**2))) for e in (before, after)]
+    gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0
     return PointsDiagnosis(
         "locked rotor" if points.is_locked else "no load", verdict, reason, tuple(causes), rms[0], rms[1], relative[0], relative[1],
         gain,
-        _parameters(points, plain[0], plain[1]), _parameters(points, x, covariance), dict(tested),
+        _parameters(points, plain[0], plain[1]), _parameters(points, x, covariance), dict(tested), points, before, after,
     )
 
 

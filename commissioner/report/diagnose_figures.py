@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, ParamSpec
 
@@ -146,6 +146,30 @@ def look_alikes(seen: Alike, named: Sequence[str]) -> Figure:
         axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color="white" if share > 0.6 else INK)
     axes.grid(False)
     axes.set(xlabel="could be taken for ... (%)", ylabel="cause at work")
+    return figure
+
+
+@_styled
+def over_points(points: Sequence[Mapping[str, float]], is_locked: bool, has_causes: bool) -> Figure:
+    """Error of the predicted current and power at every test point, over current (locked rotor) or flux (no load), and
+    over frequency where the test has several. Rings: the point was left out of the fit; dots: it was in it."""
+    frequency, volts, amps = (np.array([p[k] for p in points]) for k in ("frequency_hz", "voltage_line_v", "current_line_a"))
+    across = [(amps, "line current / A rms")] if is_locked else [(np.sqrt(2.0 / 3.0) * volts / (2.0 * np.pi * frequency),
+                                                                 "stator flux / Wb peak")]
+    if np.unique(frequency).size > 1:
+        across.append((frequency, "frequency / Hz"))
+    figure = _figure(4.6)
+    panels = figure.subplots(2, len(across), sharex="col", sharey="row", squeeze=False)
+    for row, what in zip(panels, ("current", "power"), strict=True):
+        for axes, (x, label) in zip(row, across, strict=True):
+            for when, color in (("before", ORANGE), ("after", BLUE))[: 2 if has_causes else 1]:
+                out, inside = (100.0 * np.array([p[f"{what}_error_{when}_{how}"] for p in points]) for how in ("left_out", "fitted"))
+                axes.plot(x, inside, ".", color=color, markersize=4, label=f"{BEFORE if when == 'before' else AFTER}, fitted")
+                axes.plot(x, out, "o", color=color, fillstyle="none", markersize=6, label="the same point left out of the fit")
+            axes.axhline(0.0, color=MUTED, linewidth=0.8)
+            axes.set_xlabel(label if what == "power" else "")
+        row[0].set_ylabel(f"error of the {what} / %")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), ncols=2, loc="outside upper center")
     return figure
 
 

@@ -34,6 +34,8 @@ HEADLINES = {
     "refused": "These data cannot carry an answer.",
 }
 
+POINTS_HEADLINE = "Constant parameters are not enough for these points; what is missing: {names}."
+
 
 def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
     """One self-contained page: headline, where the error is, its frequencies, causes, what cannot be told, parameters, data."""
@@ -113,7 +115,7 @@ def headline(document: Mapping[str, Any]) -> str:
     """The one sentence of the verdict, with the names."""
     names = ", ".join(_spoken(c["name"]) for c in document["causes"]) or "none"
     if document["kind"] == "points":
-        return str(document["reason"])
+        return POINTS_HEADLINE.format(names=names) if document["causes"] else str(document["reason"])
     tied = [c for c in document["causes"] if c["equivalent"]]
     classes = "; ".join(" or ".join(_spoken(n) for n in (c["name"], *c["equivalent"])) for c in tied)
     return HEADLINES[document["verdict"]].format(names=names, classes=classes)
@@ -314,6 +316,20 @@ def _chance(p: float) -> str:
     return f"1 in {number(1.0 / p, 2)}" if p < 0.2 else f"{100.0 * p:.0f} %"
 
 
+def _over_points(document: Mapping[str, Any]) -> list[Section]:
+    if not document.get("points"):
+        return []
+    is_locked = document["test"] == "locked rotor"
+    over = "With leakage saturation or skin effect left out, the error bends over current or frequency" if is_locked else (
+        "With saturation or a loss that grows with flux left out, the error bends over the flux"
+    )
+    drawn = figures.over_points(document["points"], is_locked, bool(document["causes"]))
+    return [Section("Where the circuit is wrong", [
+        picture(drawn, "Simulated against measured, every test point. Dots: the circuit was fitted to all points. Rings: it was "
+                f"fitted to the other points and had to predict this one. {over}; what is left should scatter about zero."),
+    ])]
+
+
 def points_page(document: Mapping[str, Any], name: str) -> Page:
     """The page of a points table."""
     rows = [
@@ -324,7 +340,7 @@ def points_page(document: Mapping[str, Any], name: str) -> Page:
     gain = document["gain"]
     return Page(
         title=f"Diagnosis of {document.get('test', 'test')} points: {name}",
-        headline=document["reason"], tone=TONES[document["verdict"]],
+        headline=headline(document), tone=TONES[document["verdict"]],
         facts=[
             ("error, constant parameters", percent(gain["relative_error_before"])),
             ("error, with the named causes", percent(gain["relative_error_after"])),
@@ -332,9 +348,12 @@ def points_page(document: Mapping[str, Any], name: str) -> Page:
         ],
         sections=[
             Section("Causes", [
-                Table(("cause", "size", "share of the error removed", "chance that scatter made it up"), rows)
+                *([document["reason"]] if rows else []),
+                Table(("cause", "size", "share of the error removed", "chance that scatter made it up"), rows,
+                      caption="Share: what comes back when this cause alone is left out. Shares need not add up to 100 %.")
                 if rows else "No cause passed the rules.",
             ]),
+            *_over_points(document),
             _parameters(document),
         ],
         footer="Steady-state points; line values are effective values (rms), parameters per phase of the star equivalent. ± is one "

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from commissioner.diagnose.document import points_document
 from commissioner.diagnose.points import read_points
 from commissioner.diagnose.points_diagnosis import diagnose_points
+from commissioner.report.diagnose_page import points_page
+from commissioner.report.page import Picture
 from tests.support.standstill import usable_motors
 
 MOTORS = [m for m in usable_motors() if m.plate.rated_power_w > 300.0][::7]
@@ -104,3 +107,14 @@ def test_too_few_points_impossible_power_and_loaded_motors_are_refused_with_the_
     )
     loaded = columns | {"frequency_hz": np.full(12, 50.0), "voltage_line_v": np.full(12, 400.0)}
     assert "loaded" in read_points(loaded | {"power_w": 0.5 * 400.0 * columns["current_line_a"]}, "load")
+
+
+def test_the_page_draws_every_point_fitted_and_left_out():
+    _, seen = named(locked(MOTORS[0], np.random.default_rng(4), 0.002, skin=0.15, saturation=0.12))
+    document = points_document(seen)
+    assert len(document["points"]) == 12
+    before, after = (max(abs(p[f"current_error_{w}_left_out"]) for p in document["points"]) for w in ("before", "after"))
+    assert after < 0.5 * before
+    page = points_page(document, "table")
+    assert "leakage saturation" in page.headline
+    assert sum(isinstance(part, Picture) for section in page.sections for part in section.parts) == 1
