@@ -131,18 +131,24 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     )
 
 
-def residual_current(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> Vector:
-    """What `separate` leaves of the segment's current, its mean removed."""
+def apart(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> tuple[Vector, list[Vector]]:
+    """The segment's current in parts, `(n,)` each: what `separate` leaves, its mean and the mains harmonics removed, and what it
+    gives to each comb.
+    """
     lines = separate(frame, part, combs, supply_orders)
     phases = [*(comb.phase_rad for comb in combs), frame.supply_angle_rad[part]]
-    left = frame.current_a[part] - lines.current_a[0]
+    left: Vector = frame.current_a[part] - lines.current_a[0]
+    made = []
     for p, phase in enumerate(phases):
         own = lines.comb == p
         amplitude = dict(zip(lines.order[own].tolist(), lines.current_a[own], strict=True))
+        share = np.zeros(phase.size, dtype=np.complex128)
         for h, row in enumerate(_powers(phase, max(amplitude, default=0)), start=1):
             if h in amplitude:
-                left = left - amplitude[h] * row - amplitude[-h] * np.conj(row)
-    return np.asarray(left, dtype=np.complex128)
+                share += amplitude[h] * row + amplitude[-h] * np.conj(row)
+        left = left - share
+        made.append(share)
+    return left, made[:-1]
 
 
 def _columns(phases: list[Signal], orders: list[tuple[int, ...]], drift: Signal) -> Signal:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.monitor import periods, tracking
-from commissioner.monitor.averaging import Comb, free_orders, residual_current
+from commissioner.monitor.averaging import Comb, apart, free_orders
 from commissioner.monitor.periods import PairSpectrum, Periodicity, ShaftSearch
 from commissioner.monitor.supply import TurningFrame, Vector
 from commissioner.records import Signal
@@ -36,7 +36,7 @@ class Found:
 
 def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[float, ...] = ()) -> Found:
     """Shaft and load periods of the segment. Loads at rational multiples of the shaft are the shaft's own comb."""
-    residual = residual_current(frame, part, [], SUPPLY_ORDERS)
+    residual, _ = apart(frame, part, [], SUPPLY_ORDERS)
     highest, full_scale = frame.band_hz * 0.95, float(abs(frame.current_a[part].mean()))
     spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest, full_scale)
     shaft, candidates = _find_shaft(frame, part, residual, spectrum, search)
@@ -45,17 +45,31 @@ def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[
     for frequency in given_hz:
         known.append(_refined(frame, part, residual, spectrum, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
     for _ in range(periods.MOST_LOADS):
-        combs = [
-            comb_of(frame, part, found, [c.frequency_hz for c in known[:k]], MOST_SEARCH_ORDERS)
-            for k, found in enumerate(known)
-        ]
-        left_current = residual_current(frame, part, combs, SUPPLY_ORDERS)
+        left_current, own = told_apart(frame, part, known)
         left = periods.pair_spectrum(left_current, frame.sample_period_s, highest, full_scale)
         new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
         if new is None:
             break
         known.append(new)
-    return Found(shaft, tuple(known[1:] if shaft else known), spectrum, left, candidates)
+    if len(known) > 1:
+        rest, own = told_apart(frame, part, known)
+        known = [_again(frame, part, rest + mine, spectrum, one) for one, mine in zip(known, own, strict=True)]
+    return Found(shaft and known[0], tuple(known[1:] if shaft else known), spectrum, left, candidates)
+
+
+def told_apart(frame: TurningFrame, part: slice, known: list[Periodicity]) -> tuple[Vector, list[Vector]]:
+    """The current's residual, and each comb's own part of it."""
+    combs = [
+        comb_of(frame, part, one, [c.frequency_hz for c in known[:k]], MOST_SEARCH_ORDERS)
+        for k, one in enumerate(known)
+    ]
+    return apart(frame, part, combs, SUPPLY_ORDERS)
+
+
+def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectrum, one: Periodicity) -> Periodicity:
+    """Refined once more without the others: a line of theirs a tenth of a hertz beside would turn the phase that is followed."""
+    found = _refined(frame, part, alone, spectrum, one.name, one.frequency_hz, one.harmonics_seen)
+    return found if one.name == "shaft" else replace(found, name=f"load {found.frequency_hz:.4g} Hz")
 
 
 def _find_shaft(
@@ -100,9 +114,12 @@ def _refined(
     time = frame.time_s[part]
     strongest = _strongest(spectrum, frequency_hz, seen)
     tries = []
+    noise = None
     for follows in ("mains",) if name == "shaft" else ("clock", "mains"):
         phase = comb_phase(frame, part, frequency_hz, follows)
         demodulated = tracking.demodulate(residual, time, phase, strongest)
+        noise = demodulated.noise_variance if noise is None else noise
+        demodulated = replace(demodulated, noise_variance=noise)  # the same for both, or chance in it would decide
         shift, std, power = tracking.refine(demodulated, 0.8 / np.ptp(time))
         tries.append((power, frequency_hz + shift, std, follows))
     power, frequency, std, follows = max(tries)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from commissioner.monitor import tracking
-from commissioner.monitor.averaging import Lines, residual_current
-from commissioner.monitor.combs import SUPPLY_ORDERS, Found, mean_supply
+from commissioner.monitor.averaging import Lines
+from commissioner.monitor.combs import Found, mean_supply, told_apart
+from commissioner.monitor.periods import Periodicity
 from commissioner.monitor.supply import TurningFrame
 
 DRIFT_KNOWN = 0.1
@@ -35,11 +38,18 @@ def whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: Li
     phase = ratio * (frame.supply_angle_rad + frame.slip_phase_rad) + moved * time
     blocks = int(np.clip(np.ptp(time) / 0.8, 16, 256))
     orders = sorted(shaft.harmonics_seen or (1,), key=lambda h: -_power(lines, h))[:3]
-    residual = residual_current(frame, everything, [], SUPPLY_ORDERS)
+    pace = supply / mean_supply(frame, part)
+    rest, own = told_apart(frame, everything, [_over_all(one, pace) for one in (shaft, *found.loads)])
+    residual = rest + own[0]
     demodulated = tracking.demodulate(residual, time, phase, orders, blocks)
     drift = tracking.track(demodulated, int(np.clip(np.ptp(time) / 4, 2, 16)))
     turned = float(drift(time[-1:])[0] - drift(time[:1])[0]) / float(np.ptp(time))
     return speed + moved + turned, float(np.hypot(std, DRIFT_KNOWN * (abs(turned) + abs(moved))))
+
+
+def _over_all(one: Periodicity, pace: float) -> Periodicity:
+    """With its mean frequency over everything, where the mains ran `pace` times as fast as in the segment."""
+    return replace(one, frequency_hz=one.frequency_hz * pace) if one.follows == "mains" else one
 
 
 def _power(lines: Lines, order: int) -> float:

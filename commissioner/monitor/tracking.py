@@ -93,14 +93,15 @@ def _frequency_std(demodulated: Demodulated, centre: Signal, shift: float) -> fl
 
 @dataclass(frozen=True)
 class PhaseDrift:
-    """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1."""
+    """What a comb's fundamental phase did beyond its nominal one: a polynomial in time scaled to -1 ... 1, constant outside."""
 
     polynomial: NDArray[np.float64]
     centre_s: float
     half_s: float
 
     def __call__(self, time_s: Signal) -> Signal:
-        return np.asarray(np.polynomial.legendre.legval((time_s - self.centre_s) / self.half_s, self.polynomial))
+        place = np.clip((time_s - self.centre_s) / self.half_s, -1.0, 1.0)
+        return np.asarray(np.polynomial.legendre.legval(place, self.polynomial))
 
 
 def track(demodulated: Demodulated, degree: int) -> PhaseDrift:

@@ -150,8 +150,8 @@ def test_leaks_are_seen_monotonically_and_the_smallest_five_sigma_away() -> None
 
 
 def test_healthy_recordings_raise_no_alarm() -> None:
-    alarms, closest = false_alarms(10, learned=6, duration_s=8.0)
-    assert alarms == 0
+    judged, alarms, closest = false_alarms(10, learned=6, duration_s=8.0)
+    assert (judged, alarms) == (10, 0)
     assert closest < 0.9
 
 
