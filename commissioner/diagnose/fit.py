@@ -20,6 +20,8 @@ from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
 TRIFLE = 1e-4
+SLICE = 12 * 1024
+"""Samples whitened at once in white noise: a multiple of every block a screening averages over."""
 
 
 @dataclass(frozen=True)
@@ -98,18 +100,29 @@ def normal_equations(
     """
     size = 4 + len(wanted)
 
+    def _sensitivities(k: int, here: Sequence[Term]) -> tuple[Array, Array]:
+        prediction = predict(model, record, k, layout, here)
+        return prediction.jacobian, record.segments[k].currents_a - prediction.currents_a
+
+    def _product(jacobian: Array, residual: Array, good: NDArray[np.bool_]) -> Array:
+        """Whitened Gram matrix of all directions and, last, the residual: in slices where noise is white, never copied whole."""
+        size = jacobian.shape[0] + 1
+        total = np.zeros((size, size))
+        length = SLICE if noise.is_white else max(residual.shape[1], 1)
+        for start in range(0, residual.shape[1], length):
+            part = slice(start, start + length)
+            stacked, kept = np.concatenate([jacobian[..., part], residual[None, :, part]], axis=0), good[part]
+            if block > 1 and noise.is_white:
+                stacked, kept = _averaged(stacked, kept, block)
+            white = whiten(stacked, kept, noise, record.facts.sample_period_s)
+            total += white @ white.T
+        return total
+
     def of_segment(k: int) -> tuple[Array, Array, float, int]:
         segment = record.segments[k]
         here = [c for c, term in enumerate(wanted) if term.segment in (-1, segment.uid)]
         rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
-        prediction = predict(model, record, k, layout, [wanted[c] for c in here])
-        residual = segment.currents_a - prediction.currents_a
-        stacked = np.concatenate([prediction.jacobian, residual[None]], axis=0)
-        good = segment.is_good
-        if block > 1 and noise.is_white:
-            stacked, good = _averaged(stacked, good, block)
-        white = whiten(stacked, good, noise, record.facts.sample_period_s)
-        product = white @ white.T
+        product = _product(*_sensitivities(k, [wanted[c] for c in here]), segment.is_good)
         gram, slope = np.zeros((size, size)), np.zeros(size)
         gram[np.ix_(rows, rows)] = product[:-1, :-1]
         slope[rows] = product[:-1, -1]

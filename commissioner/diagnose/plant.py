@@ -50,8 +50,9 @@ def predict(
             model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
             *(listed[k].step for k in inside),
         ])
-        tangent = _tangent(path, segment, channels, layout, at_work, indices)
-        _to_phases(tangent, scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
+        _to_phases(
+            _tangent(path, segment, channels, layout, at_work, indices), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)]
+        )
     measured = sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
     nu = path.machine[0][4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T

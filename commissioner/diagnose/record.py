@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
-MOST_THREADS = 4
+THREADS = min(os.cpu_count() or 1, 4)
+"""One segment each: more threads than cores would only hold more sensitivities in memory at once."""
 
 PHASE_ANGLES_RAD = np.array([0.0, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0])
 TO_PHASES = np.stack([np.cos(PHASE_ANGLES_RAD), np.sin(PHASE_ANGLES_RAD)], axis=1)
@@ -119,5 +121,5 @@ def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Re
     count = len(record.segments)
     if count == 1:
         return [of_segment(0)]
-    with ThreadPoolExecutor(min(count, MOST_THREADS)) as pool:
+    with ThreadPoolExecutor(min(count, THREADS)) as pool:
         return list(pool.map(of_segment, range(count)))
