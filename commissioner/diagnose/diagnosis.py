@@ -140,7 +140,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded) for name in found.accepted]
     causes = _without_truncation(causes, audit)
     causes += _audit_causes(audit, found, noise, {c.name for c in causes})
-    unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE)
+    unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE or _is_less_than_left(c, rest))
     causes = [c for c in causes if c not in unsure]
     rest = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
     count = float(found.fit.normal.count.sum())
@@ -154,6 +154,11 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         model_document(found, [*causes, *unsure]), found, split_lines(record), share,
         _remarks(noise, record, found.is_complete, unsure), unsure,
     )
+
+
+def _is_less_than_left(cause: Cause, rest: Leftover) -> bool:
+    """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
+    return not cause.from_audit and rest.sigma > max(cause.strength_sigma, MOSTLY_EXPLAINED_SIGMA)
 
 
 def _cause(

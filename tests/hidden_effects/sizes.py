@@ -48,9 +48,9 @@ def _leg(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
 def _saturation(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     flux, rated = sizes["at_flux_wb"][0], plant.nameplate.rated_flux_wb
     p = pack(plant)[0]
-    excess = saturation_excess((flux / rated) ** 2, p[at.P_SAT], p[at.P_SAT_ORDER], p[at.P_SAT_SHAPE])
-    none = saturation_excess(1e-12, p[at.P_SAT], p[at.P_SAT_ORDER], p[at.P_SAT_SHAPE])
-    return sizes["extra_current_a"][0], flux / plant.machine.inductance_h * (excess - none)
+    reached = [max((k / 60.0 * flux / rated) ** 2, 1e-12) for k in range(61)]
+    excess = [saturation_excess(y, p[at.P_SAT], p[at.P_SAT_ORDER], p[at.P_SAT_SHAPE]) for y in reached]
+    return sizes["extra_current_a"][0], flux / plant.machine.inductance_h * (excess[-1] - min(excess))
 
 
 def _leakage(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:

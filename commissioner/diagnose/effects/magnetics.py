@@ -12,9 +12,12 @@ from commissioner.diagnose.model import Term
 
 
 def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    """Extra current at the largest flux against the iron at its most permeable: that of sheet at small flux is lower."""
     layout = setting.layout
     weights = listed(values, "curve", layout.iron_vectors.shape[0])
-    extra = spline_value(layout.iron_vectors, weights, layout.iron_top_wb, setting.iron_flux_wb)
+    grid = np.linspace(0.0, setting.iron_flux_wb, 60)
+    curve = [spline_value(layout.iron_vectors, weights, layout.iron_top_wb, float(flux)) for flux in grid]
+    extra = curve[-1] - min(curve)
     return {
         "extra_current_a": (extra * setting.iron_flux_wb, "A"),
         "at_flux_wb": (setting.iron_flux_wb, "Wb"),
