@@ -89,7 +89,11 @@ class Runner:
             except Exception as surprise:  # must not leave a motor energised or a run without an end
                 error = self._unexpected(surprise)
             finally:
-                self._disarm(error.what if error is not None else "the run has ended")
+                live = self._disarm(error.what if error is not None else "the run has ended")
+        if live is not None:
+            ended, error = None, error or live
+            if error.remedy != live.remedy:
+                error.remedy = f"{live.remedy}; {error.remedy}"
         ended = ended or self._failed(error)
         self._note("run_ended", ended)
         self._present(ended)
@@ -169,7 +173,9 @@ class Runner:
             case ask.Enable():
                 self._enable()
             case ask.Disarm(reason=reason):
-                self._disarm(reason)
+                live = self._disarm(reason)
+                if live is not None:
+                    raise live
                 self._stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
                 raise TypeError(f"no such command: {command!r}")
@@ -269,11 +275,23 @@ class Runner:
         kind = DriveFault if reason.is_fault else Aborted
         raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
-    def _disarm(self, reason: str) -> None:
-        """The one place that de-energises. It tries every path and says what it verified."""
+    def _disarm(self, reason: str) -> DriveFault | None:
+        """The one place that de-energises. It tries every path and says what it verified.
+
+        A fault where the drive was told to energise before and does not confirm that its output is off.
+        """
         verified = self._inverter.disarm()
         self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
         self._note("disarmed", {"because": reason, "verified": verified})
+        if verified.is_confirmed or self._progress.segment < 0:
+            return None
+        return DriveFault(
+            "the drive does not confirm that its output is off",
+            step="de-energise",
+            value=verified.state,
+            limit="a status that says so",
+            remedy="take the motor as live: isolate the drive's supply, then look at its status",
+        )
 
     def _unexpected(self, surprise: Exception) -> CommissionerError:
         if isinstance(surprise, OSError):

@@ -5,6 +5,7 @@ import errno
 import pytest
 
 from commissioner.errors import WriteBackFailed
+from commissioner.link.facts import DisarmReport
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive import RunFolder
 from commissioner.run.runner import Runner
@@ -32,7 +33,7 @@ class Drive:
 
     def disarm(self):
         self.disarmed += 1
-        return "blocked"
+        return DisarmReport(True, "switch-on disabled", (), False)
 
     def write_circuit(self, *_):
         raise OSError(errno.ENOSPC, "No space left on device")
