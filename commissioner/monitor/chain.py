@@ -174,7 +174,8 @@ def _invert(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
     )
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
-    whole, whole_std = whole_record_speed(frame, part, found, lines)
+    ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
+    whole, whole_std = whole_record_speed(frame, part, found, lines, float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2))))
     proof = prove(audited, frame, part, combs, problem, solved)
     return Observation(
         audited,

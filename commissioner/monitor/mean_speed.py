@@ -18,9 +18,13 @@ UNSEEN = 0.01
 """Share of a recording cut at its end: the mean frequency of the rest differs by that share of its wander."""
 
 
-def whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: Lines) -> tuple[float, float]:
+def whole_record_speed(
+    frame: TurningFrame, part: slice, found: Found, lines: Lines, ripple_rad: float
+) -> tuple[float, float]:
     """Mean shaft speed over the whole stretch: the comb followed beyond the segment, (rad/s, standard error).
 
+    `ripple_rad`: rms of the shaft angle within the periods; where the stretch ends within one, that much turning more or less
+    is in its mean.
     Where the comb is lost outside the segment the segment's ratio to the mains stands, with the slip's spread as error.
     """
     shaft = found.shaft
@@ -30,6 +34,7 @@ def whole_record_speed(frame: TurningFrame, part: slice, found: Found, lines: Li
     ratio = 2 * np.pi * shaft.frequency_hz / mean_supply(frame, part)
     speed, std = ratio * supply, 2 * np.pi * shaft.frequency_std_hz
     std = float(np.hypot(std, UNSEEN * ratio * np.ptp(frame.supply_rad_per_s)))
+    std = float(np.hypot(std, np.sqrt(2.0) * ripple_rad / np.ptp(frame.time_s)))
     ends = frame.time_s[[part.start, min(part.stop, frame.time_s.size) - 1]]
     moved = 0.0 if shaft.drift is None else float(np.diff(shaft.drift(ends))[0] / np.diff(ends)[0])
     if part.start == 0 and part.stop >= frame.time_s.size:

@@ -81,7 +81,7 @@ def import_table(path: Path) -> Table:
     if "time_s" in table.columns and any(name.startswith("current_") for name in table.columns):
         return table
     try:
-        return recognise(table.columns, table.metadata, str(path))
+        return recognise(_in_si(table.columns), table.metadata, str(path))
     except DataRefused as refusal:
         return _foreign_csv(path, refusal)
 

@@ -195,7 +195,7 @@ def play(scenario: dict[str, Any], seed: int) -> tuple[Observation | Refused, di
 
 def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str, float]:
     """Errors in per cent: mean speed and torque of their values; waveforms (rms, means removed) of their amplitude, which is
-    half of peak to peak; beside it of the largest deviation from the mean, and of the rms.
+    half of peak to peak; beside it of the largest deviation from the mean, and of the rms. `*_z`: over the claimed std.
 
     The truth's waveform is what repeats with the loads: its least-squares lines on the true phases over the segment.
     """
@@ -206,9 +206,12 @@ def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str,
         "torque": 100 * (seen.mean_torque_nm / played.electromagnetic_torque_nm[inside].mean() - 1),
     }
     load = seen.period.load_torque_nm
+    out["speed_z"] = (seen.mean_speed_rad_per_s - truth["mean_speed_rad_per_s"]) / seen.mean_speed_std
+    out["torque_z"] = out["torque"] / 100 * seen.mean_torque_nm / seen.mean_torque_std
     waveforms = [("ripple", played.speed_rad_per_s, seen.period.speed_rad_per_s)]
+    stds = {"ripple": seen.period.speed_std, "load": seen.period.load_torque_std}
     if load is None:  # withheld: counted as outside every limit
-        out |= dict.fromkeys(("load", "load_of_peak", "load_of_rms"), float("nan"))
+        out |= dict.fromkeys(("load", "load_of_peak", "load_of_rms", "load_z"), float("nan"))
     else:
         waveforms.append(("load", played.load_torque_nm, load))
     for name, true, own in waveforms:
@@ -218,6 +221,9 @@ def score(seen: Observation, played: Played, truth: dict[str, Any]) -> dict[str,
         out[name] = rms / float(0.5 * np.ptp(expected))
         out[f"{name}_of_peak"] = rms / float(np.abs(expected - expected.mean()).max())
         out[f"{name}_of_rms"] = rms / float(expected.std())
+        claimed = stds[name]
+        assert claimed is not None
+        out[f"{name}_z"] = rms / 100 / float(np.sqrt(np.mean(claimed**2)))
     return out
 
 
@@ -313,6 +319,9 @@ def summary(rows: list[dict[str, Any]]) -> str:
             for key, of in ((what, "half peak to peak"), (f"{what}_of_peak", "peak"), (f"{what}_of_rms", "rms"))
         ]
         lines.append(f"{what} within its limit: " + ", ".join(shares))
+    for key in ("speed_z", "torque_z", "ripple_z", "load_z"):
+        values = np.array([r[key] for r in done])
+        lines.append(f"{key}: rms {np.sqrt(np.nanmean(values**2)):.2f}, largest {np.nanmax(np.abs(values)):.2f}")
     return "\n".join(
         [
             *lines,

@@ -144,3 +144,17 @@ def test_files_that_are_no_recordings_are_refused(tmp_path: Path, content: bytes
 def test_a_missing_file_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError):
         read_running(tmp_path / "none.csv")
+
+
+def test_units_in_the_names_count_in_a_plain_comma_csv_too(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    head = "Time (ms),Ia (mA),Ib (mA),Ic (mA),Uab (kV),Ubc (kV),Uca (kV)"
+    rows = [
+        ",".join(f"{x:.7f}" for x in (1e3 * t, *(1e3 * c[k] for c in CHANNELS), *(0.4 * c[k] for c in CHANNELS)))
+        for k, t in enumerate(TIME)
+    ]
+    path.write_text("\n".join([head, *rows]))
+    recording = read_running(path)
+    assert recording.sample_period_s == pytest.approx(1.25e-4)
+    np.testing.assert_allclose(recording.currents_a[0], CHANNELS[0], atol=1e-6)
+    np.testing.assert_allclose(recording.voltages_v[0], 400 * CHANNELS[0], atol=1e-4)
