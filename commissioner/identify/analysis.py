@@ -29,7 +29,7 @@ from commissioner.identify.axis import (
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.leg_family import one_inverter
 from commissioner.identify.resistance import InverterError
-from commissioner.identify.sufficient import require_amperes, require_tones
+from commissioner.identify.sufficient import require_amperes, require_tones, require_volts
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
 from commissioner.records import StandstillRecording
@@ -96,6 +96,7 @@ def identify(
     plate = nameplate or nameplate_from(recording.metadata)
     examined = audit(recording)
     require_amperes(examined, plate)
+    require_volts(examined, plate)
     require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
     fits: list[AxisFit] = []

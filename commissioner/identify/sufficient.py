@@ -15,6 +15,8 @@ from commissioner.motor.standstill import admittance_s
 WORST_RELATIVE_STD = 0.25
 PLAUSIBLE_CURRENT = (1e-3, 10.0)
 """Largest current of a test, of the rated peak."""
+PLAUSIBLE_IMPEDANCE = (1e-3, 30.0)
+"""Rms voltage over rms current of a test, of the rated impedance; a resistance alone is 0.004 to 0.15 of it."""
 
 
 def require_amperes(examined: Audit, plate: Nameplate) -> None:
@@ -28,6 +30,23 @@ def require_amperes(examined: Audit, plate: Nameplate) -> None:
             value=f"largest current along the axis {peak:.3g} A",
             limit=f"{PLAUSIBLE_CURRENT[0]:g} to {PLAUSIBLE_CURRENT[1]:g} times {plate.rated_current_peak_a:.3g} A",
             remedy="give currents in ampere, and the nameplate of the motor that was recorded",
+        )
+
+
+def require_volts(examined: Audit, plate: Nameplate) -> None:
+    """A voltage in other units than volts makes an impedance no motor of this plate has."""
+    excited = [s for s in examined.stretches if s.is_excited]
+    volts = math.sqrt(sum(float(np.sum(s.voltage_v**2)) for s in excited))
+    amperes = math.sqrt(sum(float(np.sum(s.current_a**2)) for s in excited))
+    rated_ohm = plate.rated_voltage_v / (math.sqrt(3.0) * plate.rated_current_a)
+    share = volts / amperes / rated_ohm
+    if not PLAUSIBLE_IMPEDANCE[0] < share < PLAUSIBLE_IMPEDANCE[1]:
+        raise DataRefused(
+            "the voltages do not fit the nameplate",
+            step="check the excitation",
+            value=f"voltage over current {volts / amperes:.3g} ohm (rms)",
+            limit=f"{PLAUSIBLE_IMPEDANCE[0]:g} to {PLAUSIBLE_IMPEDANCE[1]:g} times {rated_ohm:.3g} ohm",
+            remedy="give voltages in volt and currents in ampere, and the nameplate of the motor that was recorded",
         )
 
 

@@ -188,6 +188,8 @@ def test_a_current_against_the_voltage_or_in_other_units_is_refused():
     names = ("current_u_a", "current_v_a", "current_w_a")
     assert "does not follow" in str(refused(changed(**{n: -getattr(good, n) for n in names})))
     assert "nameplate" in str(refused(changed(**{n: 1e3 * getattr(good, n) for n in names})))
+    for factor in (1e-3, 1e3):
+        assert "voltages do not fit" in str(refused(changed(voltage_axis_v=factor * good.voltage_axis_v)))
 
 
 def test_a_running_motor_is_refused():

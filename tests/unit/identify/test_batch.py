@@ -67,7 +67,7 @@ def test_a_fractional_delay_is_a_fifth_parameter():
     assert np.max(np.abs(relative(fit))) < 5e-4
 
 
-@pytest.mark.parametrize("model", [ModelChoice(2, 1.0, LegLaw(1.5), True), ModelChoice()], ids=["all", "linear"])
+@pytest.mark.parametrize("model", [ModelChoice(4, 1.0, LegLaw(1.5), True), ModelChoice()], ids=["all", "linear"])
 def test_sensitivities_are_the_derivatives_of_the_simulation(model):
     """Information and score against finite differences of the sum of squares, saturation, knee and delay included."""
     voltage = multitone([(20.0, 0.7, 0.0), (12.0, 19.8, 2.0), (9.0, 60.1, 3.0)], 1.0, PERIOD_S)
@@ -78,7 +78,7 @@ def test_sensitivities_are_the_derivatives_of_the_simulation(model):
     problem = Problem([Segment(voltage, current, 30.0, False, weight=weight)], PERIOD_S, model)
     theta = start_theta(START, model, knee_shape(2.0, 0.3, 2.0))
     if model.with_delay:
-        theta[4], theta[5:7] = 8e-5, (0.1, 0.4)
+        theta[4], theta[5:9] = 8e-5, (0.1, 0.4, 0.2, 0.1)
     own = np.array([[0.05, 0.1, 0.08]])
     at = problem.evaluate(theta, own)
     full = np.concatenate([theta, own[0]])
