@@ -176,7 +176,8 @@ def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
     machine, covariance = result.batch.inverse_gamma_at(flux_wb)
     own = result.batch.inverse_gamma_at(result.peak_stator_flux_wb)[0]
     machine = carry_over(result.parameters, own, machine)
-    return AxisEstimate(result.axis_deg, machine, covariance)
+    law_std = result.law_error * np.array(machine.as_tuple())
+    return AxisEstimate(result.axis_deg, machine, covariance + np.diag(np.square(law_std)))
 
 
 def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) -> list[str]:

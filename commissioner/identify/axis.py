@@ -32,11 +32,16 @@ LARGEST_DISAGREEMENT = 3.0
 @dataclass(frozen=True)
 class AxisResult:
     """One test: what the chosen estimator says, the batch fit beside it, and how far they are apart in standard
-    errors."""
+    errors.
+
+    `law_error` (4,): relative, what an estimator that stands for itself misses of the least squares on the same samples.
+    It is part of `covariance` (4, 4).
+    """
 
     axis_deg: float
     parameters: InverseGamma
     covariance: Matrix
+    law_error: Matrix
     batch: BatchFit
     observer_parameters: InverseGamma
     disagreement_sigmas: float
@@ -141,10 +146,13 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
     pao = carry_over(seen, start, at_flux)
     own = np.square(observer.std) * np.square(np.array(at_flux.as_tuple()) / seen.as_tuple())
     disagreement = _disagreement(pao, at_flux, own + np.diag(covariance))
+    values, least_squares = np.array(pao.as_tuple()), np.array(at_flux.as_tuple())
+    law_error = values / least_squares - 1.0 if estimator == "lyapunov" else np.zeros(4)
     return AxisResult(
         axis_deg=axis_deg,
         parameters=_judged(pao, batch, at_flux, own, covariance, disagreement, estimator),
-        covariance=covariance,
+        covariance=covariance + np.diag(np.square(law_error * least_squares)),
+        law_error=law_error,
         batch=batch,
         observer_parameters=pao,
         disagreement_sigmas=disagreement,

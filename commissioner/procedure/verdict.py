@@ -138,8 +138,16 @@ def _uncertain(combined: Mapping[str, Quantity], acceptance: Acceptance) -> Iter
                 f"{name} is too uncertain",
                 f"{percent:.2g} % standard error",
                 f"{limit:g} %",
-                "lengthen excitation.seconds, or look for noise on the current sensors",
+                _surer(name),
             )
+
+
+def _surer(name: str) -> str:
+    """What would make it surer. No time tells R_s from an inverter whose loss is much larger than R_s I."""
+    remedy = "lengthen excitation.seconds, or look for noise on the current sensors"
+    if name != "stator_resistance_ohm":
+        return remedy
+    return f"{remedy}; behind a large dead time lower the switching frequency for the test, or raise limits.current_fraction"
 
 
 def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
