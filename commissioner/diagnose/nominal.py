@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import add_channels
@@ -19,6 +20,8 @@ from commissioner.diagnose.record import Record
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
 CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+SKIRT_BINS = 4
+"""The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.15
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
 """Radii of stops and, negative, scales of exponential operators, over the largest iron flux."""
@@ -72,8 +75,9 @@ def nominal_fit(record: Record, noise: Noise) -> Fit:
 
 
 def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:
-    """From the command's spectrum: resistance at the lowest line, reactance at the highest; two spreads of L_M.
+    """From the command's spectrum: resistance at the lowest line and at the median tone, reactance at the highest; two
 
+    spreads of L_M. A tone is read in its strongest bin: the skirts beside it are anyone's.
     `delay_s` of the current, and the half period by which it follows a held command, are taken out of the phases first.
     Clipped samples count as they are: without them the lines would be further off.
     """
@@ -89,10 +93,12 @@ def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, 
         return [SILENT] * 2
     late = delay_s + 0.5 * record.facts.sample_period_s
     impedance = volts[strong] / amps[strong] * np.exp(-2j * np.pi * frequency[strong] * late)
-    high, low = impedance[-1], impedance[0]
-    w_high, w_low = 2 * np.pi * frequency[strong[-1]], 2 * np.pi * frequency[strong[0]]
+    is_tone = np.abs(volts[strong]) == maximum_filter1d(np.abs(volts), 2 * SKIRT_BINS + 1)[strong]
+    tones = np.flatnonzero(is_tone) if is_tone.any() else np.arange(strong.size)
+    high, low = impedance[tones[-1]], impedance[0]
+    w_high, w_low = 2 * np.pi * frequency[strong[tones[-1]]], 2 * np.pi * frequency[strong[0]]
     leakage = max(abs(high.imag) / w_high, 1e-5)
-    total = max(abs(high.real), 1e-3)
+    total = max(float(np.median(np.abs(impedance[tones].real))), 1e-3)
     stator = float(np.clip(abs(low.real), 0.2 * total, 0.9 * total))
     rotor = max(total - stator, 0.2 * total)
     magnetizing = max(abs(low.imag) / w_low, 4.0 * leakage)
