@@ -27,8 +27,11 @@ HOPELESS = frozenset({"time_order", "dead_channel", "sample_rate"})
 """After these not even the fundamental means anything; after other refusals it is still reported."""
 
 
-def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> Audited:
-    """Everything that can be said about the recording before any verdict; never raises on bad data."""
+def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_deg: float | None = None) -> Audited:
+    """Everything that can be said about the recording before any verdict; never raises on bad data.
+
+    `lag_deg`: the order of the channels is known to be that of this lag of the currents.
+    """
     findings: list[Finding] = []
     recording, completed = columns.complete(recording)
     findings += [Finding(*entry) for entry in completed]
@@ -53,6 +56,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> A
         start,
         raw_frequency,
         recording.voltages_are_line_to_line,
+        lag_deg,
     )
     findings += [Finding(*entry) for entry in pairing.findings]
     if pairing.is_refused:
@@ -77,6 +81,8 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit) -> A
         tuple(findings),
         pairing.channel_map,
         trust,
+        pairing.lag_deg,
+        pairing.rivals_deg,
     )
 
 

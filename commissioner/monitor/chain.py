@@ -18,6 +18,7 @@ from commissioner.monitor.findings import Audited, Finding
 from commissioner.monitor.fit import Fitted, Problem, Start
 from commissioner.monitor.mean_speed import whole_record_speed
 from commissioner.monitor.members import members_of, pole_count, with_wobble
+from commissioner.monitor.pairing_by_slip import better_order, shaft_search
 from commissioner.monitor.periods import Periodicity, ShaftSearch
 from commissioner.monitor.proof import Proof, prove
 from commissioner.monitor.slow_slip import slip_phase
@@ -26,11 +27,9 @@ from commissioner.monitor.supply import TurningFrame, quietest, turning_frame
 from commissioner.monitor.systematic import with_sensors
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.running import from_nameplate, slip_at_power
+from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording, Signal
 
-SLIP_TRUST = 0.25
-"""Relative standard deviation of the slip that the plate and the measured power suggest: plate tolerance and warmth."""
 POINTS_PER_TURN = 360
 MOST_POINTS = 7200
 
@@ -105,11 +104,16 @@ class Wishes:
     segment_s: float = 10.0
 
 
-def observe(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None = None) -> Observation | Refused:
-    """Speed, torque and load torque of the recording's periodic state, with uncertainties, or why not."""
+def observe(
+    recording: RunningRecording, plate: Nameplate, wishes: Wishes | None = None, lag_deg: float | None = None
+) -> Observation | Refused:
+    """Speed, torque and load torque of the recording's periodic state, with uncertainties, or why not.
+
+    `lag_deg`: the lag of the channels' order that the slip has chosen.
+    """
     wishes = wishes or Wishes()
     start = wishes.start or Start(from_nameplate(plate), fitting.PRIOR_FROM_NAMEPLATE, "nameplate")
-    audited = inspect(recording, plate, start.circuit)
+    audited = inspect(recording, plate, start.circuit, lag_deg)
     if audited.refusal or audited.supply is None or audited.fundamental is None:
         reason = audited.refusal or Finding("unknown", "refused", "the audit did not finish")
         return Refused(audited, reason, audited.findings)
@@ -119,8 +123,14 @@ def observe(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None
     wander = frequency_wander(frame, part)
     if wander.stops:
         return Refused(audited, wander, (*audited.findings, wander))
-    search = _search(frame, part, plate, start)
+    search = shaft_search(audited, frame, part, plate, start)
     found = comb_search.find(frame, part, search, wishes.load_frequencies_hz)
+    if lag_deg is None and audited.rivals_deg:
+        order = better_order(audited, frame, part, plate, start, search, found)
+        if isinstance(order, Finding):
+            return Refused(audited, order, (*audited.findings, order))
+        if order is not None:
+            return observe(recording, plate, wishes, order)
     trouble = too_little(frame, part, found)
     if trouble is not None:
         return Refused(audited, trouble, (*audited.findings, trouble))
@@ -131,14 +141,6 @@ def observe(recording: RunningRecording, plate: Nameplate, wishes: Wishes | None
             return Refused(audited, poles, audited.findings)
     inertia = wishes.inertia_kg_m2 if wishes.inertia_kg_m2 is not None else plate.inertia_kg_m2
     return _invert(audited, frame, part, search, found, start, plate, inertia)
-
-
-def _search(frame: TurningFrame, part: slice, plate: Nameplate, start: Start) -> ShaftSearch:
-    """Where the operating point puts the slip: the start circuit at the measured power."""
-    supply = comb_search.mean_supply(frame, part)
-    power = 1.5 * float(np.mean(np.real(frame.voltage_v[part] * np.conj(frame.current_a[part]))))
-    slip = slip_at_power(start.circuit, supply, float(abs(frame.voltage_v[part].mean())), power)
-    return ShaftSearch(plate.pole_pairs, supply / (2 * np.pi), slip, float(np.hypot(SLIP_TRUST * slip, 0.0015)))
 
 
 def _invert(

@@ -1,8 +1,8 @@
 """Which channel is which: sequence, spacing, polarity, and which current belongs to which voltage.
 
 Six phasors decide. A motor takes active and reactive power, so its current lags its voltage by 0 to 90 degrees; the
-nameplate says by how much at this current. The simplest mistake that explains the phasors is taken, and reported;
-where two mistakes explain them equally well the data are refused.
+nameplate says by how much at this current. The simplest mistake that explains the phasors is taken, and reported.
+At light load a second order, 60 degrees away, makes a motor as well: the slip decides (`pairing_by_slip`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ SPACING_TOLERANCE_DEG = 25.0
 LARGEST_SPACING_DEG = 45.0
 """Beyond it two readings of the same three phasors are equally good."""
 LAG_TOLERANCE_DEG = 45.0
-CLEARLY_BETTER_DEG = 15.0
+BELOW_RATED_DEG = 25.0
+"""No motor's current lags by much less than at its rated load; the rest is for tolerances, saturation and sensors."""
+RIVAL_MARGIN_DEG = 10.0
+"""An idling motor's current may seem to lag by more than 90 degrees through sensors with a delay."""
 THIRD = 2 * np.pi / 3
 
 
@@ -42,6 +45,7 @@ class Pairing:
     voltage_sign: Sign
     runs_backwards: bool
     lag_deg: float
+    rivals_deg: tuple[float, ...]
     findings: tuple[Entry, ...]
     channel_map: Mapping[str, str]
 
@@ -66,8 +70,9 @@ def pair(
     start: TCircuit,
     frequency_hz: float,
     line_to_line: bool,
+    lag_deg: float | None = None,
 ) -> Pairing:
-    """The order and polarity of all channels, or findings that refuse."""
+    """The order and polarity of all channels, or findings that refuse; with `lag_deg` the order of that lag."""
     findings: list[Entry] = []
     v, i = read_triple(voltages), read_triple(currents)
     _spacing("voltage", v, SPACING_TOLERANCE_DEG, findings)
@@ -80,8 +85,12 @@ def pair(
     _spacing("current", i, min(SPACING_TOLERANCE_DEG + explained, LARGEST_SPACING_DEG), findings)
     options = _options(currents, i, reference)
     expected = _expected_lag_deg(currents, star, plate, start, frequency_hz)
-    chosen, lag = _choose(options, expected, v.sequence == i.sequence, v.sequence < 0, findings)
-    current_order, current_sign = chosen
+    if lag_deg is None:
+        current_order, current_sign, lag = _choose(options, expected, v.sequence < 0, findings)
+    else:
+        current_order, current_sign, lag = min(options, key=lambda option: abs(option[2] - lag_deg))
+    least = float(np.degrees(np.arccos(plate.power_factor))) - BELOW_RATED_DEG
+    rivals = tuple(o[2] for o in options if least < o[2] < 90.0 + RIVAL_MARGIN_DEG and o[2] != lag)
     if v.sequence < 0:
         findings.append(
             (
@@ -112,7 +121,7 @@ def pair(
         for k, name in enumerate("uvw")
     }
     return Pairing(
-        current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, tuple(findings), mapping
+        current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, rivals, tuple(findings), mapping
     )
 
 
@@ -208,11 +217,10 @@ def _expected_lag_deg(
 def _choose(
     options: list[Option],
     expected_deg: float,
-    same_sequence: bool,
     backwards: bool,
     findings: list[Entry],
-) -> tuple[tuple[Order, Sign], float]:
-    """The simplest plausible assignment; refused where none is, or where another fits clearly better."""
+) -> Option:
+    """The simplest plausible assignment; refused where none is."""
     plausible = [
         option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < LAG_TOLERANCE_DEG
     ]
@@ -229,28 +237,13 @@ def _choose(
                 "check which current belongs to which voltage, and the polarities",
             )
         )
-        return (order, sign), lag
-    preferred: Order = (0, 2, 1) if backwards and same_sequence else (0, 1, 2)
+        return order, sign, lag
+    preferred: Order = (0, 2, 1) if backwards else (0, 1, 2)
 
     def mistakes(option: Option) -> int:
         return sum(option[0][k] != preferred[k] for k in range(3)) + sum(s < 0 for s in option[1])
 
-    plausible.sort(key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
-    order, sign, lag = plausible[0]
-    rivals = [o for o in plausible[1:] if abs(o[2] - expected_deg) + CLEARLY_BETTER_DEG < abs(lag - expected_deg)]
-    if rivals and mistakes(plausible[0]) > 0:
-        findings.append(
-            (
-                "pairing",
-                "refused",
-                "the current channels are crossed and two orders are possible "
-                f"(lags of {lag:.0f} and {rivals[0][2]:.0f} degrees)",
-                lag,
-                f"{expected_deg:.0f} degrees expected",
-                "check which current belongs to which voltage",
-            )
-        )
-    return (order, sign), lag
+    return min(plausible, key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
 
 
 def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: list[Entry]) -> None:

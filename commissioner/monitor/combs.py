@@ -75,8 +75,7 @@ def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectr
 def _find_shaft(
     frame: TurningFrame, part: slice, residual: Vector, spectrum: PairSpectrum, search: ShaftSearch
 ) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
-    harmonics = max(2, min(8, int(frame.band_hz * 0.9 / search.synchronous_hz)))
-    candidates = periods.shaft_candidates(spectrum, search, harmonics)
+    candidates = periods.shaft_candidates(spectrum, search, periods.search_harmonics(frame.band_hz, search))
     table = tuple((f, score) for f, score, _ in candidates)
     for frequency, _, visible in candidates[:1]:
         seen = tuple(

@@ -55,7 +55,10 @@ class Fundamental:
 
 @dataclass(frozen=True)
 class Audited:
-    """The stretch that may be used, as space vectors in the right order, and everything that was found."""
+    """The stretch that may be used, as space vectors in the right order, and everything that was found.
+
+    `lag_deg` is the current's behind its voltage in the order taken, `rivals_deg` in the other orders that make a motor.
+    """
 
     first_sample: int
     start_s: float
@@ -67,6 +70,8 @@ class Audited:
     findings: tuple[Finding, ...]
     channel_map: Mapping[str, str]
     sensors: Trust = field(default_factory=Trust)
+    lag_deg: float = 0.0
+    rivals_deg: tuple[float, ...] = ()
 
     @property
     def refusal(self) -> Finding | None:

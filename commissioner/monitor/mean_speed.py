@@ -11,9 +11,12 @@ from commissioner.monitor.averaging import Lines
 from commissioner.monitor.combs import Found, mean_supply, told_apart
 from commissioner.monitor.periods import Periodicity
 from commissioner.monitor.supply import TurningFrame
+from commissioner.records import Signal
 
 DRIFT_KNOWN = 0.1
 """Relative error of the drift found beyond a fixed ratio to the mains: coefficients below three deviations were dropped."""
+WANDER_KNOWN = 0.25
+"""Relative error of the slip's wander as the start circuit computes it: that of its rotor resistance."""
 UNSEEN = 0.01
 """Share of a recording cut at its end: the mean frequency of the rest differs by that share of its wander."""
 
@@ -35,6 +38,8 @@ def whole_record_speed(
     speed, std = ratio * supply, 2 * np.pi * shaft.frequency_std_hz
     std = float(np.hypot(std, UNSEEN * ratio * np.ptp(frame.supply_rad_per_s)))
     std = float(np.hypot(std, np.sqrt(2.0) * ripple_rad / np.ptp(frame.time_s)))
+    wandered = ratio * float(np.std(_detrended(frame.time_s, frame.slip_phase_rad)))
+    std = float(np.hypot(std, np.sqrt(2.0) * WANDER_KNOWN * wandered / np.ptp(frame.time_s)))
     ends = frame.time_s[[part.start, min(part.stop, frame.time_s.size) - 1]]
     moved = 0.0 if shaft.drift is None else float(np.diff(shaft.drift(ends))[0] / np.diff(ends)[0])
     if part.start == 0 and part.stop >= frame.time_s.size:
@@ -50,6 +55,12 @@ def whole_record_speed(
     drift = tracking.track(demodulated, int(np.clip(np.ptp(time) / 4, 2, 16)))
     turned = float(drift(time[-1:])[0] - drift(time[:1])[0]) / float(np.ptp(time))
     return speed + moved + turned, float(np.hypot(std, DRIFT_KNOWN * (abs(turned) + abs(moved))))
+
+
+def _detrended(time_s: Signal, phase_rad: Signal) -> Signal:
+    """Without the straight line: a load that steps leaves turns of the shaft in it."""
+    centred = time_s - time_s.mean()
+    return np.asarray(phase_rad - phase_rad.mean() - centred * (centred @ phase_rad) / (centred @ centred))
 
 
 def _over_all(one: Periodicity, pace: float) -> Periodicity:

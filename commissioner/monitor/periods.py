@@ -127,6 +127,11 @@ class ShaftSearch:
         return -0.5 * ((slip - self.slip) / self.slip_std) ** 2
 
 
+def search_harmonics(band_hz: float, search: ShaftSearch) -> int:
+    """How many lines of the shaft's comb are looked at: those within the band, two to eight."""
+    return max(2, min(8, int(band_hz * 0.9 / search.synchronous_hz)))
+
+
 def shaft_candidates(
     spectrum: PairSpectrum, search: ShaftSearch, harmonics: int
 ) -> list[tuple[float, float, tuple[int, ...]]]:

@@ -87,4 +87,13 @@ def too_little(frame: TurningFrame, part: slice, found: Found) -> Finding | None
             None,
             "record longer or with better current sensors; give the rotor slots",
         )
+    if not np.isfinite(found.shaft.frequency_std_hz):
+        return Finding(
+            "no_shaft_line",
+            "refused",
+            "what looks like a shaft line does not stay in phase over the stretch: the mean speed is not fixed",
+            found.shaft.frequency_hz,
+            "a line above the noise of its 64 blocks",
+            "record longer, at steady load or with better current sensors",
+        )
     return None
