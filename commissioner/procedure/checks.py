@@ -100,11 +100,12 @@ def _interlocks(status: DriveStatus) -> Iterator[CheckResult]:
 
 
 def _at_rest(statuses: Sequence[DriveStatus]) -> CheckResult:
-    fastest = max(abs(status.shaft_speed_rad_per_s) for status in statuses)
+    speeds = [abs(status.shaft_speed_rad_per_s) for status in statuses]
+    fastest = max(speeds, key=lambda speed: math.inf if math.isnan(speed) else speed)
     return CheckResult(
         "shaft at rest over the dwell time",
         fastest <= REST_SPEED_RAD_PER_S,
-        round(fastest, 3),
+        round(fastest, 3) if math.isfinite(fastest) else "not a number",
         f"at most {REST_SPEED_RAD_PER_S} rad/s",
         "stop whatever turns the shaft",
     )

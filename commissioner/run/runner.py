@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from commissioner.errors import Aborted, CommissionerError, DriveFault, UsageError, WriteBackFailed
+from commissioner.link.facts import DisarmReport
 from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
@@ -28,8 +29,8 @@ STATUS_EVERY_S = 0.25
 """Motor time between two readings of the drive's status while energised."""
 EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
-STALL_S = 2.0
-"""Wall time without any new sample after which the stream counts as dead."""
+TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
+"""Before the first of these the drive is somebody else's: it is only looked at, and not switched off either."""
 
 JUDGED_REPLIES = (ask.Identify, ask.ReadNameplate, ask.ReadStatus, ask.TakeSnapshot, ask.WriteParameters)
 """What a course decides upon besides the samples: kept, so that `replay` can decide again."""
@@ -44,6 +45,8 @@ class _Progress:
     """What the runner keeps while it goes."""
 
     facts: SafetyFacts = field(default_factory=SafetyFacts)
+    has_touched: bool = False
+    has_written: bool = False
     segment: int = -1
     session_s: float = 0.0
     flux_fraction: float = 0.0
@@ -96,13 +99,13 @@ class Runner:
                 error.remedy = f"{live.remedy}; {error.remedy}"
         ended = ended or self._failed(error)
         self._note("run_ended", ended)
-        self._present(ended)
+        self._show(ended)
         return ended
 
     def _drive(self, course: Course) -> RunEnded:
         reply: object = None
         while True:
-            if self._stop.asked:
+            if self._stop.asked and not self._progress.has_written:  # what is written ends as written
                 raise Aborted(
                     "stopped by the operator",
                     step="run",
@@ -128,6 +131,7 @@ class Runner:
                 limit=refusal.limit,
                 remedy=refusal.remedy,
             )
+        self._progress.has_touched |= isinstance(command, TOUCHING)
         reply = self._send(command)
         if isinstance(command, JUDGED_REPLIES):
             self._folder.journal("reply", {"command": type(command).__name__, "reply": reply})
@@ -211,9 +215,10 @@ class Runner:
                 lost.what, step=lost.step, value=lost.value, limit=lost.limit,
                 remedy="make room, then `commissioner restore` this run",
             ) from failure
+        self._progress.has_written = True
         self._folder.journal("parameters_written", report, durable=True)
         facts = (report.store_count_after, report.wear_fraction, report.is_stored)
-        self._present(ParametersWritten(report.written, *facts))
+        self._show(ParametersWritten(report.written, *facts))
         return report.written
 
     def _enable(self) -> None:
@@ -239,9 +244,12 @@ class Runner:
         return block
 
     def _next_block(self) -> SampleBlock | None:
-        assert self._cursor is not None
-        deadline = time.monotonic() + STALL_S
-        while time.monotonic() < deadline:
+        longest_s = self._progress.facts.watchdog_s
+        assert self._cursor is not None and longest_s is not None
+        asked = time.monotonic()
+        deadline = asked + longest_s
+        while asked <= deadline:
+            asked = time.monotonic()
             window = self._inverter.fetch(self._cursor)
             self._cursor = window.cursor
             if window.block is not None:
@@ -253,8 +261,8 @@ class Runner:
         raise DriveFault(
             "the drive sends no samples",
             step="stream",
-            value=f"nothing for {STALL_S:g} s",
-            limit="a running stream",
+            value=f"nothing for {longest_s:g} s",
+            limit="new samples within the watchdog's time",
             remedy="check the drive's status; the output has been switched off",
         )
 
@@ -267,7 +275,14 @@ class Runner:
         if isinstance(record, VerdictReached):
             self._progress.facts = replace(self._progress.facts, writing_allowed=record.decision == "write back")
         self._folder.journal(kind_of(record), record)
-        self._present(record)
+        self._show(record)
+
+    def _show(self, record: object) -> None:
+        """To the screen. A screen that has gone must not end a run."""
+        try:
+            self._present(record)
+        except (OSError, SystemExit):
+            self._present = lambda _record: None
 
     def _stop_if(self, reason: StopReason | None) -> None:
         if reason is None:
@@ -280,7 +295,12 @@ class Runner:
 
         A fault where the drive was told to energise before and does not confirm that its output is off.
         """
-        verified = self._inverter.disarm()
+        if not self._progress.has_touched:
+            return None
+        try:
+            verified = self._inverter.disarm()
+        except Exception as surprise:  # a run must have an end
+            verified = DisarmReport(False, f"unknown: {type(surprise).__name__}: {surprise}", (), False)
         self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
         self._note("disarmed", {"because": reason, "verified": verified})
         if verified.is_confirmed or self._progress.segment < 0:

@@ -56,6 +56,7 @@ def test_a_healthy_drive_passes_every_check():
         ({"interlocks": INTERLOCKS | {"remote_control": False}}, "control is remote and ours"),
         ({"interlocks": INTERLOCKS | {"no_other_master": False}}, "no other master holds the drive"),
         ({"shaft_speed_rad_per_s": -0.6}, "shaft at rest over the dwell time"),
+        ({"shaft_speed_rad_per_s": math.nan}, "shaft at rest over the dwell time"),
         ({"heatsink_degc": 86.0}, "heatsink temperature, degC"),
         ({"winding_degc": 121.0}, "winding temperature, degC"),
     ],
@@ -66,6 +67,7 @@ def test_one_wrong_reading_fails_one_check(changes, name):
 
 def test_a_shaft_that_moved_during_the_dwell_fails_even_if_it_rests_now():
     assert _failed((replace(STATUS, shaft_speed_rad_per_s=3.0), STATUS)) == ["shaft at rest over the dwell time"]
+    assert _failed((STATUS, replace(STATUS, shaft_speed_rad_per_s=math.nan))) == ["shaft at rest over the dwell time"]
 
 
 def test_a_link_that_is_still_charging_is_not_steady():

@@ -47,7 +47,9 @@ def folder(tmp_path):
 
 
 def perform(drive, folder, course):
-    return Runner(drive, folder, bounds=None, watch=None, present=lambda record: None).perform(course)
+    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
+    runner._progress.has_touched = True
+    return runner.perform(course)
 
 
 @pytest.mark.parametrize("full_at", ["record", "disarmed", "run_ended"])
@@ -76,8 +78,7 @@ def test_a_defect_on_a_full_disk_still_lets_the_drive_go(folder):
         yield ask.Wait(0.0)
         raise ZeroDivisionError("a defect")
 
-    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
-    ended = runner.perform(course())
+    ended = perform(drive, folder, course())
     assert drive.disarmed == 1 and ended.outcome == "faulted" and "ZeroDivisionError" in ended.reason
 
 

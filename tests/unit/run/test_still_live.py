@@ -1,13 +1,20 @@
 """A drive that was told to switch off and does not say that it has: no run ends well on that."""
 
+import time
+from types import SimpleNamespace
+
 import pytest
 
 from commissioner.errors import DriveFault, ReplyTimeout
-from commissioner.link.facts import DisarmReport
+from commissioner.link.facts import DisarmReport, WriteReport
+from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive import RunFolder
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
 from commissioner.safety import commands as ask
+from commissioner.safety.limits import SafetyFacts
+from commissioner.settings import load_motor
 
 
 class Drive:
@@ -35,6 +42,7 @@ def folder(tmp_path):
 def perform(folder, drive, course, *, was_energised=True):
     runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
     if was_energised:
+        runner._progress.has_touched = True
         runner._enable()
     return runner.perform(course)
 
@@ -78,5 +86,69 @@ def test_a_drive_that_was_never_energised_is_not_called_live(folder):
         yield ask.Wait(0.0)
         raise DriveFault("no such drive", step="identify", remedy="look")
 
-    ended = perform(folder, Drive(live_from=1), course(), was_energised=False)
+    ended = perform(folder, drive := Drive(live_from=1), course(), was_energised=False)
     assert ended.error["remedy"] == "look"
+    assert drive.disarmed == 0  # it may be another master's, and at work
+
+
+def test_a_defect_in_switching_off_leaves_a_run_with_an_end(folder):
+    class Broken(Drive):
+        def disarm(self):
+            raise OSError("the port has gone")
+
+    def course():
+        yield ask.Wait(0.0)
+        return RunEnded("commissioned", "done", 0.0)
+
+    ended = perform(folder, Broken(live_from=1), course())
+    assert ended.outcome == "faulted" and "the port has gone" in ended.error["value"]
+
+
+@pytest.mark.parametrize("gone", [BrokenPipeError("closed"), SystemExit(1)])
+def test_a_screen_that_has_gone_does_not_end_a_run(folder, gone):
+    def present(record):
+        raise gone
+
+    def course():
+        yield ask.Tell(RunEnded("a record", "", 0.0))
+        return RunEnded("commissioned", "done", 0.0)
+
+    runner = Runner(Drive(live_from=9), folder, bounds=None, watch=None, present=present)
+    assert runner.perform(course()).outcome == "commissioned"
+
+
+def test_a_stop_during_the_write_back_lets_it_end_as_written(folder):
+    stop = OperatorStop()
+
+    class Writing(Drive):
+        def write_circuit(self, *_):
+            stop.asked = "SIGTERM"
+            return WriteReport((), True, 0, 1, None)
+
+    plate = load_motor("motor_2kw2")
+    box = prior(plate)
+
+    def course():
+        yield ask.WriteParameters(box.typical, plate)
+        return RunEnded("commissioned", "done", 0.0)
+
+    bounds = SimpleNamespace(parameters=box)
+    runner = Runner(Writing(live_from=9), folder, bounds, watch=None, present=lambda record: None, stop=stop)
+    runner._snapshot = object()
+    runner._progress.facts = SafetyFacts(checks_passed=True, snapshot_taken=True, writing_allowed=True)
+    ended = runner.perform(course())
+    assert ended.outcome == "commissioned", ended
+
+
+def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
+    class Silent(Drive):
+        def fetch(self, cursor):
+            return SimpleNamespace(cursor=cursor, block=None, has_ended=False)
+
+    runner = Runner(Silent(live_from=9), folder, bounds=None, watch=None, present=lambda record: None)
+    runner._progress.facts = SafetyFacts(watchdog_s=0.05)
+    runner._cursor = object()
+    began = time.monotonic()
+    with pytest.raises(DriveFault, match="no samples"):
+        runner._next_block()
+    assert time.monotonic() - began < 1.0
