@@ -20,6 +20,8 @@ from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
 TRIFLE = 1e-4
+PATIENCE = 10.0
+"""A fit that must gain so much goes on while this many times its next step's promise would get it there."""
 SLICE = 12 * 1024
 """Samples whitened at once in white noise: a multiple of every block a screening averages over."""
 
@@ -181,11 +183,12 @@ def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
 
 def fit(
     model: Model, record: Record, layout: Layout, noise: Noise, rounds: int = 12, tolerance: float = 0.3,
-    report: Callable[[str], None] | None = None,
+    report: Callable[[str], None] | None = None, wanted_chi2: float = np.inf,
 ) -> Fit:
     """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance, or
 
-    less than a trifle of what the noise does not explain: a model that lacks a cause need not fit to the last digit.
+    less than a trifle of what the noise does not explain: a model that lacks a cause need not fit to the last digit. Gives
+    up where `wanted_chi2` is out of reach.
     """
     damping = 1e-9
     normal = normal_equations(model, record, layout, model.terms, noise)
@@ -193,12 +196,14 @@ def fit(
         enough = max(tolerance, TRIFLE * (normal.total_chi2 - float(normal.count.sum())))
         low, high = limits(model, layout)
         theta = model.theta
-        improved = False
+        improved = was_shortened = False
         for _ in range(8):
             step = bounded_step(normal.total_gram, normal.total_slope, low - theta, high - theta, damping)
             promised = 2.0 * step @ normal.total_slope - step @ normal.total_gram @ step
             if promised < enough:
                 return Fit(model, normal, True, done)
+            if normal.total_chi2 - PATIENCE * promised > wanted_chi2:
+                return Fit(model, normal, False, done)
             trial = model.moved(theta + step)
             # the tangent costs little beside the trajectory: not worth looking at chi2 first
             with np.errstate(over="ignore", invalid="ignore"):
@@ -206,12 +211,16 @@ def fit(
             if np.isfinite(there.total_gram).all() and there.total_chi2 < normal.total_chi2:
                 improved = True
                 break
-            damping = max(10.0 * damping, 1e-4)
+            damping, was_shortened = max(10.0 * damping, 1e-4), True
         if not improved:
             return Fit(model, normal, False, done)
         gained = normal.total_chi2 - there.total_chi2
         model, normal = trial, there
-        damping = damping * 0.1 if gained > 0.5 * promised else damping * 3.0
+        if gained <= 0.5 * promised:
+            damping *= 3.0
+        elif not was_shortened:
+            # a step shortened just now would be too long again with less
+            damping *= 0.1
         damping = max(damping, 1e-9)
         if report:
             report(f"round {done}: chi2 {normal.total_chi2:.1f}")

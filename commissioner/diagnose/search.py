@@ -234,12 +234,14 @@ class _Search:
             if best is not None and RIVAL * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
+            wanted = max(_guard(losses, score.name), self.threshold(score.numbers))
+            to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
             trial = fit(
-                current.model.with_terms(CATALOGUE[score.name].terms(self.setting)), self.record, self.layout, self.noise
+                current.model.with_terms(CATALOGUE[score.name].terms(self.setting)), self.record, self.layout, self.noise,
+                wanted_chi2=current.chi2 - to_beat,
             )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            wanted = max(_guard(losses, score.name), self.threshold(score.numbers))
             if gain < wanted or not self._is_plausible(trial.model, score.name):
                 if required_chi2(score.numbers) < gain:
                     self.below.append(score.name)
