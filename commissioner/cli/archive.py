@@ -15,8 +15,9 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
     """Write the run's snapshot back, after asking."""
     import typer
 
+    screen.require_yes(yes, as_json=as_json)
     summary = find_run(runs, run)
-    if not yes and not as_json:
+    if not yes:
         screen.out.print(
             f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
             "stored. Make sure that it is the same drive."
