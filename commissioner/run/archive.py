@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
+import errno
 import json
 import math
 import os
@@ -42,9 +43,12 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        for name in ("journal.jsonl", "blocks.bin"):
+            if (path / name).is_symlink():
+                raise damaged(path, name, "a symbolic link")
         self._records = _drop_torn_line(path / "journal.jsonl")
-        self._journal = (path / "journal.jsonl").open("a", encoding="utf-8")
-        self._blocks: BinaryIO = (path / "blocks.bin").open("ab", buffering=0)
+        self._journal = open(path / "journal.jsonl", "a", encoding="utf-8", opener=_open_no_link)  # noqa: SIM115
+        self._blocks: BinaryIO = open(path / "blocks.bin", "ab", buffering=0, opener=_open_no_link)  # noqa: SIM115
 
     @classmethod
     def create(cls, root: Path, label: str) -> RunFolder:
@@ -78,7 +82,11 @@ class RunFolder:
     def append(self, block: SampleBlock, segment: int) -> None:
         """Append the block in one write, so that a kill leaves it whole or recognisably torn."""
         payload = _encode(block, segment)
-        self._blocks.write(_RECORD.pack(_MARK, len(payload), zlib.crc32(payload)) + payload)
+        record = _RECORD.pack(_MARK, len(payload), zlib.crc32(payload)) + payload
+        start = os.fstat(self._blocks.fileno()).st_size
+        if self._blocks.write(record) != len(record):  # what follows a torn record could not be read
+            os.ftruncate(self._blocks.fileno(), start)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def save(self, name: str, document: object) -> Path:
         """Write a JSON document whole or not at all."""
@@ -87,7 +95,7 @@ class RunFolder:
     def save_text(self, name: str, text: str) -> Path:
         target = self.path / name
         temporary = target.with_name(name + ".part")
-        with temporary.open("w", encoding="utf-8") as file:
+        with open(temporary, "w", encoding="utf-8", opener=_open_no_link) as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
@@ -174,6 +182,11 @@ def read_document(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         return {}
     return document if isinstance(document, dict) else {}
+
+
+def _open_no_link(path: str, flags: int) -> int:
+    """An `opener` that never writes through a symbolic link."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 def _drop_torn_line(path: Path) -> int:
