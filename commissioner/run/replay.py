@@ -164,18 +164,41 @@ def _snapshot(record: Mapping[str, Any]) -> ParameterSnapshot:
 
 
 def read_snapshot(folder: Path) -> ParameterSnapshot:
-    """The snapshot a run archived before it wrote anything. DataRefused: damaged."""
+    """The snapshot a run archived before it wrote anything. DataRefused: damaged, or not as the journal has it.
+
+    A run that was killed between the two copies has only the first; it wrote nothing.
+    """
     document = read_saved(folder, "snapshot.json", "identity", "in_use", "stored")
+    taken = [
+        line["record"]["reply"]
+        for line in read_journal(folder / "journal.jsonl")
+        if line["kind"] == "reply" and isinstance(line["record"], dict) and line["record"].get("command") == "TakeSnapshot"
+    ]
+    if taken and document != taken[-1]:
+        raise damaged(folder, "snapshot.json", _otherwise(document, taken[-1]))
     try:
         return _checked(_snapshot(document))
     except (TypeError, ValueError, AttributeError) as error:
         raise damaged(folder, "snapshot.json", str(error)) from error
 
 
+def _otherwise(saved: Mapping[str, Any], journalled: Any) -> str:
+    """The first place where the file and the run's journal differ."""
+    for key, here in saved.items():
+        there = journalled.get(key) if isinstance(journalled, dict) else None
+        if here == there:
+            continue
+        if isinstance(here, dict) and isinstance(there, dict):
+            name = next(name for name in (*here, *there) if here.get(name) != there.get(name) or name not in here)
+            return f"{key}.{name} = {here.get(name)}, in journal.jsonl {there.get(name)}"
+        return f"{key} = {here}, in journal.jsonl {there}"
+    return "without a key that journal.jsonl has"
+
+
 def _checked(snapshot: ParameterSnapshot) -> ParameterSnapshot:
     """Refuse what is no set of finite numbers: it is going to be written into a drive."""
     for name, value in (*snapshot.in_use.items(), *snapshot.stored.items()):
-        if not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(f"{name} = {value!r}")
     return snapshot
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from commissioner.errors import DataRefused, UsageError
+from commissioner.errors import DataRefused, IdentityMismatch, UsageError
 from commissioner.link.drive_file import load_profile
 from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import open_port
 from commissioner.link.url import TlsUrl, parse_url
-from commissioner.records import WrittenParameter
-from commissioner.run.archive import RunFolder, read_saved
+from commissioner.records import ParameterSnapshot, WrittenParameter
+from commissioner.registers.codec import crc16_modbus, encode_item
+from commissioner.registers.profile import DriveProfile
+from commissioner.run.archive import RunFolder, damaged, read_journal, read_saved
 from commissioner.run.catalogue import RunSummary
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.replay import read_snapshot
@@ -32,8 +36,9 @@ class Restored:
 def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> Restored:
     """The snapshot of `run` into the drive it was taken from, verified and stored.
 
-    DataRefused: the run took no snapshot. IdentityMismatch: another drive or firmware answers. What is restored is
-    added to the run's own journal before and after.
+    DataRefused: the run took no snapshot, or it was changed. IdentityMismatch: another drive or firmware answers, or it
+    holds values that are neither the snapshot's nor this run's. What is restored is added to the run's own journal
+    before and after.
     """
     folder = Path(run.folder)
     if not (folder / "snapshot.json").is_file():
@@ -50,11 +55,68 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             f"the archive of {run.run} keeps no TLS files", step="restore", value=str(address),
             limit="an address with ca=, cert= and key=", remedy="give the drive's whole address with --drive",
         )  # fmt: skip
-    snapshot = read_snapshot(folder)
+    snapshot = _complete(read_snapshot(folder), profile, folder)
+    lines = read_journal(folder / "journal.jsonl")
     with closing(RunFolder(folder)) as journal, OperatorStop():  # a set is never left half written for a Ctrl-C
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
         with closing(port):
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
-            report = inverter.restore(snapshot)
+            present = inverter.snapshot().in_use
+            _check_known(present, snapshot, profile, lines)
+            report = inverter.restore(snapshot, present)
         journal.journal("snapshot_restored", report, durable=True)
     return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)
+
+
+def _complete(snapshot: ParameterSnapshot, profile: DriveProfile, folder: Path) -> ParameterSnapshot:
+    """The snapshot where it holds exactly the drive file's parameters; no `stored` where the drive cannot show it."""
+    names = set(profile.parameters.order) if profile.parameters else set()
+    for which, values in (("in_use", snapshot.in_use), ("stored", snapshot.stored or dict.fromkeys(names, 0.0))):
+        wrong = sorted(names.symmetric_difference(values))
+        if wrong:
+            is_missing = wrong[0] in names
+            raise damaged(
+                folder, "snapshot.json", f"{which}: {wrong[0]} {'is missing' if is_missing else 'is not known'}"
+            )
+    return snapshot
+
+
+def _check_known(
+    present: Mapping[str, float], snapshot: ParameterSnapshot, profile: DriveProfile, lines: list[dict[str, Any]]
+) -> None:
+    """IdentityMismatch where a value in use was neither found by this run nor announced by it."""
+    announced = list(_announced(lines))
+    if (
+        profile.parameters
+        and profile.parameters.staged_crc
+        and _words_crc(present, profile) in {values.get(profile.parameters.staged_crc) for values in announced}
+    ):
+        return  # a set that this run committed, also where parts of it lay staged before
+    for name, held in present.items():
+        known = [snapshot.in_use.get(name), snapshot.stored.get(name)]
+        known += [values.get(key) for values in announced for key in (name, f"staged_{name}")]
+        item = profile.item(name)
+        words = [encode_item(item, value) for value in known if isinstance(value, int | float)]
+        if encode_item(item, held) not in words:
+            raise IdentityMismatch(
+                f"the drive holds a {name} that this run neither found nor wrote", step="restore", value=held,
+                limit=" or ".join(dict.fromkeys(f"{v:.6g}" for v in known if isinstance(v, int | float))),
+                remedy="someone changed the drive after this run: restore the newest run of this drive first, or "
+                "enter the values at the drive",
+            )  # fmt: skip
+
+
+def _announced(lines: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """What each intent to stage or commit said, journalled before it went out."""
+    for line in lines:
+        record = line["record"]
+        if line["kind"] == "about_to" and isinstance(record, dict) and record.get("action") in ("stage", "commit"):
+            values = record.get("values")
+            yield values if isinstance(values, dict) else {}
+
+
+def _words_crc(values: Mapping[str, float], profile: DriveProfile) -> int:
+    """The check sum that a drive with staging is given over a whole set."""
+    assert profile.parameters is not None
+    order = profile.parameters.order
+    return crc16_modbus([word for name in order for word in encode_item(profile.item(f"staged_{name}"), values[name])])

@@ -1,0 +1,170 @@
+"""Restore writes only what its run found, and only over what its run found or wrote; a run folder is written as itself."""
+
+import errno
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.cli.archive import restore_run
+from commissioner.errors import DataRefused, IdentityMismatch, UsageError
+from commissioner.link.drive_file import load_profile
+from commissioner.link.inverter import Inverter
+from commissioner.records import SampleBlock
+from commissioner.run import restore as restoring
+from commissioner.run.archive import RunFolder, read_blocks
+from commissioner.run.catalogue import summarise
+from tests.support.scripted_port import PARAMETERS, ScriptedDrive
+
+PROFILE = load_profile("simulated")
+NEW = {"stator_resistance": 3.3, "rotor_resistance": 1.9, "leakage_inductance": 0.024, "magnetizing_inductance": 0.310}
+
+
+class Drive(ScriptedDrive):
+    def close(self):
+        """As a port."""
+
+
+class Bench:
+    """A run that found the drive's values; `write` makes it write others."""
+
+    def __init__(self, root, monkeypatch):
+        self.drive = Drive()
+        self.folder = RunFolder.create(root, "x")
+        monkeypatch.setattr(restoring, "open_port", lambda *_, **__: self.drive)
+        self.inverter = Inverter(self.drive, PROFILE, lambda i: self.folder.journal("about_to", i))
+        self.snapshot = self.inverter.snapshot()
+        self.folder.save("request.json", {"url": "tcp://127.0.0.1:1", "profile": "simulated"})
+        self.folder.save("snapshot.json", self.snapshot)
+        self.folder.journal("reply", {"command": "TakeSnapshot", "reply": self.snapshot})
+
+    def write(self, values=NEW):
+        return self.inverter.write_parameters(values, self.inverter.snapshot())
+
+    def restore(self):
+        return restoring.restore(summarise(self.folder.path), None)
+
+    def held(self):
+        return self.inverter.snapshot().in_use
+
+    def edit(self, change):
+        path = self.folder.path / "snapshot.json"
+        document = json.loads(path.read_text())
+        change(document)
+        path.write_text(json.dumps(document))
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    bench = Bench(tmp_path, monkeypatch)
+    yield bench
+    bench.folder.close()
+
+
+def test_what_the_run_wrote_is_taken_back(bench):
+    bench.write()
+    assert {row.name for row in bench.restore().written} == set(PARAMETERS)
+    assert bench.held() == bench.snapshot.in_use
+
+
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        (lambda d: d["in_use"].update(stator_resistance=60.0), "in_use.stator_resistance = 60"),
+        (lambda d: d["stored"].update(stator_resistance=60.0), "stored.stator_resistance = 60"),
+        (lambda d: d["in_use"].pop("stator_resistance"), "in_use.stator_resistance"),
+        (lambda d: d.update(in_use={}, stored={}), "in_use"),
+        (lambda d: d["identity"].update(serial_number=1), "serial_number"),
+    ],
+)
+def test_a_changed_snapshot_is_refused_by_its_key(bench, change, names):
+    bench.write()
+    held = bench.held()
+    bench.edit(change)
+    with pytest.raises(DataRefused, match=r"snapshot\.json") as caught:
+        bench.restore()
+    assert names in str(caught.value.value) and caught.value.remedy
+    assert bench.held() == held
+
+
+def test_an_incomplete_snapshot_is_refused_also_where_the_journal_has_no_copy(bench):
+    path = bench.folder.path / "journal.jsonl"
+    path.write_text("")
+    bench.edit(lambda d: d["in_use"].pop("stator_resistance"))
+    with pytest.raises(DataRefused, match=r"snapshot\.json") as caught:
+        bench.restore()
+    assert "stator_resistance is missing" in caught.value.value
+
+
+def test_values_that_somebody_else_wrote_are_not_overwritten(bench):
+    bench.write()
+    other = Inverter(bench.drive, PROFILE)
+    other.write_parameters({"rotor_resistance": 1.5}, other.snapshot())
+    held = bench.held()
+    with pytest.raises(IdentityMismatch, match="rotor_resistance") as caught:
+        bench.restore()
+    assert caught.value.exit_code == 5 and "newest run" in caught.value.remedy
+    assert bench.held() == held
+
+
+@pytest.mark.parametrize("new", [set(), {"stator_resistance"}, {"rotor_resistance", "leakage_inductance"}])
+def test_any_mixture_of_old_and_announced_values_is_taken_back(bench, new):
+    """A kill in a drive without staging leaves some of the values written."""
+    bench.folder.journal("about_to", {"action": "commit", "values": NEW})
+    other = Inverter(bench.drive, PROFILE)
+    other.write_parameters({name: NEW[name] for name in new}, other.snapshot())
+    bench.restore()
+    assert bench.held() == bench.snapshot.in_use
+
+
+def test_a_set_that_lay_staged_before_the_run_is_known_by_its_check_sum(bench):
+    bench.write()
+    path = bench.folder.path / "journal.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for line in lines:
+        if line["kind"] == "about_to" and line["record"]["action"] == "stage":
+            line["record"]["values"] = {"staged_crc": line["record"]["values"]["staged_crc"]}
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    bench.restore()
+    assert bench.held() == bench.snapshot.in_use
+
+
+def test_restore_with_json_asks_for_yes(bench):
+    with pytest.raises(UsageError, match="--json"):
+        restore_run(bench.folder.path.parent, "last", None, yes=False, as_json=True)
+
+
+@pytest.mark.parametrize("name", ["journal.jsonl", "blocks.bin"])
+def test_a_link_in_a_run_folder_is_not_written_through(bench, tmp_path, name):
+    victim = tmp_path / "victim"
+    victim.write_text("one\nprecious")
+    (bench.folder.path / name).unlink()
+    (bench.folder.path / name).symlink_to(victim)
+    with pytest.raises(DataRefused, match=name):
+        RunFolder(bench.folder.path)
+    assert victim.read_text() == "one\nprecious"
+
+
+def test_a_block_that_is_written_short_leaves_no_torn_record(bench):
+    signal = np.arange(29.0)
+    block = SampleBlock(
+        session=1, first_index=0, sample_period_s=2e-4, axis_deg=0.0, voltage_axis_v=signal, current_u_a=signal,
+        current_v_a=signal, current_w_a=None, dc_link_v=540.0, lost_before=0,
+    )  # fmt: skip
+    whole = bench.folder._blocks
+    bench.folder.append(block, 0)
+
+    class Short:
+        fileno = whole.fileno
+
+        def write(self, data):
+            return whole.write(data[:50])
+
+    bench.folder._blocks = Short()
+    with pytest.raises(OSError) as caught:
+        bench.folder.append(replace(block, first_index=29), 0)
+    bench.folder._blocks = whole
+    assert caught.value.errno == errno.ENOSPC
+    bench.folder.append(replace(block, first_index=58), 0)
+    assert [b.first_index for _, b in read_blocks(bench.folder.path / "blocks.bin")] == [0, 58]
