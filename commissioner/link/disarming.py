@@ -24,7 +24,7 @@ PATHS: tuple[tuple[str, dict[str, Value]], ...] = (
 def de_energise(items: Items, watchdog_s: float, sleep: Callable[[float], None]) -> DisarmReport:
     """Path after path until the status confirms a blocked output; else wait for the drive's watchdog and look again.
 
-    Never raises a CommissionerError.
+    Never raises an Exception: whatever breaks one path, the next is tried.
     """
     if "control_word" not in items.profile.items:
         return DisarmReport(True, "this service cannot energise this drive", (), False)
@@ -44,8 +44,8 @@ def de_energise(items: Items, watchdog_s: float, sleep: Callable[[float], None])
 def _attempt(items: Items, path: str, values: dict[str, Value]) -> Attempt:
     try:
         items.write(values)
-    except CommissionerError as error:
-        return Attempt(path, error.what)
+    except Exception as error:
+        return Attempt(path, _said(error))
     return Attempt(path, "acknowledged")
 
 
@@ -53,8 +53,12 @@ def _blocked_state(items: Items, attempts: list[Attempt]) -> DriveState | None:
     """The state, where the drive's own status says that the output is blocked."""
     try:
         state = read_state(items)
-    except CommissionerError as error:
-        attempts.append(Attempt("read the status", error.what))
+    except Exception as error:
+        attempts.append(Attempt("read the status", _said(error)))
         return None
     attempts.append(Attempt("read the status", state.value))
     return None if state.may_be_energised else state
+
+
+def _said(error: Exception) -> str:
+    return error.what if isinstance(error, CommissionerError) else f"{type(error).__name__}: {error}"

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import NoReturn, TypeVar
 
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 
-from commissioner.errors import LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
+from commissioner.errors import CommissionerError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.clients import SerialClient, make_client
 from commissioner.link.port import LinkStats, Words
 from commissioner.link.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, SerialTrust, Trust
@@ -59,7 +60,6 @@ class ModbusPort:
         self._url, self._profile = url, profile
         self._exceptions = EXCEPTION_MEANINGS | dict(profile.exceptions)
         self._device = url.device or profile.link.device_id
-        self._client = make_client(url, self._device)
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
         self._token = time.time_ns() & 0xFFFF
@@ -159,11 +159,20 @@ class ModbusPort:
     def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True) -> Result:
         if not self._client.connected:
             self.connect()
-        self._trust.ready()
+        self._checked("bring the line into step", self._trust.ready)
         answer = ask()
         if needs_proof:
-            self._trust.confirm()
+            self._checked("prove the answer", self._trust.confirm)
         return answer
+
+    def _checked(self, what: str, check: Callable[[], None]) -> None:
+        """Draining touches the wire as well: an adapter pulled out in the middle of it is a broken connection."""
+        try:
+            check()
+        except CommissionerError:
+            raise
+        except Exception as error:
+            self._broke(what, error)
 
     def _make_trust(self) -> Trust:
         if not isinstance(self._client, SerialClient):
@@ -233,7 +242,9 @@ class ModbusPort:
         ) from error
 
     def _broke(self, what: str, error: Exception) -> NoReturn:
-        self._client.close()  # type: ignore[no-untyped-call]
+        with suppress(Exception):  # closing what is gone may fail as well
+            self._client.close()  # type: ignore[no-untyped-call]
+        self._client.socket = None
         self._timed_out(what, f"the connection broke: {error}", error)
 
     def _timed_out(self, what: str, value: str, error: Exception) -> NoReturn:

@@ -5,6 +5,7 @@ import itertools
 import os
 
 import pytest
+import serial
 from pymodbus.client import ModbusSerialClient
 
 from commissioner.errors import LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
@@ -235,6 +236,23 @@ def test_a_profile_without_echo_register_proves_the_line_by_answers_of_two_lengt
         for address in (100, 200):
             with pytest.raises(LinkError):
                 port.read(address, 2)
+        port.close()
+
+
+@pytest.mark.parametrize("asked", ["in doubt", "watched"])
+def test_an_adapter_pulled_out_while_the_line_is_drained_is_a_typed_error(asked, monkeypatch):
+    def gone():
+        raise serial.SerialException("Could not configure port: (5, 'Input/output error')")
+
+    with RtuDevice(Bank()) as device:
+        port = connect(device)
+        port.read(10, 4)
+        if asked == "in doubt":
+            port._trust.doubt()
+        monkeypatch.setattr(port._client, "drain", gone)
+        with pytest.raises(ReplyTimeout) as caught:
+            port.write(10, [4])
+        assert "Could not configure port" in str(caught.value.value)
         port.close()
 
 

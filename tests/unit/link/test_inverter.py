@@ -421,3 +421,19 @@ def test_a_commercial_drive_is_never_energised():
         inverter.set_watchdog(500)
     assert inverter.disarm().is_confirmed
     assert drive.log == []
+
+
+@pytest.mark.parametrize("error", [ValueError("a defect"), OSError(5, "Input/output error"), TypeError("a defect")])
+def test_what_breaks_one_path_of_disarm_does_not_keep_it_from_the_next(bench, error, monkeypatch):
+    whole, calls = bench.inverter.port.write, []
+
+    def broken_once(address, values):
+        calls.append(values)
+        if len(calls) == 1:
+            raise error
+        whole(address, values)
+
+    monkeypatch.setattr(bench.inverter.port, "write", broken_once)
+    report = bench.inverter.disarm()
+    assert report.is_confirmed and len(calls) > 1
+    assert type(error).__name__ in report.attempts[0].outcome
