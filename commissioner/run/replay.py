@@ -51,9 +51,34 @@ def replay(folder: Path) -> Replayed:
     A run that a guard, a fault or the operator ended is compared up to there. DataRefused: the folder holds no run.
     """
     journal = read_journal(folder / "journal.jsonl")
+    _check_whole(folder, journal)
+    job = read_job(folder, journal)
     archived = [_decision(line["kind"], line["record"]) for line in journal if line["kind"] in _DECISIONS]
-    replayed = list(_decide_again(read_job(folder, journal), Findings(), journal, folder))
-    return Replayed(len(archived), _first_difference(archived, replayed))
+    if not archived:
+        raise damaged(folder, "journal.jsonl", "no decision behind the job")
+    kinds = {line["kind"] for line in journal}
+    is_by_itself = "run_ended" in kinds and "error" not in kinds
+    if is_by_itself:
+        archived += [_end(line["record"]) for line in journal if line["kind"] == "run_ended"]
+    replayed = list(_decide_again(job, Findings(), journal, folder, with_end=is_by_itself))
+    return Replayed(len(archived), _first_difference(archived, replayed, may_go_on=not is_by_itself))
+
+
+def _check_whole(folder: Path, journal: list[dict[str, Any]]) -> None:
+    """DataRefused: a line before the last is no record, or the numbers have a gap. A kill tears only the last line."""
+    path = folder / "journal.jsonl"
+    lines = path.read_text("utf-8", errors="replace").split("\n") if path.is_file() else []
+    if len(journal) < len(lines) - 1:
+        raise damaged(folder, path.name, f"line {len(journal) + 1} of {len(lines) - 1} is no record")
+    for number, line in enumerate(journal):
+        if line.get("n") != number:
+            raise damaged(folder, path.name, f"record {line.get('n')} where {number} belongs")
+
+
+def _end(record: Any) -> dict[str, Any]:
+    """How a run ended by itself; the time under voltage is the runner's to count."""
+    ended = record if isinstance(record, dict) else {}
+    return _decision("run_ended", {key: ended.get(key) for key in ("outcome", "reason")})
 
 
 def learn_again(folder: Path) -> tuple[Job, Findings]:
@@ -92,7 +117,7 @@ def _decision(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _decide_again(
-    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path
+    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path, *, with_end: bool = False
 ) -> Iterator[dict[str, Any]]:
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
     blocks = (block for _, block in read_blocks(folder / "blocks.bin"))
@@ -103,7 +128,10 @@ def _decide_again(
             if isinstance(command, ask.Tell):
                 yield json.loads(json.dumps(_decision(kind_of(command.record), plain(command.record))))
             reply = _answer(command, replies, blocks)
-    except (StopIteration, _ArchiveEnds, CommissionerError):
+    except StopIteration as stop:
+        if with_end:
+            yield _end(plain(stop.value))
+    except (_ArchiveEnds, CommissionerError):
         return
 
 
@@ -124,12 +152,16 @@ def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Ite
         raise _ArchiveEnds from None
 
 
-def _first_difference(archived: list[dict[str, Any]], replayed: list[dict[str, Any]]) -> Difference | None:
+def _first_difference(
+    archived: list[dict[str, Any]], replayed: list[dict[str, Any]], *, may_go_on: bool
+) -> Difference | None:
     for number, (old, new) in enumerate(zip(archived, replayed, strict=False)):
         if old != new:
             return Difference(number, old, new)
     if len(replayed) < len(archived):
         return Difference(len(replayed), archived[len(replayed)], None)
+    if len(replayed) > len(archived) and not may_go_on:
+        return Difference(len(archived), None, replayed[len(archived)])
     return None
 
 

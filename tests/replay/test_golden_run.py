@@ -124,3 +124,50 @@ def test_the_golden_run_is_a_whole_one(golden):
     samples = np.concatenate([block.current_u_a for _, block in read_blocks(golden / "blocks.bin")])
     assert samples.size > 40_000
     assert np.all(np.isfinite(samples))
+
+
+def edit(folder, change):
+    """The journal with its records changed by `change`, which may drop some."""
+    path = folder / "journal.jsonl"
+    kept = [change(json.loads(line)) for line in path.read_text().splitlines()]
+    path.write_text("".join(json.dumps(line) + "\n" for line in kept if line is not None))
+    return folder
+
+
+def test_a_changed_end_is_reported(fresh, tmp_path):
+    def change(line):
+        if line["kind"] == "run_ended":
+            line["record"]["outcome"] = "rejected"
+        return line
+
+    difference = replay(edit(copy(fresh, tmp_path), change)).difference
+    assert difference is not None and difference.archived["kind"] == "run_ended"
+
+
+def test_a_record_taken_out_is_refused(fresh, tmp_path):
+    folder = edit(copy(fresh, tmp_path), lambda line: None if line["kind"] == "verdict_reached" else line)
+    with pytest.raises(DataRefused, match="journal") as caught:
+        replay(folder)
+    assert "belongs" in caught.value.value
+
+
+def test_a_bad_line_before_the_last_is_refused_and_a_torn_last_one_is_not(fresh, tmp_path):
+    path = copy(fresh, tmp_path) / "journal.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines) + '{"n": 9')
+    assert replay(path.parent).is_identical
+    lines[5] = "garbage\n"
+    path.write_text("".join(lines))
+    with pytest.raises(DataRefused, match="journal") as caught:
+        replay(path.parent)
+    assert "line 6" in caught.value.value
+
+
+def test_a_journal_without_a_decision_is_refused(fresh, tmp_path):
+    path = copy(fresh, tmp_path) / "journal.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    job = next(k for k, line in enumerate(lines) if json.loads(line)["kind"] == "job")
+    kept = [line for line in lines[: job + 1] if json.loads(line)["kind"] not in replaying._DECISIONS]
+    path.write_text("".join(json.dumps(json.loads(line) | {"n": k}) + "\n" for k, line in enumerate(kept)))
+    with pytest.raises(DataRefused, match="journal"):
+        replay(path.parent)
