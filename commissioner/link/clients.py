@@ -14,11 +14,13 @@ from typing import NoReturn
 
 import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient, ModbusTlsClient
+from pymodbus.exceptions import ConnectionException
 
 from commissioner.errors import UsageError
 from commissioner.link.rtu import find_answers
 from commissioner.link.url import DriveUrl, RtuUrl, TcpUrl, TlsUrl
 
+LONGEST_READ = 4096
 SILENCE_S = 0.05
 """A frame has no hole this long: USB converters hold bytes back for 16 ms at most by default (FTDI AN232B-04)."""
 
@@ -26,7 +28,43 @@ SILENCE_S = 0.05
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what it would print is raised by the port instead
 
 
-class TcpClient(ModbusTcpClient):
+class _Deadline(ModbusTcpClient):
+    """One deadline from sending to the whole answer, whatever trickles in meanwhile.
+
+    pymodbus 3.15 grants each piece the whole time again, on the wall clock, and never looks at it within a TLS record.
+    Python's sockets keep their time-out, on the monotonic clock, within a record too.
+    """
+
+    _end = 0.0
+
+    def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
+        wanted = self.comm_params.timeout_connect
+        self._end = time.monotonic() + wanted
+        if self.socket is None:
+            raise ConnectionException("the connection is closed")  # type: ignore[no-untyped-call]
+        self.socket.settimeout(wanted)
+        self.socket.sendall(request)
+        return len(request)
+
+    def recv(self, size: int | None) -> bytes:
+        """What is there, at least one byte; empty when the time since sending is over."""
+        left = self._end - time.monotonic()
+        if left <= 0.0:
+            return b""
+        if self.socket is None:
+            raise ConnectionException("the connection is closed")  # type: ignore[no-untyped-call]
+        self.socket.settimeout(left)
+        try:
+            data = bytes(self.socket.recv(size or LONGEST_READ))
+        except TimeoutError:
+            return b""
+        if not data:
+            self.close()  # type: ignore[no-untyped-call]
+            raise ConnectionException("the other end closed the connection")  # type: ignore[no-untyped-call]
+        return data
+
+
+class TcpClient(_Deadline):
     def connect(self) -> bool:
         """True when connected. Raises OSError with the reason where it fails; so do the other two."""
         if self.socket is None:
@@ -34,7 +72,7 @@ class TcpClient(ModbusTcpClient):
         return True
 
 
-class TlsClient(ModbusTlsClient):
+class TlsClient(_Deadline, ModbusTlsClient):
     def connect(self) -> bool:
         """As TcpClient; ssl.SSLError, an OSError, where a certificate or the name on it is not accepted."""
         if self.socket is None:
