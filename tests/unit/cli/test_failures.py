@@ -68,7 +68,7 @@ def archive(tmp_path):
 
 @pytest.mark.parametrize("name", ["request.json", "snapshot.json"])
 @pytest.mark.parametrize("content", ["nonsense", "{}", "[1]", '{"url": 5, "profile": "simulated", "nameplate": 7}'])
-@pytest.mark.parametrize("verb", [("runs", "show"), ("runs", "report"), ("runs", "export"), ("replay",), ("restore",)])
+@pytest.mark.parametrize("verb", [("runs", "show"), ("runs", "report"), ("runs", "export"), ("replay",), ("restore", "--yes")])
 def test_a_damaged_archive_is_refused_by_name(capsys, archive, name, content, verb):
     (archive / name).write_text(content)
     target = [archive / "x.csv"] if verb == ("runs", "export") else []
