@@ -15,6 +15,7 @@ import typer
 from typer.exceptions import TyperException
 
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
+from commissioner.link.url import without_secrets
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 INTERRUPTED = 130
@@ -70,7 +71,7 @@ def _say(error: CommissionerError, as_json: bool) -> None:
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
     return UsageError(
-        text, step="command line", value=" ".join(arguments), limit="see --help", remedy="correct the call"
+        text, step="command line", value=" ".join(map(without_secrets, arguments)), limit="see --help", remedy="correct the call"
     )
 
 
@@ -92,7 +93,7 @@ def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerErr
 
 def _too_much(arguments: Sequence[str]) -> CommissionerError:
     return DataRefused(
-        "this needs more memory than there is", step=_verb(arguments), value=" ".join(arguments),
+        "this needs more memory than there is", step=_verb(arguments), value=" ".join(map(without_secrets, arguments)),
         limit="what fits into memory", remedy="split the recording, or ask for less",
     )  # fmt: skip
 

@@ -14,6 +14,10 @@ BAUD_RATES = (1200, 2400, 4800, 9600, 14400, 19200, 38400, 57600, 115200, 230400
 PARITIES = ("E", "O", "N")
 
 
+USERINFO = re.compile(r"(?<=://)(?!/)(?:(?!\?(?:device|ca|cert|key)=).)*@", re.DOTALL)
+"""Up to the last @, since a password may hold any character; an @ in an option's value is none of it."""
+
+
 @dataclass(frozen=True)
 class TcpUrl:
     """Modbus TCP. `device` None: the drive file's."""
@@ -65,6 +69,8 @@ DriveUrl = TcpUrl | TlsUrl | RtuUrl
 
 def parse_url(text: str) -> DriveUrl:
     """The drive's address. Raises UsageError naming the part that cannot be right."""
+    if USERINFO.search(text):
+        raise _refuse(text, "a user", "no user, password or fragment")
     try:
         parts = urlsplit(text)
         _ = parts.port
@@ -80,7 +86,9 @@ def parse_url(text: str) -> DriveUrl:
 
 def without_secrets(text: str) -> str:
     """The address as it may be shown and archived: no user, no password, not where certificate and key are."""
-    return re.sub(r"(?<=[?&])(cert|key)=[^&]*(&|$)", "", re.sub(r"//[^/?#]*@", "//", text)).rstrip("?&")
+    address, mark, query = USERINFO.sub("", text).partition("?")
+    shown = [pair for pair in query.split("&") if unquote(pair.partition("=")[0]).lower() not in ("cert", "key")]
+    return (address + mark + "&".join(shown)).rstrip("?&") if mark else address
 
 
 def _tcp(text: str, parts: SplitResult) -> TcpUrl:

@@ -109,3 +109,9 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     out, err = process.communicate(timeout=60)
     assert process.returncode == 4, err
     assert json.loads(out)["outcome"] == "aborted" and "Traceback" not in err
+
+
+def test_a_call_that_is_refused_does_not_repeat_the_password_in_it(capsys):
+    code, document = leave(capsys, "check", "--drive", "tcp://bob:hunter2@127.0.0.1:1", "--bogus")
+    assert code == 2
+    assert "hunter2" not in json.dumps(document)

@@ -76,6 +76,10 @@ def test_a_refused_address_does_not_repeat_its_password():
         ("tls://drive?key=/c.pem&cert=/b.pem&device=3", "tls://drive?device=3"),
         ("tls://drive?cert=/b.pem&key=/c.pem", "tls://drive"),
         ("tcp://user:pw@drive?device=1", "tcp://drive?device=1"),
+        ("tcp://user:p/w@x@drive?device=1", "tcp://drive?device=1"),
+        ("tls://drive?k%65y=/c.pem&device=3", "tls://drive?device=3"),
+        ("tls://drive?ca=/a@b.pem", "tls://drive?ca=/a@b.pem"),
+        ("rtu:///dev/x@1?baud=9600", "rtu:///dev/x@1?baud=9600"),
         ("rtu:///dev/ttyUSB0?baud=9600", "rtu:///dev/ttyUSB0?baud=9600"),
     ],
 )
