@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -10,12 +9,13 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
+from numba import get_num_threads
 from numpy.typing import NDArray
 
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
-THREADS = min(os.cpu_count() or 1, 4)
+THREADS = min(int(get_num_threads()), 4)
 """One segment each: more threads than cores would only hold more sensitivities in memory at once."""
 
 PHASE_ANGLES_RAD = np.array([0.0, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0])

@@ -52,9 +52,9 @@ def sequences(draw: st.DrawFn, wire: str) -> Sequence:
     script = Script(
         draw(st.sampled_from([*DECISIONS[:1] * 3, *DECISIONS[1:]])),
         tests,
-        is_biased,
         draw(st.floats(0.8, 2.5)),
         *draw(_rogue(requests)),
+        is_biased,
     )
     return Sequence(
         seed=draw(st.integers(0, 9999)),

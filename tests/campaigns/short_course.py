@@ -48,10 +48,10 @@ class Script:
 
     decision: str = "write back"
     tests: int = 1
-    is_biased: bool = False
     strength: float = 1.0
     rogue: str = ""
     rogue_at: int = 0
+    is_biased: bool = False
 
 
 @functools.cache

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from commissioner.link.facts import DisarmReport
 from commissioner.link.inverter import Inverter
 from commissioner.run import runner
 from tests.campaigns import mutants
@@ -61,7 +62,8 @@ def test_a_commit_that_never_ends_ends_as_a_fault_with_the_old_parameters(tmp_pa
 
 
 def test_a_service_that_does_not_disarm_is_seen(tmp_path, monkeypatch):
-    monkeypatch.setattr(Inverter, "disarm", lambda self: None)
+    claimed = DisarmReport(True, "switch-on disabled", (), False)
+    monkeypatch.setattr(Inverter, "disarm", lambda self: claimed)
     done = run_one(sequence("overrun:600@45"), SCENARIO, tmp_path)
     assert any("after the run had ended" in broken for broken in done.broken), done
 
