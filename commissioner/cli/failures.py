@@ -71,7 +71,7 @@ def _say(error: CommissionerError, as_json: bool) -> None:
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
     return UsageError(
-        text, step="command line", value=" ".join(map(without_secrets, arguments)), limit="see --help", remedy="correct the call"
+        text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call"
     )
 
 
@@ -91,9 +91,14 @@ def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerErr
     )  # fmt: skip
 
 
+def _call(arguments: Sequence[str]) -> str:
+    """The call as it may be shown and kept."""
+    return " ".join(map(without_secrets, arguments))
+
+
 def _too_much(arguments: Sequence[str]) -> CommissionerError:
     return DataRefused(
-        "this needs more memory than there is", step=_verb(arguments), value=" ".join(map(without_secrets, arguments)),
+        "this needs more memory than there is", step=_verb(arguments), value=_call(arguments),
         limit="what fits into memory", remedy="split the recording, or ask for less",
     )  # fmt: skip
 

@@ -22,15 +22,10 @@ PLAUSIBLE_IMPEDANCE = (1e-3, 30.0)
 def require_amperes(examined: Audit, plate: Nameplate) -> None:
     """Currents of the size a test on this motor can have: other units, or another motor's plate, show here."""
     peak = max(float(np.max(np.abs(s.current_a))) for s in examined.stretches if s.is_excited)
-    share = peak / plate.rated_current_peak_a
-    if not PLAUSIBLE_CURRENT[0] < share < PLAUSIBLE_CURRENT[1]:
-        raise DataRefused(
-            "the currents do not fit the nameplate",
-            step="check the excitation",
-            value=f"largest current along the axis {peak:.3g} A",
-            limit=f"{PLAUSIBLE_CURRENT[0]:g} to {PLAUSIBLE_CURRENT[1]:g} times {plate.rated_current_peak_a:.3g} A",
-            remedy="give currents in ampere, and the nameplate of the motor that was recorded",
-        )
+    _require_near(
+        "currents", f"largest current along the axis {peak:.3g} A", peak, plate.rated_current_peak_a, "A",
+        PLAUSIBLE_CURRENT, "give currents in ampere",
+    )  # fmt: skip
 
 
 def require_volts(examined: Audit, plate: Nameplate) -> None:
@@ -39,14 +34,23 @@ def require_volts(examined: Audit, plate: Nameplate) -> None:
     volts = math.sqrt(sum(float(np.sum(s.voltage_v**2)) for s in excited))
     amperes = math.sqrt(sum(float(np.sum(s.current_a**2)) for s in excited))
     rated_ohm = plate.rated_voltage_v / (math.sqrt(3.0) * plate.rated_current_a)
-    share = volts / amperes / rated_ohm
-    if not PLAUSIBLE_IMPEDANCE[0] < share < PLAUSIBLE_IMPEDANCE[1]:
+    _require_near(
+        "voltages", f"voltage over current {volts / amperes:.3g} ohm (rms)", volts / amperes, rated_ohm, "ohm",
+        PLAUSIBLE_IMPEDANCE, "give voltages in volt and currents in ampere",
+    )  # fmt: skip
+
+
+def _require_near(
+    what: str, seen: str, value: float, rated: float, unit: str, limits: tuple[float, float], remedy: str
+) -> None:
+    """DataRefused where `value` is not within `limits` times its rated one."""
+    if not limits[0] < value / rated < limits[1]:
         raise DataRefused(
-            "the voltages do not fit the nameplate",
+            f"the {what} do not fit the nameplate",
             step="check the excitation",
-            value=f"voltage over current {volts / amperes:.3g} ohm (rms)",
-            limit=f"{PLAUSIBLE_IMPEDANCE[0]:g} to {PLAUSIBLE_IMPEDANCE[1]:g} times {rated_ohm:.3g} ohm",
-            remedy="give voltages in volt and currents in ampere, and the nameplate of the motor that was recorded",
+            value=seen,
+            limit=f"{limits[0]:g} to {limits[1]:g} times {rated:.3g} {unit}",
+            remedy=f"{remedy}, and the nameplate of the motor that was recorded",
         )
 
 
