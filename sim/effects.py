@@ -14,9 +14,9 @@ import numpy as np
 
 from sim import layout as at
 from sim.laws import LEAKAGE_SHAPES, SATURATION_SHAPES, SIGN_SHAPES, leakage_excess
-from sim.machine import Effect, Plant, _Lag
+from sim.machine import Effect, Lag, Plant
 
-Apply = Callable[[Effect, Plant, np.ndarray, np.ndarray], "_Lag | None"]
+Apply = Callable[[Effect, Plant, np.ndarray, np.ndarray], Lag | None]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def _entry(name: str, unit: str, meaning: str, shapes: tuple[str, ...], smallest
     return register
 
 
-def apply(effect: Effect, plant: Plant, p: np.ndarray, s: np.ndarray) -> _Lag | None:
+def apply(effect: Effect, plant: Plant, p: np.ndarray, s: np.ndarray) -> Lag | None:
     """Write one effect into the arrays. KeyError for an unknown name, ValueError for an unknown shape."""
     kind = CATALOGUE[effect.name]
     if effect.shape and effect.shape not in kind.shapes:
@@ -120,7 +120,7 @@ def _sampling_delay(effect, plant, p, s):
 
 @_entry("sensor_lag", "s", "sum of time constants of the analogue filter", ("first_order", "second_order"), 5e-6, 2e-4)
 def _sensor_lag(effect, plant, p, s):
-    return _Lag(effect.size, 1 + _shape(effect))
+    return Lag(effect.size, 1 + _shape(effect))
 
 
 @_entry(

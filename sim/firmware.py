@@ -16,8 +16,9 @@ from sim import layout as at
 from sim.drive_map import DriveMap, Item
 from sim.kernel import coast
 from sim.live import COUNTS_PER_LSB, crc16, run_interrupts
-from sim.machine import COPPER_PER_K, Plant, fresh_state, pack
+from sim.machine import COPPER_PER_K, Plant
 from sim.memory import Memory
+from sim.packing import fresh_state, pack
 from sim.parameters import ParameterSet
 from sim.registers import Registers
 from sim.samples import LINK_STEP_V, VOLTAGE_STEP_V, SampleRing

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from sim.effects import CATALOGUE
-from sim.machine import Machine, pack
+from sim.machine import Machine
+from sim.packing import pack
 from sim.recording import record
 from sim.scenario import MACHINE_TABLE, Scenario, build, table_machine, table_rows
 

@@ -16,7 +16,8 @@ import pyarrow.parquet as pa_parquet
 from sim import layout as at
 from sim.compiled import kernel
 from sim.kernel import coast, play_voltages
-from sim.machine import Effect, Plant, fresh_state, pack
+from sim.machine import Effect, Plant
+from sim.packing import fresh_state, pack
 from sim.scenario import Scenario, Segment
 from sim.sensing import between, convert, phase_of, sense
 from sim.truth import answer_key

@@ -10,9 +10,11 @@ from scipy.optimize import brentq
 
 from sim import effects
 from sim import layout as at
+from sim.inductance import inverse_gamma, saturated
 from sim.kernel import load
 from sim.laws import sign_law
-from sim.machine import Plant, inverse_gamma, pack, saturated
+from sim.machine import Plant
+from sim.packing import pack
 from sim.scenario import Scenario
 
 KINDS = ("secant", "incremental", "sine")

@@ -19,8 +19,9 @@ from sim import layout as at
 from sim.drive_map import load_map
 from sim.firmware import Firmware
 from sim.kernel import play_voltages
-from sim.machine import Heating, Machine, Plant, PowerStage, Sensors, fresh_state, pack
+from sim.machine import Heating, Machine, Plant, PowerStage, Sensors
 from sim.memory import Memory
+from sim.packing import fresh_state, pack
 from sim.scenario import load
 from sim.server import run_in_thread
 from sim.states import Setup

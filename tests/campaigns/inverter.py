@@ -18,7 +18,8 @@ import numpy as np
 from commissioner.identify.analysis import Identification, identify
 from commissioner.records import StandstillRecording
 from sim.hidden import impedance
-from sim.machine import Machine, inverse_gamma
+from sim.inductance import inverse_gamma
+from sim.machine import Machine
 from sim.recording import record
 from sim.scenario import Scenario, build, table_machine, table_rows
 

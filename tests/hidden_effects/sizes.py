@@ -8,7 +8,8 @@ import numpy as np
 
 from sim import layout as at
 from sim.laws import leakage_excess, saturation_excess
-from sim.machine import Effect, Plant, pack
+from sim.machine import Effect, Plant
+from sim.packing import pack
 from sim.truth import leg_error_v
 
 Sizes = Mapping[str, tuple[float, float, str]]

@@ -12,8 +12,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from sim import layout as at
+from sim.inductance import inverse_gamma
 from sim.kernel import all_currents, coast, play_voltages
-from sim.machine import Effect, Heating, Machine, Plant, PowerStage, Sensors, fresh_state, inverse_gamma, pack
+from sim.machine import Effect, Heating, Machine, Plant, PowerStage, Sensors
+from sim.packing import fresh_state, pack
 from sim.truth import axis_error_v
 
 IDEAL = Plant(

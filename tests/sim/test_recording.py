@@ -14,7 +14,7 @@ import pytest
 
 from sim import hidden
 from sim.effects import CATALOGUE
-from sim.machine import inverse_gamma
+from sim.inductance import inverse_gamma
 from sim.recording import record, write_table
 from sim.scenario import build, load
 
