@@ -155,5 +155,6 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
         yield PlateProblem(
             "rated_power_w",
             plate.rated_power_w,
-            f"0.25 ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate",
+            f"0.25 ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate; of a plate with "
+            "two voltages, voltage and current of the same connection",
         )

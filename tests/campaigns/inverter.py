@@ -60,9 +60,12 @@ def to_recording(columns: dict[str, np.ndarray], metadata: dict[str, Any]) -> St
 def draw(seed: int, plan: str = "") -> Scenario:
     """Machine, inverter, sensors and test of one draw; amplitudes set so that current and flux stay inside."""
     random = np.random.default_rng([seed, 41])
-    rows = [r["id"] for r in table_rows() if 0.5 <= float(r["P_kW"]) <= 40.0 and 350 <= float(r["V_LL"]) <= 500]
+    rows = {r["id"]: r for r in table_rows() if 0.5 <= float(r["P_kW"]) <= 40.0 and 350 <= float(r["V_LL"]) <= 500}
     saturation = float(random.uniform(0.15, 0.5))
-    plate, machine = table_machine(str(random.choice(rows)), saturation)
+    chosen_row = str(random.choice(list(rows)))
+    plate, machine = table_machine(chosen_row, saturation)
+    if _is_per_unit_base(plate):
+        plate["rated_current_a"] = float(rows[chosen_row]["I_calc_A"])
     machine |= {
         "saturation_at_rated_flux": saturation,
         "saturation_order": float(random.uniform(5.0, 9.0)),
@@ -97,6 +100,12 @@ def draw(seed: int, plan: str = "") -> Scenario:
     chosen = plan or PLANS[seed % len(PLANS)]
     document["recording"] = {"segments": _plan(chosen, document, random)}
     return build(document)
+
+
+def _is_per_unit_base(plate: dict[str, Any]) -> bool:
+    """Krause's machines state P / (sqrt(3) U), the base of their per-unit values, as current: no plate carries that."""
+    base_a = plate["rated_power_w"] / (np.sqrt(3.0) * plate["rated_voltage_v"])
+    return bool(abs(plate["rated_current_a"] / base_a - 1.0) < 0.02)
 
 
 def _plan(plan: str, document: dict[str, Any], random: np.random.Generator) -> list[dict[str, Any]]:
