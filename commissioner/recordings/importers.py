@@ -7,7 +7,6 @@ TDMS, MDF 4 and COMTRADE: channels under such names or the contract's own, by th
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -16,8 +15,9 @@ import numpy as np
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.foreign_csv import parse_csv, read_text
+from commissioner.recordings.names import is_per_minute, key_of, meaning_of, uses_rst
 from commissioner.recordings.table import CONTRACT_COLUMNS, Table, read_table, to_running
-from commissioner.recordings.units import IN_NAME, scale_of, unit_in
+from commissioner.recordings.units import scale_of, unit_in
 from commissioner.records import RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str]]]] = {
@@ -29,7 +29,6 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
     ".cff": comtrade.channels,
 }
 NOT_READ = {".mdf": "MDF 3", ".xlsx": "Excel", ".xls": "Excel"}
-PHASES = {"a": "u", "b": "v", "c": "w", "1": "u", "2": "v", "3": "w", "u": "u", "v": "v", "w": "w", "r": "u", "t": "w"}
 
 
 def read_running(path: Path) -> RunningRecording:
@@ -119,14 +118,16 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
     """The contract's columns among others' names; time is made from a rate where there is no time column."""
     kept: dict[str, Signal] = {}
     data = dict(metadata)
+    for key, number in [*data.items(), *((name, float(v[0])) for name, v in columns.items() if v.size == 1)]:
+        found = _period_from(key, number)
+        if found is not None:
+            data.setdefault("sample_period_s", found)
+    with_s = uses_rst(columns)
     for name, values in columns.items():
-        meaning = meaning_of(name)
-        if values.size == 1 and _key(name) in {"fs", "samplerate", "samplingrate", "samplingfrequency"}:
-            data["sample_period_s"] = 1.0 / float(values[0])
-        elif values.size == 1 and _key(name) in {"ts", "dt", "tsample", "sampleperiod"}:
-            data["sample_period_s"] = float(values[0])
-        elif meaning and meaning not in kept and values.size > 1:
-            kept[meaning] = values
+        meaning = meaning_of(name, with_s)
+        if meaning and meaning not in kept and values.size > 1:
+            per_minute = meaning == "speed_rad_per_s" and is_per_minute(name) and scale_of(unit_in(name)) == 1.0
+            kept[meaning] = values * (np.pi / 30) if per_minute else values
     longest = max((v.size for v in kept.values()), default=0)
     kept = {name: values for name, values in kept.items() if values.size == longest}
     period = data.get("sample_period_s")
@@ -139,9 +140,20 @@ def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str]
             step="recognise columns",
             value=_some(columns),
             limit="time_s, three line currents and three voltages, in SI units",
-            remedy="record all six channels against time, or rename the columns to the contract's",
+            remedy="record all six channels against time, or rename the columns to the contract's (time_s, current_u_a, "
+            "voltage_u_v or voltage_uv_v ...); without a time column give `# sample_period_s: 0.000125` as the first line",
         )
     return Table(kept, data, source)
+
+
+def _period_from(name: str, value: float | str) -> float | None:
+    """The sample period that a single number beside the columns gives: a rate in hertz, or the period in seconds."""
+    if not isinstance(value, float) or not value > 0:
+        return None
+    key = key_of(name)
+    if key in {"fs", "samplerate", "samplingrate", "samplingfrequency", "sampleratehz", "samplingratehz", "fshz"}:
+        return 1.0 / value
+    return value if key in {"ts", "dt", "tsample", "sampleperiod", "sampleinterval", "samplinginterval"} else None
 
 
 def _missing(kept: Mapping[str, Signal]) -> list[str]:
@@ -159,32 +171,3 @@ def _missing(kept: Mapping[str, Signal]) -> list[str]:
 def _some(columns: Mapping[str, Signal]) -> str:
     names = list(columns)
     return ", ".join(names[:8]) + (f" ... ({len(names)} columns)" if len(names) > 8 else "")
-
-
-def _key(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.rsplit(".", maxsplit=1)[-1].lower())
-
-
-def meaning_of(name: str) -> str | None:
-    """The contract's column that a name means, or None: `Ia`, `i_L1 (A)`, `Strom U`, `van`, `U12`, `vab`, `t`, `speed`."""
-    bare = IN_NAME.sub("", name.rsplit(".", maxsplit=1)[-1] if not name.rsplit(".", maxsplit=1)[-1].isdigit() else name)
-    key = re.sub(r"[^a-z0-9]", "", bare.lower())
-    if key in {"t", "time", "times", "zeit", "timestamp", "x", "xaxis", "second"}:
-        return "time_s"
-    if key in {"speed", "speedradpers", "wm", "omegam", "drehzahl", "n", "rpm"}:
-        return "speed_rad_per_s"
-    found = re.match(
-        r"^(?:i|is|cur|current|strom|courant|currentphase|iphase|phasecurrent|il|strom)(?:l)?([abcuvwrt123])a?$", key
-    )
-    if found and key not in {"it"}:
-        return f"current_{PHASES[found.group(1)]}_a"
-    found = re.match(
-        r"^(?:u|v|vs|vol|volt|voltage|spannung|tension|voltagephase|vl|ul)(?:l)?([abcuvwrt123])(?:n|0|v)?$", key
-    )
-    if found:
-        return f"voltage_{PHASES[found.group(1)]}_v"
-    found = re.match(r"^(?:u|v|vs|vol|volt|voltage|spannung|ul|vl)(?:l)?([abcuvwrt123])(?:l)?([abcuvwrt123])v?$", key)
-    if found:
-        pair = PHASES[found.group(1)] + PHASES[found.group(2)]
-        return f"voltage_{pair}_v" if pair in {"uv", "vw", "wu"} else None
-    return None

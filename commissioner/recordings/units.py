@@ -7,7 +7,7 @@ import re
 
 SCALE = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 UNIT = re.compile(r"^[\[(]?\s*(n|u|µ|μ|m|k|M)?(s|sec|a|v|rad/s|1/min|rpm|hz)\s*[\])]?$", re.IGNORECASE)
-IN_NAME = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]\s*$|_(ms|us|s|mA|A|mV|V|kV)$")
+IN_NAME = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]\s*$|_(ms|us|s|mA|A|mV|V|kV|rpm)$")
 
 
 def unit_in(name: str) -> str:

@@ -10,7 +10,8 @@ import pytest
 from scipy.io import savemat
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.recordings.importers import import_table, meaning_of, read_running
+from commissioner.recordings.importers import import_table, read_running
+from commissioner.recordings.names import meaning_of
 
 DATA = Path(__file__).parents[2] / "data"
 TIME = np.arange(400) * 1.25e-4
@@ -39,6 +40,21 @@ CHANNELS = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
         ("theta_e_rad", None),
         ("temperature", None),
         ("U13", None),
+        ("I_S", "current_v_a"),
+        ("U_ST", "voltage_vw_v"),
+        ("stator_current_b", "current_v_a"),
+        ("phase_voltage_c", "voltage_w_v"),
+        ("voltage_A", "voltage_u_v"),
+        ("current_A", "current_u_a"),
+        ("Phase A current [A]", "current_u_a"),
+        ("StatorCurrentB", "current_v_a"),
+        ("U L1-L2 [V]", "voltage_uv_v"),
+        ("I L3 [A]", "current_w_a"),
+        ("Voltage_CA", "voltage_wu_v"),
+        ("speed_rpm", "speed_rad_per_s"),
+        ("is", None),
+        ("motor temperature", None),
+        ("voltage", None),
     ],
 )
 def test_column_names_are_understood(name: str, meaning: str | None) -> None:

@@ -1,0 +1,107 @@
+"""What a column of somebody else's file is called: `Ia`, `i_L1 (A)`, `Strom U`, `stator_current_a`, `I_R`, `U L1-L2 [V]`, `vab`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from commissioner.recordings.units import IN_NAME
+
+PHASES = {
+    "a": "u",
+    "b": "v",
+    "c": "w",
+    "1": "u",
+    "2": "v",
+    "3": "w",
+    "u": "u",
+    "v": "v",
+    "w": "w",
+    "r": "u",
+    "s": "v",
+    "t": "w",
+}
+ALPHABETS = ("abc", "uvw", "rst", "123")
+FILLING = frozenset(
+    {
+        "phase",
+        "ph",
+        "stator",
+        "line",
+        "motor",
+        "machine",
+        "mains",
+        "grid",
+        "supply",
+        "channel",
+        "terminal",
+        "measured",
+        "to",
+    }
+)
+CURRENT = r"i|is|il|iph|cur|curr|current|currents|strom|courant|amps"
+VOLTAGE = r"u|v|vs|vl|ul|vph|uph|vll|ull|vol|volt|volts|voltage|voltages|spannung|tension"
+TIME = frozenset({"t", "time", "times", "zeit", "timestamp", "x", "xaxis", "second", "seconds", "sec"})
+SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
+SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
+"""Without a unit of its own such a column is in 1/min."""
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
+_PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
+_PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
+_SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
+
+
+def meaning_of(name: str, with_s: bool = False) -> str | None:
+    """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
+    last = name.rsplit(".", maxsplit=1)[-1]
+    name = name if last.isdigit() else last
+    return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
+
+
+def uses_rst(names: Iterable[str]) -> bool:
+    """True where the phases are called R, S, T."""
+    keys = {key_of(name) for name in names}
+    return any({f"{kind}r", f"{kind}t"} <= keys for kind in ("i", "u", "v", "il", "ul", "vl"))
+
+
+def key_of(name: str) -> str:
+    """Letters and digits of a name, without its unit in brackets and its path."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1]).lower())
+
+
+def is_per_minute(name: str) -> bool:
+    """A speed column whose name alone says 1/min."""
+    return key_of(name) in SPEED_PER_MINUTE
+
+
+def _meaning(bare: str, with_s: bool) -> str | None:
+    words = [word.lower() for word in _WORD.findall(bare)]
+    key = re.sub(r"[^a-z0-9]", "", bare.lower())
+    if key in TIME:
+        return "time_s"
+    if key in SPEED | SPEED_PER_MINUTE:
+        return "speed_rad_per_s"
+    words = [word for word in words if word not in FILLING]
+    kinds = [word for word in words if re.fullmatch(rf"{CURRENT}|{VOLTAGE}", word)]
+    kind = max(kinds, key=len, default="")
+    if kind and (len(words) > 1):
+        rest = list(words)
+        rest.remove(kind)
+        found = _column(kind, "".join(rest))
+        if found:
+            return found
+    short = _SHORT.fullmatch("".join(words) if words else key)
+    if short and (with_s or short.group(0) not in {"is", "us", "vs"}) and (with_s or short.group(0) != "it"):
+        return _column(short.group(1), short.group(2))
+    return None
+
+
+def _column(kind: str, phase: str) -> str | None:
+    is_current = re.fullmatch(CURRENT, kind) is not None
+    one = _PHASE.fullmatch(phase)
+    if one:
+        return f"current_{PHASES[one.group(1)]}_a" if is_current else f"voltage_{PHASES[one.group(1)]}_v"
+    two = None if is_current else _PAIR.fullmatch(phase)
+    alike = two and any(two.group(1) in letters and two.group(2) in letters for letters in ALPHABETS)
+    pair = PHASES[two.group(1)] + PHASES[two.group(2)] if two and alike else ""
+    return f"voltage_{pair}_v" if pair in {"uv", "vw", "wu"} else None
