@@ -33,8 +33,9 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     `lag_deg`: the order of the channels is known to be that of this lag of the currents.
     """
     findings: list[Finding] = []
+    recording, exchanged = columns.sort_by_kind(recording, plate)
     recording, completed = columns.complete(recording)
-    findings += [Finding(*entry) for entry in completed]
+    findings += [Finding(*entry) for entry in (*exchanged, *completed)]
     low, high = clock.whole_stretch(recording, findings)
     period = clock.sample_clock(recording, slice(low, high), findings)
     clock.fast_enough(period, plate, findings)
@@ -43,8 +44,6 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     empty = np.zeros(0, dtype=np.complex128)
     if any(finding.code in HOPELESS and finding.stops for finding in findings) or high - low < clock.LEAST_SAMPLES:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})
-    currents, voltages, exchanged = columns.sort_by_kind(currents, voltages, plate)
-    findings += [Finding(*entry) for entry in exchanged]
     levels.channel_levels(currents, voltages, findings)
     if any(finding.code in HOPELESS and finding.stops for finding in findings):
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})

@@ -1,14 +1,71 @@
-"""Columns before phases: a third one that follows from two, and currents and voltages under each other's names."""
+"""Columns before phases: currents and voltages under each other's names, and a third one that follows from two."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from commissioner.monitor.channels import Entry
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
+
+CURRENT_RANGE = (0.02, 3.0)
+"""Of the rated current, rms."""
+VOLTAGE_RANGE = (0.1, 2.5)
+"""Of a phase's rated voltage, rms: an inverter at reduced frequency, or line to line."""
+APART = 2.0
+"""Factor between the smallest of one kind and the largest of the other, or the columns stay as they are named."""
+
+
+def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[RunningRecording, list[Entry]]:
+    """Currents and voltages by their size where the columns as named cannot be what they are named; else as it is.
+
+    Absent columns (nothing in them) have no kind: where both groups are exchanged, the hole goes along.
+    """
+    signals = [*recording.currents_a, *recording.voltages_v]
+    size = np.array([float(np.std(good)) if (good := signal[np.isfinite(signal)]).size else 0.0 for signal in signals])
+    if _is_plausible(size, (3, 4, 5), plate):
+        return recording, []
+    others = [
+        kinds for kinds in combinations(range(6), 3) if _is_plausible(size, kinds, plate) and _is_clear(size, kinds)
+    ]
+    if len(others) != 1:
+        return recording, []
+    wrong_i = [k for k in others[0] if k < 3]
+    wrong_v = [k - 3 for k in range(3, 6) if k not in others[0]]
+    for i, v in zip(wrong_i, wrong_v, strict=True):
+        signals[i], signals[3 + v] = signals[3 + v], signals[i]
+    names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
+    entry: Entry = (
+        "crossed_channels",
+        "corrected",
+        f"columns of currents and voltages are exchanged: {names}",
+        names,
+        "currents and voltages in their own columns",
+        "correct the column names",
+    )
+    a, b, c, d, e, f = signals
+    return replace(recording, currents_a=(a, b, c), voltages_v=(d, e, f)), [entry]
+
+
+def _is_plausible(size: Signal, voltages: tuple[int, ...], plate: Nameplate) -> bool:
+    """Every column that holds something lies in the range of its kind."""
+    scale = np.full(6, plate.rated_current_a)
+    low, high = np.full(6, CURRENT_RANGE[0]), np.full(6, CURRENT_RANGE[1])
+    kinds = list(voltages)
+    scale[kinds] = plate.rated_voltage_v / np.sqrt(3.0)
+    low[kinds], high[kinds] = VOLTAGE_RANGE
+    share = size / scale
+    return bool(np.all((size == 0) | ((share > low) & (share < high))))
+
+
+def _is_clear(size: Signal, voltages: tuple[int, ...]) -> bool:
+    """The two kinds lie a factor `APART` from each other."""
+    v = [size[k] for k in voltages if size[k] > 0]
+    i = [size[k] for k in range(6) if k not in voltages and size[k] > 0]
+    return bool(v and i and (min(v) > APART * max(i) or min(i) > APART * max(v)))
 
 
 def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]]:
@@ -37,34 +94,3 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]
         )
     i, v = groups
     return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), entries
-
-
-def sort_by_kind(
-    currents: list[Signal], voltages: list[Signal], plate: Nameplate
-) -> tuple[list[Signal], list[Signal], list[Entry]]:
-    """Currents and voltages by their size where a column of one kind holds the other; as given where that is not clear.
-
-    Clear: exactly three channels between 0.2 and 2.5 times the rated voltage of a phase, the rest at most twice the rated
-    current, and these two ranges apart by a factor of two.
-    """
-    rms = np.array([float(np.std(signal)) for signal in (*currents, *voltages)])
-    phase_v = plate.rated_voltage_v / np.sqrt(3.0)
-    largest_current, least_voltage = 2.0 * plate.rated_current_a, 0.2 * phase_v
-    is_voltage = (rms > least_voltage) & (rms < 2.5 * phase_v)
-    clear = least_voltage > 2 * largest_current and is_voltage.sum() == 3 and np.all(rms[~is_voltage] < largest_current)
-    wrong_i, wrong_v = np.flatnonzero(is_voltage[:3]), np.flatnonzero(~is_voltage[3:])
-    if not clear or wrong_i.size == 0:
-        return currents, voltages, []
-    new_i, new_v = list(currents), list(voltages)
-    for i, v in zip(wrong_i, wrong_v, strict=True):
-        new_i[i], new_v[v] = voltages[v], currents[i]
-    names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
-    entry: Entry = (
-        "crossed_channels",
-        "corrected",
-        f"columns of currents and voltages are exchanged: {names}",
-        names,
-        "currents and voltages in their own columns",
-        "correct the column names",
-    )
-    return new_i, new_v, [entry]
