@@ -301,6 +301,7 @@ class Inverter:
         words = self.port.exchange(address, request, layout.address, layout.words, proves_itself=True)
         decoded = decode_window(words, cursor)
         if isinstance(decoded, WindowRefusal):
+            self.port.doubt()
             raise ReplyMismatch(
                 decoded.reason.value, step="fetch samples", value=decoded.seen, limit=decoded.expected,
                 remedy="check the link; a drive that restarted must be commissioned again",

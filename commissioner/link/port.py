@@ -71,6 +71,10 @@ class Port(Protocol):
         """Set one coil (FC05)."""
         ...
 
+    def doubt(self) -> None:
+        """The caller saw from its content that the last answer was an older request's: the right one may still come."""
+        ...
+
     def close(self) -> None:
         """Give the wire back. Idempotent."""
         ...

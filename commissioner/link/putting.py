@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from commissioner.errors import DriveFault
 from commissioner.link.facts import Action, Intent, Journal
 from commissioner.link.parameter_sets import ParameterSets, Values
-from commissioner.registers.codec import Value, crc16_modbus, encode_item
+from commissioner.registers.codec import Value
+from commissioner.registers.convention import staged_words_crc
 
 BUSY, DONE = 1, 2
 RESULT_DEADLINE_S = 5.0
@@ -62,8 +63,7 @@ class Staged:
         assert crc_name is not None
         held = self._items.read(staged)
         differing = {name: v for name, v in staged.items() if not self._items.same_words(name, held[name], v)}
-        words = [word for name, v in staged.items() for word in encode_item(self._sets.profile.item(name), v)]
-        crc: dict[str, Value] = {crc_name: crc16_modbus(words)}
+        crc: dict[str, Value] = {crc_name: staged_words_crc(target, self._sets.profile)}
         self._journal(Intent(Action.STAGE, differing | crc))
         self._items.write(differing)
         self._items.write(crc)

@@ -23,6 +23,7 @@ from types import MappingProxyType
 from commissioner.errors import UsageError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
+from commissioner.registers.codec import Value, crc16_modbus, encode_item
 from commissioner.registers.profile import DriveProfile, Item
 
 RESISTANCES = ("stator_resistance", "rotor_resistance")
@@ -133,3 +134,11 @@ def _named(r_s: float, r_r: float, l_m: float, l_s: float, circuit: InverseGamma
 _CIRCUITS: Mapping[str, Callable[[InverseGamma], dict[str, float]]] = MappingProxyType(
     {"inverse_gamma": _inverse_gamma, "gamma": _gamma, "t": _t}
 )
+
+
+def staged_words_crc(values: Mapping[str, Value], profile: DriveProfile) -> int:
+    """The check sum that a drive with staging is given over a whole set: `values` by the drive file's names, CRC-16 of
+    the staged registers in the file's order."""
+    assert profile.parameters is not None
+    order = profile.parameters.order
+    return crc16_modbus([word for name in order for word in encode_item(profile.item(f"staged_{name}"), values[name])])

@@ -100,6 +100,7 @@ class RunFolder:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(target)
+        _sync_folder(self.path)
         return target
 
     def close(self) -> None:
@@ -187,6 +188,16 @@ def read_document(text: str) -> dict[str, Any]:
 def _open_no_link(path: str, flags: int) -> int:
     """An `opener` that never writes through a symbolic link."""
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
+
+
+def _sync_folder(path: Path) -> None:
+    """A name given in a folder outlives a power loss only once the folder is on the disk; some file systems cannot."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _drop_torn_line(path: Path) -> int:

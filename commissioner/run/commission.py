@@ -25,9 +25,10 @@ from commissioner.report.run_page import run_page
 from commissioner.report.summary import diagnosis_sentences, summarise
 from commissioner.run.archive import RunFolder, archive_lost, plain, read_journal, write_recording
 from commissioner.run.diagnosed import diagnose_run
+from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.operator_stop import OperatorStop
-from commissioner.run.runner import Course, Present, Runner, ended_by
+from commissioner.run.runner import Course, Present, Runner
 
 
 @dataclass(frozen=True)
@@ -117,10 +118,10 @@ def carry_out(
             with suppress(OSError):
                 folder.journal("link", port.stats.as_dict())
             return ended
-    except CommissionerError as error:
-        ended = ended_by(error, 0.0)
-        folder.journal("error", error.as_dict(), durable=True)
-        folder.journal("run_ended", ended, durable=True)
+    except (CommissionerError, OSError) as failure:
+        error = failure if isinstance(failure, CommissionerError) else as_error(failure, folder)
+        ended = ended_by(error, folder, 0.0)
+        note(folder, "run_ended", ended)
         if isinstance(error, UsageError):
             raise
         return ended

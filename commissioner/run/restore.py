@@ -14,7 +14,8 @@ from commissioner.link.inverter import Inverter
 from commissioner.link.modbus import open_port
 from commissioner.link.url import TlsUrl, parse_url
 from commissioner.records import ParameterSnapshot, WrittenParameter
-from commissioner.registers.codec import crc16_modbus, encode_item
+from commissioner.registers.codec import encode_item
+from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive import RunFolder, damaged, read_journal, read_saved
 from commissioner.run.catalogue import RunSummary
@@ -89,7 +90,7 @@ def _check_known(
     if (
         profile.parameters
         and profile.parameters.staged_crc
-        and _words_crc(present, profile) in {values.get(profile.parameters.staged_crc) for values in announced}
+        and staged_words_crc(present, profile) in {values.get(profile.parameters.staged_crc) for values in announced}
     ):
         return  # a set that this run committed, also where parts of it lay staged before
     for name, held in present.items():
@@ -113,10 +114,3 @@ def _announced(lines: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         if line["kind"] == "about_to" and isinstance(record, dict) and record.get("action") in ("stage", "commit"):
             values = record.get("values")
             yield values if isinstance(values, dict) else {}
-
-
-def _words_crc(values: Mapping[str, float], profile: DriveProfile) -> int:
-    """The check sum that a drive with staging is given over a whole set."""
-    assert profile.parameters is not None
-    order = profile.parameters.order
-    return crc16_modbus([word for name in order for word in encode_item(profile.item(f"staged_{name}"), values[name])])

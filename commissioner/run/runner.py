@@ -7,19 +7,17 @@ journals, on the disk, what energises or writes before it goes out.
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable, Generator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from commissioner.errors import Aborted, CommissionerError, DriveFault, UsageError, WriteBackFailed
-from commissioner.link.facts import DisarmReport
+from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
 from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
 from commissioner.run.archive import RunFolder, archive_lost
+from commissioner.run.ending import as_error, ended_by, let_go, note, taken_as_live
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -54,7 +52,8 @@ class _Progress:
 
 
 class Runner:
-    """Carries one course out: `perform` returns how the run ended, whatever happens on the way."""
+    """Carries one course out, once: `perform` returns how the run ended, whatever happens on the way. After that the gate
+    lets nothing through."""
 
     def __init__(
         self,
@@ -90,15 +89,18 @@ class Runner:
             except CommissionerError as failure:
                 error = failure
             except Exception as surprise:  # must not leave a motor energised or a run without an end
-                error = self._unexpected(surprise)
+                error = as_error(surprise, self._folder)
             finally:
+                self._progress.facts = replace(self._progress.facts, run_ended=True)
                 live = self._disarm(error.what if error is not None else "the run has ended")
         if live is not None:
             ended, error = None, error or live
             if error.remedy != live.remedy:
                 error.remedy = f"{live.remedy}; {error.remedy}"
-        ended = ended or self._failed(error)
-        self._note("run_ended", ended)
+        if ended is None:
+            assert error is not None
+            ended = ended_by(error, self._folder, self.energised_s)
+        note(self._folder, "run_ended", ended)
         self._show(ended)
         return ended
 
@@ -297,46 +299,12 @@ class Runner:
         """
         if not self._progress.has_touched:
             return None
-        try:
-            verified = self._inverter.disarm()
-        except Exception as surprise:  # a run must have an end
-            verified = DisarmReport(False, f"unknown: {type(surprise).__name__}: {surprise}", (), False)
+        verified = let_go(self._inverter)
         self._progress.facts = replace(self._progress.facts, energised=False, loaded=None)
-        self._note("disarmed", {"because": reason, "verified": verified})
+        note(self._folder, "disarmed", {"because": reason, "verified": verified})
         if verified.is_confirmed or self._progress.segment < 0:
             return None
-        return DriveFault(
-            "the drive does not confirm that its output is off",
-            step="de-energise",
-            value=verified.state,
-            limit="a status that says so",
-            remedy="take the motor as live: isolate the drive's supply, then look at its status",
-        )
-
-    def _unexpected(self, surprise: Exception) -> CommissionerError:
-        if isinstance(surprise, OSError):
-            return archive_lost(self._folder.path, surprise)
-        self._note("defect", "".join(traceback.format_exception(surprise)))
-        return CommissionerError(
-            f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
-            remedy="please report it with the run folder",
-        )  # fmt: skip
-
-    def _note(self, kind: str, record: object) -> None:
-        """Journal how the run ends. A disk that is full cannot keep it from ending."""
-        with suppress(OSError):
-            self._folder.journal(kind, record, durable=True)
-
-    def _failed(self, error: CommissionerError | None) -> RunEnded:
-        assert error is not None
-        self._note("error", error.as_dict())
-        return ended_by(error, self.energised_s)
-
-
-def ended_by(error: CommissionerError, energised_s: float) -> RunEnded:
-    """The end that an error makes of a run; a call that cannot be right aborts one that has begun."""
-    outcome = "aborted" if isinstance(error, UsageError) else error.outcome
-    return RunEnded(outcome, error.what, energised_s, error.as_dict())
+        return taken_as_live(verified.state)
 
 
 def kind_of(record: object) -> str:

@@ -61,6 +61,7 @@ class ScriptedDrive:
         self.on_write: Callable[[str, tuple[int, ...]], None] = lambda name, words: None
         self.log: list[tuple[str, str]] = []
         self.is_closed = False
+        self.doubts = 0
         self.commit_result = self.store_result = 2
         self._power_up()
 
@@ -92,6 +93,9 @@ class ScriptedDrive:
     def write_coil(self, address: int, value: bool) -> None:
         self._fail()
         self.log.append((f"coil {address}", str(value)))
+
+    def doubt(self) -> None:
+        self.doubts += 1
 
     def close(self) -> None:
         self.is_closed = True

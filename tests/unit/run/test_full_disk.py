@@ -1,15 +1,24 @@
 """A disk that takes no more: the drive is let go, the run ends with the reason, and nothing is left open."""
 
+import dataclasses
 import errno
+import os
+from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
 from commissioner.errors import WriteBackFailed
+from commissioner.link.drive_file import load_profile
 from commissioner.link.facts import DisarmReport
 from commissioner.procedure.findings import RunEnded
+from commissioner.run import commission
 from commissioner.run.archive import RunFolder
+from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
 from commissioner.safety import commands as ask
+from commissioner.settings import load_motor, load_procedure
+from tests.support.scripted_port import ScriptedDrive
 
 
 class FullFolder(RunFolder):
@@ -88,3 +97,47 @@ def test_a_disk_that_fills_up_while_writing_back_says_what_the_drive_may_hold(fo
     with pytest.raises(WriteBackFailed, match="old or its new parameters") as caught:
         runner._write(ask.WriteParameters(None, None))
     assert "restore" in caught.value.remedy
+
+
+@pytest.mark.parametrize("full_at", ["job", "error", "run_ended"])
+def test_a_disk_that_fills_up_before_the_first_command_or_as_the_link_fails_ends_the_run_with_the_reason(
+    folder, full_at, monkeypatch
+):
+    folder.full_at = full_at
+    order = commission.Order(
+        "tcp://127.0.0.1:1", load_profile("simulated"), load_motor("motor_2kw2"), load_procedure(), write_back=False
+    )
+    drive = ScriptedDrive()
+    if full_at == "job":
+        monkeypatch.setattr(commission, "open_drive", lambda *_: nullcontext(drive))
+    ended = commission.carry_out(order, folder, None, lambda record: None, None, "job", OperatorStop())
+    assert ended.outcome == "faulted"
+    assert not [name for name, _ in drive.log if name == "write"]
+    if full_at == "job":
+        assert "No space left" in ended.reason and "--runs" in ended.error["remedy"]
+
+
+def test_after_its_end_a_run_carries_out_nothing_more(folder):
+    drive = Drive()
+
+    def course():
+        yield ask.Wait(0.0)
+        return RunEnded("commissioned", "done", 0.0)
+
+    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
+    assert runner.perform(course()).outcome == "commissioned"
+    again = runner.perform(course())
+    assert again.outcome == "aborted" and "the run has ended" in again.reason
+
+
+def test_a_saved_document_and_its_name_are_on_the_disk(folder, monkeypatch):
+    synced = []
+    sync = os.fsync
+
+    def noted(descriptor):
+        synced.append(Path(f"/proc/self/fd/{descriptor}").readlink())
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    folder.save("snapshot.json", dataclasses.asdict(DisarmReport(True, "off", (), False)))
+    assert synced == [folder.path / "snapshot.json.part", folder.path]

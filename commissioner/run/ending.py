@@ -1,0 +1,52 @@
+"""How a run ends: the drive let go and looked at, what broke as an error with a remedy, the error as an end."""
+
+from __future__ import annotations
+
+import traceback
+from contextlib import suppress
+
+from commissioner.errors import CommissionerError, DriveFault, UsageError
+from commissioner.link.facts import DisarmReport
+from commissioner.link.inverter import Inverter
+from commissioner.procedure.findings import RunEnded
+from commissioner.run.archive import RunFolder, archive_lost
+
+
+def let_go(inverter: Inverter) -> DisarmReport:
+    """De-energise by every path; what was verified. Whatever breaks meanwhile: a run must have an end."""
+    try:
+        return inverter.disarm()
+    except Exception as surprise:
+        return DisarmReport(False, f"unknown: {type(surprise).__name__}: {surprise}", (), False)
+
+
+def taken_as_live(state: str) -> DriveFault:
+    """A drive that was energised and does not confirm that its output is off."""
+    return DriveFault(
+        "the drive does not confirm that its output is off", step="de-energise", value=state,
+        limit="a status that says so", remedy="take the motor as live: isolate the drive's supply, then look at its status",
+    )  # fmt: skip
+
+
+def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
+    """A disk that takes no more, or a defect of ours, whose traceback goes to the journal."""
+    if isinstance(surprise, OSError):
+        return archive_lost(folder.path, surprise)
+    note(folder, "defect", "".join(traceback.format_exception(surprise)))
+    return CommissionerError(
+        f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
+        remedy="please report it with the run folder",
+    )  # fmt: skip
+
+
+def note(folder: RunFolder, kind: str, record: object) -> None:
+    """Journal how the run ends. A disk that is full cannot keep it from ending."""
+    with suppress(OSError):
+        folder.journal(kind, record, durable=True)
+
+
+def ended_by(error: CommissionerError, folder: RunFolder, energised_s: float) -> RunEnded:
+    """The end that an error makes of a run, journalled; a call that cannot be right aborts one that has begun."""
+    note(folder, "error", error.as_dict())
+    outcome = "aborted" if isinstance(error, UsageError) else error.outcome
+    return RunEnded(outcome, error.what, energised_s, error.as_dict())
