@@ -99,8 +99,9 @@ def _ours(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], so
 
 
 def _in_si(columns: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Each channel by the unit in its name."""
-    return {name: scale_of(unit_in(name)) * values for name, values in columns.items()}
+    """Each channel by the unit in its name; a damaged value passes as what it is, for the audit to name."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return {name: scale_of(unit_in(name)) * values for name, values in columns.items()}
 
 
 def _foreign_csv(path: Path, refusal: DataRefused) -> Table:

@@ -132,6 +132,8 @@ def _values(raw: Stretch, order: str, held: list[_Channel], is_interleaved: bool
         return
     chunk = sum(channel.size(order) for channel in held)
     count = len(raw.data) // chunk if chunk else 0
+    if not count:
+        return
     rows, start = np.frombuffer(raw.take(count * chunk), np.uint8).reshape(count, chunk), 0
     for channel in held:
         end = start + channel.size(order)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from commissioner.errors import CommissionerError, DataRefused
@@ -140,6 +140,7 @@ def test_channels_with_the_contracts_names_pass_as_they_are(tmp_path):
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@example("logger.tdms", 341, 16, False, False)  # a chunk longer than any array
 @given(st.sampled_from(FILES), st.integers(0, 10**6), st.integers(1, 255), st.booleans(), st.booleans())
 def test_a_damaged_file_gives_a_typed_error_or_a_recording(tmp_path, name, place, flip, is_cut, is_near_the_start):
     data = (DATA / name).read_bytes()
