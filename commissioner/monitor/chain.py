@@ -21,9 +21,10 @@ from commissioner.monitor.members import members_of, pole_count, with_wobble
 from commissioner.monitor.pairing_by_slip import better_order, shaft_search
 from commissioner.monitor.periods import Periodicity, ShaftSearch
 from commissioner.monitor.proof import Proof, prove
+from commissioner.monitor.quiet import SEGMENT_S, quietest
 from commissioner.monitor.slow_slip import slip_phase
 from commissioner.monitor.steadiness import frequency_wander, too_little
-from commissioner.monitor.supply import TurningFrame, quietest, turning_frame
+from commissioner.monitor.supply import TurningFrame, turning_frame
 from commissioner.monitor.systematic import with_sensors
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
@@ -101,7 +102,7 @@ class Wishes:
     load_frequencies_hz: tuple[float, ...] = ()
     inertia_kg_m2: float | None = None
     start: Start | None = None
-    segment_s: float = 10.0
+    segment_s: float = SEGMENT_S
 
 
 def observe(
@@ -177,7 +178,8 @@ def _invert(
     )
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
-    whole, whole_std = whole_record_speed(frame, part, found, lines, float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2))))
+    ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))
+    whole, whole_std = whole_record_speed(frame, part, found, lines, ripple_rad, fitted.circuit)
     proof = prove(audited, frame, part, combs, problem, solved)
     return Observation(
         audited,

@@ -20,7 +20,9 @@ MOST_SHAFT_ORDERS = 24
 USED_FOR_REFINING = 4
 DRIFT_DEGREE = 4
 """A slip that wanders over the segment, as voltage and load do: phase polynomial beyond a fixed ratio to the mains (or to the
-clock), only as far as its coefficients stand out."""
+clock), only as far as its coefficients stand out. Where it does, the frequency that captures most is not the mean one."""
+DRIFT_KNOWN = 0.1
+"""Relative error of the drift's mean: coefficients below three deviations were dropped."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,9 @@ def _refined(
     power, frequency, std, follows = max(tries)
     phase = comb_phase(frame, part, frequency, follows)
     drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
-    return Periodicity(name, frequency, std, follows, power, seen, drift)
+    shift = drift.mean_rad_per_s / (2 * np.pi)
+    std = float(np.hypot(std, DRIFT_KNOWN * shift))
+    return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean())
 
 
 def _strongest(spectrum: PairSpectrum, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:

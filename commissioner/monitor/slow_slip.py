@@ -17,7 +17,8 @@ from commissioner.records import Signal
 
 
 def slip_phase(frame: TurningFrame, circuit: TCircuit) -> Signal:
-    """`(n,)` electrical rad: integral of the slow slip frequency's deviation from its mean, negative where the shaft lags.
+    """`(n,)` rad of the supply's angle that turn a shaft at mean slip as far: the integral of the slow slip frequency's deviation
+    from its mean over (1 - slip), negative where the shaft lags.
 
     Slip frequency = Re{(d lambda_r/dt + R_r i_r) / (j lambda_r)} of the means over whole supply periods, quasi-steady
     (rate 0), through a cubic spline with knots `KNOT_SPACING_S` apart. Wrong parameters scale it, by about their error in R_r.
@@ -40,7 +41,7 @@ def slip_phase(frame: TurningFrame, circuit: TCircuit) -> Signal:
     knots = np.concatenate([[frame.time_s[0]] * 4, inner, [frame.time_s[-1]] * 4])
     slow = make_lsq_spline(time, slip - slip.mean(), knots, k=3).antiderivative()
     phase = np.asarray(slow(frame.time_s), dtype=np.float64)
-    return np.asarray(phase - phase.mean(), dtype=np.float64)
+    return np.asarray((phase - phase.mean()) / (1 + slip.mean() / supply), dtype=np.float64)
 
 
 def _rotor_current(circuit: TCircuit, current: Vector, rotor_flux: Vector) -> Vector:

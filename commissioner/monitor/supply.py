@@ -1,4 +1,4 @@
-"""What the mains do: sequence, frequency over time, the frame that turns with them, and the quietest stretch.
+"""What the mains do: sequence, frequency over time, and the frame that turns with them.
 
 The frame's angle is a stiff cubic spline through the demodulated voltage, so the filter is zero-phase and has no start-up.
 Any smooth angle is exact for the model as long as voltage, current and omega_e use the same one.
@@ -22,11 +22,6 @@ Instants = NDArray[np.floating[Any]]
 TURN = np.exp(2j * np.pi / 3)
 KNOT_SPACING_S = 1.5
 """Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
-SEGMENT_S = 10.0
-LONGEST_SEGMENT_S = 60.0
-"""Longer averages meet the motor's warming."""
-SAME_POWER = 0.02
-SAME_VARIATION = 1.3
 BAND_IN_SUPPLY_FREQUENCIES = 14.0
 """Kept either side of the supply frequency: shaft harmonics up to 28 of a four-pole motor, supply lines up to 13."""
 
@@ -166,45 +161,6 @@ def turning_frame(current: Vector, voltage: Vector, supply: SupplyAngle, sample_
         start,
         np.zeros(slow_time.size),
     )
-
-
-def quietest(frame: TurningFrame, length_s: float = SEGMENT_S) -> slice:
-    """The stretch of `length_s` with the least rms variation of instantaneous power, grown while it stays as quiet.
-
-    It grows block by block (1 s) on either side while the block's mean power stays within `SAME_POWER` of the quietest
-    stretch and its variation within `SAME_VARIATION` of it, up to `LONGEST_SEGMENT_S`. All of a record shorter than that
-    which is quiet throughout.
-    """
-    count = frame.time_s.size
-    wanted = int(length_s / frame.sample_period_s)
-    if wanted >= count:
-        return slice(0, count)
-    power = 1.5 * np.real(frame.voltage_v * np.conj(frame.current_a))
-    sums = np.concatenate([[0.0], np.cumsum(power)])
-    squares = np.concatenate([[0.0], np.cumsum(np.square(power - power.mean()))])
-    starts = np.arange(0, count - wanted + 1, max(1, wanted // 20))
-    mean = (sums[starts + wanted] - sums[starts]) / wanted
-    variance = (squares[starts + wanted] - squares[starts]) / wanted - (mean - power.mean()) ** 2
-    k = int(np.argmin(variance))
-    first = int(starts[k])
-    block = int(1.0 / frame.sample_period_s)
-    longest = int(LONGEST_SEGMENT_S / frame.sample_period_s)
-
-    def is_alike(low: int) -> bool:
-        part = power[low : low + block]
-        return bool(
-            abs(part.mean() - mean[k]) < SAME_POWER * np.mean(np.abs(power)) + 0.3 * np.sqrt(variance[k])
-            and part.std() < SAME_VARIATION * np.sqrt(variance[k])
-        )
-
-    last = first + wanted
-    grows = [True, True]
-    while any(grows) and last - first + block <= longest:
-        grows[0] = grows[0] and first >= block and is_alike(first - block)
-        first -= block if grows[0] else 0
-        grows[1] = grows[1] and last + block <= count and last - first + block <= longest and is_alike(last)
-        last += block if grows[1] else 0
-    return slice(first, last)
 
 
 def _fast_length(count: int) -> int:

@@ -103,6 +103,17 @@ class PhaseDrift:
         place = np.clip((time_s - self.centre_s) / self.half_s, -1.0, 1.0)
         return np.asarray(np.polynomial.legendre.legval(place, self.polynomial))
 
+    @property
+    def mean_rad_per_s(self) -> float:
+        """Mean rate from end to end."""
+        return float(np.sum(self.polynomial[1::2]) / self.half_s)
+
+    def without_mean(self) -> PhaseDrift:
+        """The same without its mean rate: it ends as it began."""
+        polynomial = self.polynomial.copy()
+        polynomial[1] -= np.sum(polynomial[1::2])
+        return PhaseDrift(polynomial, self.centre_s, self.half_s)
+
 
 def track(demodulated: Demodulated, degree: int) -> PhaseDrift:
     """The smooth phase that the comb's blocks show together: delta_b = sum h Im(z_b conj c) / sum h^2 |c|^2, iterated.
