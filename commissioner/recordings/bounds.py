@@ -15,7 +15,17 @@ MAX_BYTES = 2 * 1024**3
 MAX_FOREIGN_BYTES = 256 * 1024**2
 """Of a text that is not in the contract's format: it is taken apart line by line, at ten times its size in memory."""
 MAX_COLUMNS = 4096
+MIN_UNPACKED_BYTES, MAX_RATIO = 64 * 1024**2, 30
+"""What a small file may unpack to, and how many times its size a larger one. Measured signals shrink by 2 to 10; only
+made-up ones by more, and those can be saved unpacked."""
+NUMBER_BYTES = 8
+"""A float64: what every number of a file becomes, however short it was."""
 _CHUNK = 1 << 20
+
+
+def unpacked_limit(path: Path) -> int:
+    """How many bytes the file may unpack to."""
+    return min(MAX_BYTES, max(MIN_UNPACKED_BYTES, MAX_RATIO * path.stat().st_size))
 
 
 def bounded_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
@@ -24,6 +34,7 @@ def bounded_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
         raise too_large(path, path.stat().st_size, limit)
     if path.suffix != ".gz":
         return path.read_bytes()
+    limit = min(limit, unpacked_limit(path))
     with gzip.open(path, "rb") as packed:
         size = 0
         while piece := packed.read(_CHUNK):
@@ -34,21 +45,32 @@ def bounded_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
         return packed.read()
 
 
+def bounded_text(path: Path, limit: int = MAX_BYTES) -> bytes:
+    """As `bounded_bytes`, of a file whose cells, were each a number, stay within the limit as well."""
+    data = bounded_bytes(path, limit)
+    cells = data.count(b"\n") + data.count(b"\r") + sum(data.count(mark) for mark in (b",", b";", b"\t"))
+    if NUMBER_BYTES * cells > unpacked_limit(path):
+        raise too_large(path, NUMBER_BYTES * cells, unpacked_limit(path))
+    return data
+
+
 def numeric_columns(path: Path, file: pa_parquet.ParquetFile) -> list[str]:
     """The columns that are numbers: texts, lists and dictionaries can unpack to any size and are never read."""
     if file.metadata.num_columns > MAX_COLUMNS:
         raise too_large(path, f"{file.metadata.num_columns} columns", MAX_COLUMNS)
     schema = file.schema_arrow
     names = [f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)]
-    rows = sum(max(file.metadata.row_group(k).num_rows, 0) for k in range(file.metadata.num_row_groups))
-    size = 8 * max(rows, file.metadata.num_rows) * len(names)
-    if size > MAX_BYTES:
-        raise too_large(path, size, MAX_BYTES)
+    groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+    rows = max(sum(max(group.num_rows, 0) for group in groups), file.metadata.num_rows)
+    values = sum(max(g.column(k).num_values, 0) for g in groups for k in range(g.num_columns))
+    size, limit = NUMBER_BYTES * max(rows * len(names), values), unpacked_limit(path)
+    if size > limit:
+        raise too_large(path, size, limit)
     return names
 
 
 def too_large(path: Path, seen: object, limit: int) -> DataRefused:
     return DataRefused(
         f"{path}: the file unpacks to too much", step="read recording", value=seen, limit=limit,
-        remedy="split the recording",
+        remedy="split the recording, or save it unpacked",
     )  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from commissioner.errors import DataRefused
-from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_bytes
+from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
 from commissioner.recordings.units import UNIT, scale_of, unit_in
 from commissioner.records import Signal
 
@@ -18,7 +18,7 @@ MAX_PREFACE_LINES = 200
 
 def read_text(path: Path) -> str:
     try:
-        data = bounded_bytes(path, MAX_FOREIGN_BYTES)
+        data = bounded_text(path, MAX_FOREIGN_BYTES)
     except (OSError, EOFError, zlib.error) as error:
         raise _unreadable(path, str(error)) from error
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
@@ -42,7 +42,11 @@ def parse_csv(text: str, source: str) -> tuple[dict[str, Signal], dict[str, floa
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator), [])
+    """None where a cell is longer than any number or name."""
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return []
 
 
 def _layout(lines: list[str], source: str) -> tuple[str, int]:

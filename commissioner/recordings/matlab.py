@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.recordings.bounds import MAX_BYTES, too_large
+from commissioner.recordings.bounds import MAX_BYTES, NUMBER_BYTES, too_large, unpacked_limit
 from commissioner.recordings.stretch import Stretch
 from commissioner.records import Signal
 
@@ -70,25 +70,29 @@ def vectors(path: Path) -> dict[str, Signal]:
     if not order or raw[:10] == b"MATLAB 7.3" or _HDF5 in raw[512:520]:
         file.refuse("another format, such as v7.3 (HDF5) or v4")
     found: dict[str, Signal] = {}
+    limit, unpacked, numbers = unpacked_limit(path), 0, 0
     while not file.is_at_end:
         kind, content = file.element()
         if kind == _COMPRESSED:
-            content = _unpacked(content, MAX_BYTES - size)
-            size += len(content.data)
+            content = _unpacked(content, limit - unpacked, limit)
+            unpacked += len(content.data)
             kind, content = content.element()
-        if kind == _MATRIX:
-            found.update(_array(content, "", MAX_DEPTH))
+        for name, signal in _array(content, "", MAX_DEPTH) if kind == _MATRIX else ():
+            found[name] = signal
+            numbers += NUMBER_BYTES * signal.size
+            if numbers > limit:
+                raise too_large(path, f"> {limit}", limit)
     return found
 
 
-def _unpacked(packed: _Bytes, limit: int) -> _Bytes:
+def _unpacked(packed: _Bytes, left: int, limit: int) -> _Bytes:
     stream = zlib.decompressobj()
     try:
-        data = stream.decompress(packed.data, limit + 1)
+        data = stream.decompress(packed.data, left + 1)
     except zlib.error as error:
         packed.refuse(str(error))
-    if len(data) > limit:
-        raise too_large(packed.path, f"> {MAX_BYTES}", MAX_BYTES)
+    if len(data) > left:
+        raise too_large(packed.path, f"> {limit}", limit)
     return _Bytes(memoryview(data), packed.order, packed.path)
 
 
@@ -126,6 +130,9 @@ def _columns(name: str, values: np.ndarray, shape: list[int], body: _Bytes) -> I
     """MATLAB stores column by column; the longer side of a matrix is time."""
     if values.size != math.prod(shape):
         body.refuse(f"{values.size} numbers in an array of {shape}")
+    limit = unpacked_limit(body.path)
+    if NUMBER_BYTES * values.size > limit:
+        raise too_large(body.path, NUMBER_BYTES * values.size, limit)
     numbers = values.astype(np.float64)
     sides = [length for length in shape if length != 1]
     if len(sides) <= 1:

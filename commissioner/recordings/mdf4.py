@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, too_large
+from commissioner.recordings.bounds import MAX_COLUMNS, NUMBER_BYTES, too_large, unpacked_limit
 from commissioner.recordings.stretch import Stretch
 from commissioner.records import Signal
 
@@ -38,7 +38,8 @@ class _File:
     def __init__(self, path: Path) -> None:
         self.stretch = Stretch.of_file(path, _FORM)
         self.left = MAX_BLOCKS
-        self.unpacked = 0
+        self.limit = unpacked_limit(path)
+        self.unpacked = self.numbers = 0
 
     def block(self, place: int, *marks: str) -> _Block:
         self.left -= 1
@@ -90,14 +91,23 @@ class _File:
 
     def _counted(self, data: bytes) -> bytes:
         self.unpacked += len(data)
-        if self.unpacked > MAX_BYTES:
-            raise too_large(self.stretch.path, f"> {MAX_BYTES}", MAX_BYTES)
+        self._check(self.unpacked)
         return data
+
+    def make_room(self, count: int) -> None:
+        """Before `count` numbers are made of the file's."""
+        self.numbers += NUMBER_BYTES * count
+        self._check(self.numbers)
+
+    def _check(self, size: int) -> None:
+        if size > self.limit:
+            raise too_large(self.stretch.path, size, self.limit)
 
     def _inflated(self, packed: Stretch) -> bytes:
         original, kind, columns, size, length = packed.read("<2sBxIQQ")
-        if original != b"DT" or kind not in (0, 1) or size > MAX_BYTES:
-            packed.refuse(f"packed data of kind {kind} and {size} bytes")
+        if original != b"DT" or kind not in (0, 1):
+            packed.refuse(f"packed data of kind {kind}")
+        self._check(self.unpacked + size)
         stream = zlib.decompressobj()
         try:
             data = stream.decompress(packed.take(length), size + 1)
@@ -158,8 +168,9 @@ def _signals(file: _File, group: _Block, records: np.ndarray) -> dict[str, Signa
             continue
         if byte_offset + size > records.shape[1] or (number > 3 and size == 1):
             file.stretch.refuse(f"a channel at byte {byte_offset} of records of {records.shape[1]}")
-        if len(signals) >= MAX_COLUMNS or 8 * records.shape[0] * (len(signals) + 1) > MAX_BYTES:
+        if len(signals) >= MAX_COLUMNS:
             raise too_large(file.stretch.path, f"{len(signals)} channels", MAX_COLUMNS)
+        file.make_room(records.shape[0])
         words = np.ascontiguousarray(records[:, byte_offset : byte_offset + size]).view(f"{_NUMBERS[number]}{size}")
         values = _converted(file, _link(channel, 4, file.stretch), words.ravel().astype(np.float64))
         if values is not None:

@@ -20,7 +20,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_bytes, numeric_columns, too_large
+from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.records import RunningRecording, Signal, StandstillRecording
 
 MAX_METADATA_LINES = 1000
@@ -204,7 +204,7 @@ def _read_parquet(path: Path) -> Table:
 
 
 def _read_csv(path: Path) -> Table:
-    text = io.BytesIO(bounded_bytes(path))
+    text = io.BytesIO(bounded_text(path))
     metadata: dict[str, str] = {}
     start = 0
     for _ in range(MAX_METADATA_LINES):

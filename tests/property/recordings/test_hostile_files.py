@@ -5,7 +5,10 @@ import gzip
 import io
 import json
 import os
+import subprocess
+import sys
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -42,7 +45,7 @@ def columns(rows):
 def test_a_gzip_of_more_than_the_limit_is_refused_without_unpacking_it_into_memory(tmp_path, monkeypatch):
     path = tmp_path / "bomb.csv.gz"
     path.write_bytes(gzip.compress(bytes(16 * MEGABYTE)) * 16)
-    monkeypatch.setattr(table, "bounded_bytes", functools.partial(bounds.bounded_bytes, limit=255 * MEGABYTE))
+    monkeypatch.setattr(table, "bounded_text", functools.partial(bounds.bounded_text, limit=63 * MEGABYTE))
     tracemalloc.start()
     try:
         with pytest.raises(DataRefused, match="unpacks to too much"):
@@ -102,9 +105,57 @@ def test_a_matlab_file_whose_variables_unpack_to_more_than_the_limit_is_refused(
     savemat(path, {"a": np.zeros(4 * MEGABYTE)}, do_compression=True)
     assert path.stat().st_size < MEGABYTE
     assert matlab.vectors(path)["a"].size == 4 * MEGABYTE
-    monkeypatch.setattr(matlab, "MAX_BYTES", 32 * MEGABYTE)
+    monkeypatch.setattr(bounds, "MIN_UNPACKED_BYTES", 32 * MEGABYTE)
     with pytest.raises(DataRefused, match="unpacks to too much"):
         matlab.vectors(path)
+
+
+PEAK = """
+import sys
+from pathlib import Path
+from commissioner.errors import DataRefused
+from commissioner.recordings.importers import contract_table, import_table
+peak_kb = lambda: next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM"))
+before = peak_kb()
+for read in (import_table, contract_table):
+    try:
+        read(Path(sys.argv[1]))
+    except DataRefused:
+        pass
+print(peak_kb() - before)
+"""
+
+
+BOMBS = {
+    "numbers.csv.gz": lambda path: path.write_bytes(gzip.compress(b"1\n" * (20 * MEGABYTE))),
+    "cells.csv.gz": lambda path: path.write_bytes(gzip.compress(b"0;1;2;3;4;5;6\n" * (4 * MEGABYTE))),
+    "line.csv.gz": lambda path: path.write_bytes(gzip.compress(b"a" * (60 * MEGABYTE))),
+    "big.mat": lambda path: savemat(path, {"a": np.zeros(30 * MEGABYTE)}, do_compression=True),
+    "bytes.mat": lambda path: savemat(path, {"a": np.zeros(60 * MEGABYTE, np.int8)}, do_compression=True),
+    "many.mat": lambda path: savemat(path, {f"a{k}": np.zeros(4 * MEGABYTE) for k in range(8)}, do_compression=True),
+    "big.parquet": lambda path: pa_parquet.write_table(
+        pa.table(dict.fromkeys("abcdef", np.zeros(12 * MEGABYTE))), path
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_small_file_costs_little_memory_whatever_it_unpacks_to(tmp_path, name):
+    BOMBS[name](tmp_path / name)
+    assert (tmp_path / name).stat().st_size < 3 * MEGABYTE
+    done = subprocess.run(
+        [sys.executable, "-c", PEAK, tmp_path / name], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert int(done.stdout) < 300 * 1024, f"{done.stdout} kB"
+
+
+def test_a_packed_mdf_is_held_to_what_it_may_unpack_to(monkeypatch):
+    """The same packed data, said to belong to ever more groups, would unpack to any size."""
+    path = Path(__file__).parents[2] / "data" / "foreign_formats" / "zipped.mf4"
+    monkeypatch.setattr(bounds, "MIN_UNPACKED_BYTES", 1000)
+    monkeypatch.setattr(bounds, "MAX_RATIO", 1)
+    seen = typed(lambda: import_table(path))
+    assert isinstance(seen, DataRefused) and "unpacks to too much" in seen.what
 
 
 def test_a_foreign_text_above_its_limit_is_refused(tmp_path, monkeypatch):
