@@ -132,7 +132,7 @@ def observe(
             return Refused(audited, order, (*audited.findings, order))
         if order is not None:
             return observe(recording, plate, wishes, order)
-    trouble = too_little(frame, part, found)
+    trouble = too_little(frame, part, found, search)
     if trouble is not None:
         return Refused(audited, trouble, (*audited.findings, trouble))
     poles = pole_count(found, found.spectrum, plate.pole_pairs, wishes.load_frequencies_hz)

@@ -90,7 +90,11 @@ def pair(
     else:
         current_order, current_sign, lag = min(options, key=lambda option: abs(option[2] - lag_deg))
     least = float(np.degrees(np.arccos(plate.power_factor))) - BELOW_RATED_DEG
-    rivals = tuple(o[2] for o in options if least < o[2] < 90.0 + RIVAL_MARGIN_DEG and o[2] != lag)
+    rivals = tuple(
+        o[2]
+        for o in options
+        if least < o[2] < 90.0 + RIVAL_MARGIN_DEG and abs(o[2] - expected) < LAG_TOLERANCE_DEG and o[2] != lag
+    )
     if v.sequence < 0:
         findings.append(
             (

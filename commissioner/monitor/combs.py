@@ -86,7 +86,7 @@ def _find_shaft(
             if _is_peak(spectrum, h * frequency) and not _on_mains_skirt(h * frequency, search.supply_hz)
         )
         powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
-        if powers.max() > periods.SIGNIFICANT or powers.sum() > 2 * periods.SIGNIFICANT:
+        if powers.max() > periods.SHAFT_SIGNIFICANT or powers.sum() > 2 * periods.SHAFT_SIGNIFICANT:
             return _refined(frame, part, residual, spectrum, "shaft", frequency, seen), table
     return None, table
 

@@ -22,6 +22,8 @@ SIGNIFICANT = 18.0
 """Whitened pair power (mean 1 on noise): P = (1 + 2q) e^{-2q} = 9e-15 for one cell, below 1e-9 over a whole spectrum."""
 VISIBLE = 9.0
 """Enough where the frequency is already known to a cell: P = 3e-7."""
+SHAFT_SIGNIFICANT = 12.0
+"""In the few dozen cells of the slip range that the operating point allows: below 1e-7 in all of them."""
 CAP = 40.0
 """One line cannot outvote the operating point by more than this."""
 DYNAMIC_RANGE = 1e-5
@@ -127,6 +129,20 @@ class ShaftSearch:
         return -0.5 * ((slip - self.slip) / self.slip_std) ** 2
 
 
+def strongest_in_range(spectrum: PairSpectrum, search: ShaftSearch) -> float:
+    """The largest whitened power where the shaft's first line may be."""
+    low, high = range_hz(search)
+    inside = (spectrum.frequency_hz >= low) & (spectrum.frequency_hz <= high)
+    return float(spectrum.power[inside].max(initial=0.0))
+
+
+def range_hz(search: ShaftSearch) -> tuple[float, float]:
+    """Where the shaft's first line may be."""
+    reach = 4.0 * search.slip_std
+    low = search.synchronous_hz * (1 - min(search.slip + reach, 0.5))
+    return low, search.synchronous_hz * (1 - max(search.slip - reach, 0.0))
+
+
 def search_harmonics(band_hz: float, search: ShaftSearch) -> int:
     """How many lines of the shaft's comb are looked at: those within the band, two to eight."""
     return max(2, min(8, int(band_hz * 0.9 / search.synchronous_hz)))
@@ -140,9 +156,7 @@ def shaft_candidates(
     Score: capped whitened power over the lines seen, minus the operating point's misfit; a comb without its first or
     second line pays, since every shaft has some imbalance.
     """
-    reach = 4.0 * search.slip_std
-    low = search.synchronous_hz * (1 - min(search.slip + reach, 0.5))
-    high = search.synchronous_hz * (1 - max(search.slip - reach, 0.0))
+    low, high = range_hz(search)
     step = spectrum.frequency_hz[1]
     grid = np.arange(low, high + step, 0.5 * step / min(harmonics, 4))
     if grid.size == 0:

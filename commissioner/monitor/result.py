@@ -41,6 +41,10 @@ def as_document(
         "mean_speed_rad_per_s": quantity(observation.mean_speed_rad_per_s, observation.mean_speed_std),
         "mean_torque_nm": quantity(observation.mean_torque_nm, observation.mean_torque_std)
         | {"std_from_sensors": observation.mean_torque_sensor_std},
+        "used": {
+            "start_s": float(observation.frame.time_s[0] + observation.audited.start_s),
+            "end_s": float(observation.frame.time_s[-1] + observation.audited.start_s),
+        },
         "sensors": _sensors(observation.audited),
         "slip": observation.slip,
         "segment": _segment(observation),
@@ -235,11 +239,15 @@ def _terminal(audited: Audited) -> dict[str, object]:
 
 
 def _segment(observation: Observation) -> dict[str, float]:
+    """The stretch that was inverted; `mean_speed_rad_per_s` at the top is that of everything that was `used`."""
     time = observation.frame.time_s[observation.part] + observation.audited.start_s
+    shaft = observation.found.shaft
+    assert shaft is not None
     return {
         "start_s": float(time[0]),
         "end_s": float(time[-1]),
         "mean_speed_rad_per_s": observation.segment_speed_rad_per_s,
+        "mean_speed_std_rad_per_s": 2 * np.pi * shaft.frequency_std_hz,
         "supply_frequency_hz": observation.lines.supply_rad_per_s / (2 * np.pi),
     }
 

@@ -7,6 +7,7 @@ import numpy as np
 from commissioner.monitor import periods
 from commissioner.monitor.combs import Found
 from commissioner.monitor.findings import Finding
+from commissioner.monitor.periods import ShaftSearch
 from commissioner.monitor.supply import TurningFrame
 
 LARGEST_FREQUENCY_WANDER = 0.004
@@ -55,16 +56,17 @@ def _swing(frame: TurningFrame, part: slice) -> float:
     return float(np.std(angle))
 
 
-def too_little(frame: TurningFrame, part: slice, found: Found) -> Finding | None:
+def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSearch) -> Finding | None:
     length = float(np.ptp(frame.time_s[part]))
     if found.shaft is None and not found.loads:
+        low, high = periods.range_hz(search)
         return Finding(
             "no_period",
             "refused",
-            "the currents show neither the shaft nor any periodic load",
-            float(found.spectrum.power.max()),
-            periods.SIGNIFICANT,
-            "record longer, with better sensors, or at a load that turns",
+            f"the currents show neither the shaft (looked for from {low:.4g} to {high:.4g} Hz) nor any periodic load",
+            periods.strongest_in_range(found.spectrum, search),
+            f"a line {periods.SHAFT_SIGNIFICANT:g} times as strong as the noise around it",
+            "record longer, with better sensors, or at a load that turns; check rated_speed_rpm and pole_pairs",
         )
     slowest = min([f.frequency_hz for f in (found.shaft, *found.loads) if f is not None])
     turns = length * slowest

@@ -45,6 +45,7 @@ TIME = frozenset({"t", "time", "times", "zeit", "timestamp", "x", "xaxis", "seco
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 """Without a unit of its own such a column is in 1/min."""
+CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
@@ -53,6 +54,8 @@ _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|
 
 def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
+    if CONTRACT.fullmatch(name):
+        return name
     last = name.rsplit(".", maxsplit=1)[-1]
     name = name if last.isdigit() else last
     return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere

@@ -41,6 +41,8 @@ CHANNELS = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
         ("temperature", None),
         ("U13", None),
         ("I_S", "current_v_a"),
+        ("current_v_a", "current_v_a"),
+        ("voltage_wu_v", "voltage_wu_v"),
         ("U_ST", "voltage_vw_v"),
         ("stator_current_b", "current_v_a"),
         ("phase_voltage_c", "voltage_w_v"),

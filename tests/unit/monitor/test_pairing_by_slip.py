@@ -65,7 +65,7 @@ def test_a_shaft_line_without_a_known_frequency_is_refused() -> None:
     seen = seen_in(recording, plate)
     assert seen.found.shaft is not None
     loose = replace(seen.found, shaft=replace(seen.found.shaft, frequency_std_hz=float("inf")))
-    reason = too_little(seen.frame, seen.part, loose)
+    reason = too_little(seen.frame, seen.part, loose, seen.search)
     assert reason is not None and reason.code == "no_shaft_line"
 
 
