@@ -13,6 +13,7 @@ from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
     from commissioner.motor.nameplate import Nameplate
+    from commissioner.recordings.table import Table
     from commissioner.records import StandstillRecording
 
 ROWS = (
@@ -53,7 +54,7 @@ def identify_and_write(
     from commissioner.cli.live import LiveView
     from commissioner.cli.run import show_and_exit
     from commissioner.identify.analysis import identify as analyse
-    from commissioner.identify.audit import nameplate_from
+    from commissioner.identify.plate import nameplate_from
     from commissioner.run.write_recorded import write_recorded
     from commissioner.settings import load_procedure
 
@@ -86,7 +87,22 @@ def _read(path: Path) -> StandstillRecording:
     from commissioner.recordings.importers import contract_table
     from commissioner.recordings.table import to_standstill
 
-    return to_standstill(contract_table(path))
+    return to_standstill(_other_separators(path) or contract_table(path))
+
+
+def _other_separators(path: Path) -> Table | None:
+    """The contract's columns between semicolons or tabs, with decimal points or commas; None for any other file."""
+    from commissioner.recordings.foreign_csv import parse_csv, read_text
+    from commissioner.recordings.table import CONTRACT_COLUMNS, Table
+
+    if path.suffix.lower() not in (".csv", ".txt", ".tsv") or not path.is_file():
+        return None
+    text = read_text(path)
+    header = next((line for line in text.splitlines() if line and not line.startswith("#")), "")
+    if len(header.replace("\t", ";").split(";")) < 2:
+        return None
+    columns, metadata = parse_csv(text, str(path))
+    return Table({name: values for name, values in columns.items() if name in CONTRACT_COLUMNS}, metadata, str(path))
 
 
 def _nameplate(motor: str | None) -> Nameplate | None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.errors import UsageError
-from commissioner.identify.audit import Audit, Stretch, audit, nameplate_from
+from commissioner.identify.audit import Audit, audit
 from commissioner.identify.axis import (
     LARGEST_DISAGREEMENT,
     AxisFit,
@@ -25,10 +25,14 @@ from commissioner.identify.axis import (
     carry_over,
     fit_axis,
     judge_axis,
+    segments,
 )
 from commissioner.identify.combine import AxisEstimate, Combined, combine
 from commissioner.identify.leg_family import one_inverter
+from commissioner.identify.leg_refit import with_known_law
+from commissioner.identify.plate import nameplate_from
 from commissioner.identify.resistance import InverterError
+from commissioner.identify.stretches import Stretch
 from commissioner.identify.sufficient import require_amperes, require_tones, require_volts
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
@@ -103,7 +107,8 @@ def identify(
     for stretches in _by_test(examined):
         like = fits[0] if fits else None
         fits.append(fit_axis(stretches, plate, period_s, start, inverter, like))
-    legs = one_inverter([f.batch for f in fits])
+    free = [f.batch for f in fits]
+    legs = with_known_law(free, [segments(f.stretches) for f in fits], one_inverter(free))
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
     return _summary(

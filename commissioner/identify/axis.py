@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.identify.audit import Stretch
 from commissioner.identify.batch import BatchFit, Segment
 from commissioner.identify.compensation import NOTHING, Compensation
 from commissioner.identify.extensions import select_model
@@ -18,7 +17,8 @@ from commissioner.identify.fit import fit_segments
 from commissioner.identify.observed import excited_part, observe
 from commissioner.identify.resistance import InverterError, Staircase, dc_levels, fit_staircase
 from commissioner.identify.starts import from_impedance
-from commissioner.identify.sufficient import require_conditioned
+from commissioner.identify.stretches import Stretch
+from commissioner.identify.sufficient import require_alignment, require_conditioned
 from commissioner.identify.whiteness import Whiteness, whiteness
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
@@ -78,15 +78,37 @@ def fit_axis(
     """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with."""
     stairs = _staircase(stretches)
     first_leg = leg or (stairs.inverter if stairs else None)
+    fit = _fitted(stretches, stairs, plate, period_s, guess, first_leg, like)
+    try:
+        require_alignment(fit.batch)
+        require_conditioned(fit.batch)
+    except DataRefused:
+        if leg is not None or stairs is None:
+            raise
+        # what was taken for settled levels was none: begin as if there were none
+        fit = _fitted(stretches, None, plate, period_s, guess, None, None)
+        require_alignment(fit.batch)
+        require_conditioned(fit.batch)
+    return fit
+
+
+def _fitted(
+    stretches: Sequence[Stretch],
+    stairs: Staircase | None,
+    plate: Nameplate,
+    period_s: float,
+    guess: InverseGamma | None,
+    first_leg: InverterError | None,
+    like: AxisFit | None,
+) -> AxisFit:
     begun = _begun_like(like, stretches, period_s) if like is not None else None
     if begun is not None:
         chosen, fit = begun
     else:
         chosen = list(stretches)
         starts = _starts(chosen, plate, period_s, guess, first_leg)
-        fit = select_model(_segments(chosen), period_s, starts, first_leg)
+        fit = select_model(segments(chosen), period_s, starts, first_leg)
         chosen, fit = _better_with_link(chosen, period_s, fit)
-    require_conditioned(fit)
     return AxisFit(tuple(chosen), stairs, fit, follows_link=chosen[0] is not stretches[0])
 
 
@@ -95,7 +117,9 @@ def _begun_like(like: AxisFit, stretches: Sequence[Stretch], period_s: float) ->
     chosen = with_link(stretches, like.batch.inverter()) if like.follows_link else list(stretches)
     batch = like.batch
     try:
-        return chosen, fit_segments(_segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta)
+        return chosen, fit_segments(
+            segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta
+        )
     except DataRefused:
         return None
 
@@ -120,13 +144,13 @@ def _better_with_link(stretches: list[Stretch], period_s: float, fit: BatchFit) 
         return stretches, fit
     follows = with_link(stretches, fit.inverter())
     try:
-        other = fit_segments(_segments(follows), period_s, fit.gamma.as_inverse_gamma(), fit.model, fit.theta)
+        other = fit_segments(segments(follows), period_s, fit.gamma.as_inverse_gamma(), fit.model, fit.theta)
     except DataRefused:
         return stretches, fit
     return (follows, other) if other.criterion() < fit.criterion() - 10.0 else (stretches, fit)
 
 
-def _segments(stretches: Sequence[Stretch]) -> list[Segment]:
+def segments(stretches: Sequence[Stretch]) -> list[Segment]:
     """Between segments the cage still carries what the current left behind, and iron may be remanent before the first:
     no segment is taken to start at rest."""
     return [Segment(s.voltage_v, s.current_a, s.axis_deg, starts_at_rest=False, kind=s.kind) for s in stretches]

@@ -16,9 +16,6 @@ from commissioner.records import Signal
 
 TABLE_ROWS = 2049
 PRICE = 4.0
-LEG_DOUBT, LEG_DOUBT_PER_KNEE = 0.0015, 0.15
-"""What the drawn leg error may be off from the real one, of its plateau, at least and per knee over largest current: the
-nearer the knee is to the currents of the test, the less the tail is told from a resistance. It goes into R_s."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +100,8 @@ class BatchFit:
         """What the form of the leg error leaves open in R_s."""
         if self.model.leg is None:
             return 0.0
-        values, largest = self.theta[self.model.leg_slice], self.model.leg.largest_a
-        knee = self.model.leg.table(values, np.zeros((values.size, values.size))).knee_a
-        share = max(LEG_DOUBT, LEG_DOUBT_PER_KNEE * min(knee / largest, 1.0))
-        return share * float(np.max(np.abs(values))) / largest
+        leg, values = self.model.leg, self.theta[self.model.leg_slice]
+        return leg.doubt_share(values) * float(np.max(np.abs(values))) / leg.largest_a
 
     def inverter_covariance_at(self, flux_wb: float) -> Matrix:
         """(4, 4): the part of the secant machine's covariance that comes from the inverter and is common to all axes."""
@@ -114,7 +109,7 @@ class BatchFit:
             return np.zeros((4, 4))
         part = self.model.leg_slice
         crossed = self.covariance[:, part]
-        common = crossed @ np.linalg.pinv(self.covariance[part, part]) @ crossed.T
+        common = crossed @ np.linalg.pinv(self.covariance[part, part], rcond=1e-12, hermitian=True) @ crossed.T
         common[0, 0] += self.leg_doubt_ohm**2
         return replace(self, covariance=common).inverse_gamma_at(flux_wb)[1]
 

@@ -96,10 +96,9 @@ def _step(problem: Problem, at: Evaluation, theta: Matrix, damping: float) -> Ma
 def _apply(problem: Problem, theta: Matrix, own: Matrix, step: Matrix) -> tuple[Matrix, Matrix]:
     new_theta = theta + step[: problem.model.size]
     new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *problem.bounds)
-    leg = new_theta[problem.model.leg_slice]
-    if leg.size and leg[-1] > 0.0:
-        # a leg that gives voltage at small currents and takes it at large ones is an oscillator, not an inverter
-        np.maximum(leg, 0.0, out=leg)
+    if problem.model.leg is not None:
+        part = problem.model.leg_slice
+        new_theta[part] = problem.model.leg.admissible(new_theta[part])
     new_theta[DELAY] = float(np.clip(new_theta[DELAY], -problem.period_s, 2.0 * problem.period_s))
     new_own = own + step[problem.model.size :].reshape(own.shape)
     if not problem.model.with_drift:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,87 +19,77 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from commissioner.identify.batch import BatchFit
-from commissioner.identify.leg_law import TAIL
+from commissioner.identify.leg_law import TAIL, LegLaw
+from commissioner.identify.leg_pair import (
+    DEAD_TIME,
+    FORM,
+    KNEE_SPREAD,
+    SHARE_SPREAD,
+    THRESHOLD,
+    TYPICAL_KNEE,
+    TYPICAL_SHARE,
+    PairLaw,
+)
 from commissioner.records import Signal
 
 Matrix = NDArray[np.float64]
-Shape = Callable[[Signal], Signal]
 WORST_CHANCE = 1e-4
 """A pair of laws is believed where curves this far from it would be at least this likely."""
-RESOLUTION, FORM = 5e-4, 5e-4
-"""What a curve point may be off although the fit is sure of it: sideways, of the largest current, because a steep loss
-moves much within one sample; in height, of the plateau."""
-TYPICAL_KNEE, KNEE_SPREAD = 0.02, 1.5
-"""Median knee, of the largest current, and standard deviation of its logarithm."""
-TYPICAL_SHARE, SHARE_SPREAD = 0.2, 1.0
-"""The threshold's part of the loss, likewise."""
-
-
-def _capacitive(z: Signal) -> Signal:
-    reach = 1.0 / np.maximum(z, 1.0)
-    return np.asarray(z * reach * (1.0 - 0.5 * reach))
-
-
-def _power(n: float) -> Shape:
-    return lambda z: np.asarray(z / (1.0 + z**n) ** (1.0 / n))
-
-
-DEAD_TIME: dict[str, Shape] = {
-    "capacitive": _capacitive,
-    "tanh": np.tanh,
-    "arc tangent": lambda z: np.asarray(2.0 / math.pi * np.arctan(0.5 * math.pi * z)),
-    "hyperbola": _power(1.0),
-    "root": _power(2.0),
-    "corner": _power(5.0),
-    "clamped": lambda z: np.asarray(z**3 / (1.0 + z**3)),
-}
-THRESHOLD: dict[str, Shape] = {"hyperbola": _power(1.0), "root": _power(2.0), "tanh": np.tanh}
+RESOLUTION = 5e-4
+"""What a curve point may be off sideways although the fit is sure of it, of the largest current: a steep loss moves much
+within one sample. In height: `FORM`."""
 
 
 @dataclass(frozen=True)
-class _Pair:
+class Pair:
+    """A pair of laws drawn to the curves: the loss at the knots, its covariance, chi-square of what is left; the law and
+    its values."""
+
     values: Signal
     covariance: Matrix
     misfit: float
+    law: PairLaw
+    plateaus: Signal
 
 
 def one_inverter(fits: Sequence[BatchFit]) -> list[BatchFit]:
     """The fits with the leg curve they agree on. Unchanged where a leg was not fitted, or no known law describes it."""
-    law = fits[0].model.leg
-    if law is None or any(f.model.leg != law for f in fits):
+    pairs = pairs_of(fits)
+    if not pairs or chi2.sf(pairs[0].misfit, pairs[0].values.size - 4) < WORST_CHANCE:
         return list(fits)
+    chances = np.array([math.exp(-0.5 * (p.misfit - pairs[0].misfit)) for p in pairs])
+    chances /= chances.sum()
+    values = np.sum([c * p.values for c, p in zip(chances, pairs, strict=True)], axis=0)
+    spread = [p.covariance + np.outer(p.values - values, p.values - values) for p in pairs]
+    covariance = np.sum([c * x for c, x in zip(chances, spread, strict=True)], axis=0)
+    return [_given(f, values, covariance) for f in fits]
+
+
+def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
+    """Every pair of laws drawn to the curves of the fits together, the best first; none where a leg was not fitted."""
+    law = fits[0].model.leg
+    if not isinstance(law, LegLaw) or any(f.model.leg != law for f in fits):
+        return []
     parts = [f.model.leg_slice for f in fits]
     weights = [np.linalg.pinv(f.covariance[p, p]) for f, p in zip(fits, parts, strict=True)]
     information = np.sum(weights, axis=0)
     mean = np.linalg.solve(
         information, np.sum([w @ f.theta[p] for w, f, p in zip(weights, fits, parts, strict=True)], axis=0)
     )
-    current = law.corner_a * law.knots / (1.0 - law.knots)
+    current = law.knots_a
     steepness = np.gradient(np.append(0.0, mean), np.append(0.0, current))[1:]
     blur = np.square(steepness * RESOLUTION * law.largest_a) + (FORM * np.max(np.abs(mean))) ** 2
     root = np.linalg.cholesky(np.linalg.inv(np.linalg.inv(information) + np.diag(blur))).T
     pairs = [
-        _fit_pair(dead, drop, current, law.largest_a, mean, root)
-        for dead, drop in itertools.product(DEAD_TIME.values(), THRESHOLD.values())
+        _fit_pair((dead, drop), current, law.largest_a, mean, root)
+        for dead, drop in itertools.product(DEAD_TIME, THRESHOLD)
     ]
-    best = min(p.misfit for p in pairs)
-    if chi2.sf(best, law.size - 4) < WORST_CHANCE:
-        return list(fits)
-    chances = np.array([math.exp(-0.5 * (p.misfit - best)) for p in pairs])
-    chances /= chances.sum()
-    values = np.sum([c * p.values for c, p in zip(chances, pairs, strict=True)], axis=0)
-    covariance = np.sum(
-        [
-            c * (p.covariance + np.outer(p.values - values, p.values - values))
-            for c, p in zip(chances, pairs, strict=True)
-        ],
-        axis=0,
-    )
-    return [_given(f, values, covariance) for f in fits]
+    return sorted(pairs, key=lambda p: p.misfit)
 
 
-def _fit_pair(dead: Shape, drop: Shape, current: Signal, largest_a: float, mean: Signal, root: Matrix) -> _Pair:
+def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: Signal, root: Matrix) -> Pair:
     """Plateau, threshold's share and both knees (logarithms) by weighted least squares."""
+    dead, drop = DEAD_TIME[names[0]], THRESHOLD[names[1]]
     plateau = max(float(np.max(np.abs(mean))), 1e-6)
     typical = math.log(TYPICAL_KNEE * largest_a)
 
@@ -119,7 +109,14 @@ def _fit_pair(dead: Shape, drop: Shape, current: Signal, largest_a: float, mean:
     fit = least_squares(misfit, [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical], max_nfev=60)
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)
     jacobian = np.linalg.solve(root, fit.jac[: mean.size])
-    return _Pair(curve(fit.x), jacobian @ spread @ jacobian.T, 2.0 * float(fit.cost))
+    total, ratio, knee_1, knee_2 = map(float, np.exp(np.clip(fit.x, -30.0, 30.0)))
+    return Pair(
+        values=curve(fit.x),
+        covariance=jacobian @ spread @ jacobian.T,
+        misfit=2.0 * float(fit.cost),
+        law=PairLaw(*names, knee_1, knee_2, largest_a),
+        plateaus=np.array([total / (1.0 + ratio), total * ratio / (1.0 + ratio), 0.0, 0.0]),
+    )
 
 
 def _given(fit: BatchFit, values: Signal, covariance: Matrix) -> BatchFit:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from commissioner.identify.leg_pair import FORM
 from commissioner.identify.resistance import InverterError
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.records import Signal
@@ -28,6 +29,11 @@ CURVATURE, CURVATURE_STEP = 1.0, 0.4
 """Standard deviations, of the plateau: of g = xi^3 d2f/dxi2, which is -k/a for a dead time of knee k, and of what g
 changes by from knot to knot in the tail. Shapes of published inverters (capacitive, tanh, arc tangent, root; knees up to
 a twentieth of the largest current) then move R_s by less than 0.0015 plateau over largest current."""
+FALL_OF_LEG = 0.001
+"""How much of its largest value a leg error may fall from knot to knot, one standard deviation: physics lets it rise only."""
+LEG_DOUBT, LEG_DOUBT_PER_KNEE = 0.0015, 0.15
+"""What the drawn leg error may be off from the real one, of its plateau, at least and per knee over largest current: the
+nearer the knee is to the currents of the test, the less the tail is told from a resistance. It goes into R_s."""
 TAIL = 7
 """Knots from this one on belong to the tail."""
 TABLE_POINTS = 61
@@ -35,9 +41,11 @@ TABLE_POINTS = 61
 
 @dataclass(frozen=True)
 class LegLaw:
-    """Cubic spline through zero and one free value per knot; straight in xi beyond the largest current."""
+    """Cubic spline through zero and one free value per knot; straight in xi beyond the largest current. `form_is_known`:
+    its values come from a law that describes the samples, not from the curve alone."""
 
     largest_a: float
+    form_is_known: bool = False
 
     @property
     def corner_a(self) -> float:
@@ -51,6 +59,11 @@ class LegLaw:
     def knots(self) -> Signal:
         """Knots in xi, without the one at zero."""
         return np.array(KNOTS) / (1.0 + CORNER)
+
+    @cached_property
+    def knots_a(self) -> Signal:
+        """The same in ampere."""
+        return np.asarray(self.corner_a * self.knots / (1.0 - self.knots))
 
     @cached_property
     def _spline(self) -> CubicSpline:
@@ -77,9 +90,29 @@ class LegLaw:
         bend = self._spline(self.knots, 2) * self.knots[:, None] ** 3
         return np.vstack([bend / CURVATURE, np.diff(bend, axis=0)[TAIL:] / CURVATURE_STEP])
 
+    def expected(self, values: Signal, plateau_v: float) -> tuple[Matrix, Signal]:
+        """(rows, missed): what is known beforehand, in standard deviations. The tail bends no more than a dead time's;
+        the loss rises with current."""
+        falls = np.diff(np.eye(self.size), axis=0)
+        falls = falls[falls @ values < 0.0] / FALL_OF_LEG
+        rows = np.vstack([self.expectations, falls]) / plateau_v
+        return rows, np.asarray(rows @ values)
+
+    @staticmethod
+    def admissible(values: Signal) -> Signal:
+        """A leg that gives voltage at small currents and takes it at large ones is an oscillator, not an inverter."""
+        return np.maximum(values, 0.0) if values[-1] > 0.0 else values
+
+    def doubt_share(self, values: Signal) -> float:
+        """What the curve may be off the real one, of the plateau."""
+        if self.form_is_known:
+            return FORM
+        knee = self.table(values, np.zeros((values.size, values.size))).knee_a
+        return max(LEG_DOUBT, LEG_DOUBT_PER_KNEE * min(knee / self.largest_a, 1.0))
+
     def coefficients(self, leg: InverterError) -> Signal:
         """The values of a leg error known otherwise."""
-        return leg.leg_voltage_v(self.corner_a * self.knots / (1.0 - self.knots))
+        return leg.leg_voltage_v(self.knots_a)
 
     def table(self, values: Matrix, covariance: Matrix) -> InverterError:
         """The curve with its standard errors up to thirty times the largest current."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.identify import output_error
 from commissioner.identify.leg_law import LegLaw
+from commissioner.identify.leg_pair import PairLaw
 from commissioner.identify.resistance import InverterError
 from commissioner.motor.circuit import Gamma, InverseGamma
 from commissioner.records import Signal
@@ -30,7 +31,7 @@ class ModelChoice:
 
     extra_powers: int = 0
     flux_scale_wb: float = 1.0
-    leg: LegLaw | None = None
+    leg: LegLaw | PairLaw | None = None
     with_delay: bool = False
     with_drift: bool = True
 

@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.identify.audit import Stretch
 from commissioner.identify.compensation import Compensation
 from commissioner.identify.coordinates import PRIOR_LOG_STD
 from commissioner.identify.observer import BlockEstimate, ParallelObserver, StoredBlock
+from commissioner.identify.stretches import Stretch
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, ParameterBox
 from commissioner.motor.standstill import poles_per_s

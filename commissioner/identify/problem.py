@@ -22,8 +22,6 @@ from commissioner.records import Signal
 SCORE_BLOCK_S = 0.25
 CURRENT_MARGIN = 1.5
 NEAR_ZERO = 0.03
-FALL_OF_LEG = 0.001
-"""How much of its largest value a leg error may fall from knot to knot, one standard deviation: physics lets it rise only."""
 
 
 @dataclass
@@ -121,11 +119,7 @@ class Problem:
         if self.model.leg is None:
             return
         part = self.model.leg_slice
-        values = theta[part]
-        falls = np.diff(np.eye(self.model.leg_size, k=0), axis=0)
-        falls = falls[falls @ values < 0.0] / FALL_OF_LEG
-        rows = np.vstack([self.model.leg.expectations, falls]) / self.plateau_v
-        missed = rows @ values
+        rows, missed = self.model.leg.expected(theta[part], self.plateau_v)
         out.squares += self.noise_a2 * float(missed @ missed)
         out.information[part, part] += self.noise_a2 * rows.T @ rows
         out.score[part] -= self.noise_a2 * rows.T @ missed

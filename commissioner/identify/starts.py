@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from commissioner.identify.audit import Stretch, tones_in
 from commissioner.identify.resistance import InverterError
+from commissioner.identify.stretches import Stretch, tones_in
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox
 from commissioner.motor.standstill import admittance_s

@@ -1,0 +1,49 @@
+"""The nameplate as it stands in a recording's metadata."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from commissioner.errors import DataRefused
+from commissioner.motor.nameplate import Nameplate, check
+
+NAMEPLATE_KEYS = (
+    "rated_power_w",
+    "rated_voltage_v",
+    "rated_frequency_hz",
+    "rated_current_a",
+    "rated_speed_rpm",
+    "power_factor",
+    "pole_pairs",
+)
+
+
+def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:
+    """The nameplate in a recording's metadata; DataRefused naming the first key that is missing or impossible."""
+    for key in NAMEPLATE_KEYS:
+        if not isinstance(metadata.get(key), float | int):
+            raise DataRefused(
+                f"the recording's metadata lack {key}",
+                step="read the nameplate",
+                value=metadata.get(key),
+                limit="a number in SI units",
+                remedy=f"add '# {key}: ...' to the file, or give --motor",
+            )
+    number = {key: float(metadata[key]) for key in NAMEPLATE_KEYS}
+    pole_pairs = int(number.pop("pole_pairs"))
+    inertia = metadata.get("inertia_kg_m2")
+    plate = Nameplate(
+        **number,
+        pole_pairs=pole_pairs,
+        connection=str(metadata.get("connection", "star")),
+        inertia_kg_m2=float(inertia) if isinstance(inertia, float | int) else None,
+    )
+    for problem in check(plate):
+        raise DataRefused(
+            f"the nameplate cannot be right: {problem.key}",
+            step="read the nameplate",
+            value=problem.value,
+            limit=problem.expected,
+            remedy=f"correct {problem.key}, or give --motor",
+        )
+    return plate
