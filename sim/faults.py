@@ -26,6 +26,7 @@ DRIVE = {
     "overcurrent": None, "heatsink": None, "winding": None, "earth_fault": None, "sto": None, "undervoltage": None,
     "overrun": 100, "sample_gap": 5, "power_cycle": None, "stuck_commit": None, "store_fails": None,
     "heartbeat_ignored": None, "ignore": "control_word", "refuse": "watchdog_ms", "other_map": 100,
+    "runs_away": None,
 }
 WRITE_REGISTERS = 16
 NUMBERED = {"late", "truncated", "wrong_unit", "short_reply", "stall", "restart", "overrun", "sample_gap", "other_map"}
@@ -182,6 +183,8 @@ def _misbehave(fault: Fault, drive: Firmware) -> None:
         drive.setup.store_fails = True
     elif fault.name == "heartbeat_ignored":
         drive.setup.heeds_heartbeat = False
+    elif fault.name == "runs_away":  # energised it heeds no command, and its watchdog is dead
+        drive.setup.runs_away = True
     elif fault.name == "ignore":
         drive.setup.ignores = drive.setup.ignores | {str(fault.argument)}
     elif fault.name == "refuse":

@@ -205,12 +205,12 @@ class Firmware:
         """Bite when due, whoever is or is not asking."""
         limit_ms = self.values["watchdog_ms"]
         silent_ms = (self._now() - self.fed_at) * 1e3
-        if self.is_energised and limit_ms and silent_ms > limit_ms:
+        if self.is_energised and limit_ms and silent_ms > limit_ms and not self.setup.runs_away:
             self.trip(Trip.WATCHDOG, silent_ms, float(limit_ms))
 
     def watchdog_due_in(self) -> float:
         """Seconds until the watchdog would bite, inf when it is not running."""
-        if not self.is_energised or not self.values["watchdog_ms"]:
+        if not self.is_energised or not self.values["watchdog_ms"] or self.setup.runs_away:
             return math.inf
         return self.fed_at + self.values["watchdog_ms"] / 1e3 - self._now()
 
@@ -218,6 +218,8 @@ class Firmware:
 
     def control(self, word: int) -> None:
         """CiA 402 control word: device control commands by their bit patterns."""
+        if self.is_energised and self.setup.runs_away:
+            return
         reset = bool(word & 0x80) and not self.last_control & 0x80
         self.last_control = word
         if self.state is State.FAULT:

@@ -55,6 +55,7 @@ class Setup:
     fault_at_start: int = 0
     takes_watchdog: bool = True
     heeds_heartbeat: bool = True
+    runs_away: bool = False
     shaft_speed_rad_per_s: float = 0.0
     parameters: tuple[float, float, float, float] = (3.2, 1.8, 0.026, 0.200)
     commit_sticks: bool = False

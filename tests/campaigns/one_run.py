@@ -163,7 +163,7 @@ def run_one(sequence: Sequence, scenario: Scenario, root: Path) -> Outcome:
     log = truth.read_log(folder / "state.jsonl")
     outcome.lost, outcome.sessions = lost, len(truth.of(log, "energised"))
     outcome.watchdog_bites = sum(trip["cause"] == WATCHDOG_TRIP for trip in truth.of(log, "trip"))
-    for _, end in truth.sessions(log):
+    for _, end in truth.sessions(truth.before_runaway(log)):
         if end is not None:
             outcome.dead_after_s = max(outcome.dead_after_s, requests.loss_before(end["wall"]) or 0.0)
             if end["why"] == f"trip {WATCHDOG_TRIP}":
@@ -262,10 +262,14 @@ def _judge(
     log = truth.read_log(folder / "state.jsonl")
     job = make_job(write_back=True, tests=1)
     allowed = allowed_for(job, writing=sequence.script.decision == "write back")
-    yield from truth.broken_supervision(log, allowed)
-    yield from truth.broken_loss(log, requests)
-    yield from truth.broken_end(log, ended_wall)
-    yield from truth.broken_limits(log, allowed)
+    heeding = truth.before_runaway(log)
+    yield from truth.broken_supervision(heeding, allowed)
+    yield from truth.broken_loss(heeding, requests)
+    yield from truth.broken_end(heeding, ended_wall)
+    yield from truth.broken_limits(heeding, allowed)
+    yield from truth.broken_runaway(
+        log, ended.outcome if ended else "no connection", str((ended.error or {}).get("remedy")) if ended else ""
+    )
     yield from truth.broken_permission(log, allowed)
     yield from _broken_outcome(sequence, log, ended, summary)
 

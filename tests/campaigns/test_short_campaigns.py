@@ -45,6 +45,7 @@ def sequence(*faults, wire="tcp", decision="write back", rogue="", rogue_at=0):
         (("ignore:control_word@80",), "faulted"),
         (("store_fails",), "faulted"),
         (("power_cycle@store",), "faulted"),
+        (("runs_away@e0.1s",), "faulted"),
         (("ignore:watchdog_ms",), "faulted"),
         (("refuse:watchdog_ms",), "rejected"),
     ],
@@ -53,6 +54,16 @@ def test_each_grave_fault_ends_as_it_must(tmp_path, wire, faults, outcome):
     done = run_until_undisturbed(sequence(*faults, wire=wire), SCENARIO, tmp_path)
     assert not done.broken
     assert done.ended.outcome == outcome, done.ended
+
+
+def test_a_run_that_leaves_a_runaway_drive_live_must_say_so(tmp_path, monkeypatch):
+    left = sequence("runs_away@e0.1s")
+    done = run_until_undisturbed(left, SCENARIO, tmp_path)
+    assert done.ended.outcome == "faulted" and "isolate" in done.ended.error["remedy"]
+    claimed = DisarmReport(True, "switch-on disabled", (), False)
+    monkeypatch.setattr(Inverter, "disarm", lambda self: claimed)
+    done = run_one(left, SCENARIO, tmp_path)
+    assert any("the drive is live" in broken for broken in done.broken), done
 
 
 def test_a_commit_that_never_ends_ends_as_a_fault_with_the_old_parameters(tmp_path):

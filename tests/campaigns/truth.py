@@ -15,6 +15,7 @@ GRACE_S = 0.1
 FLUX_TOLERANCE = 1.02
 READING = (3, 23)
 """Functions whose reply can be cut shorter and stay well-formed."""
+RUNAWAY = "runs_away"
 PARAMETER_ITEMS = ("staged_", "commit", "store")
 
 Entry = Mapping[str, Any]
@@ -88,6 +89,24 @@ def sessions(log: Sequence[Entry]) -> Iterator[tuple[Entry, Entry | None]]:
 
 def is_energised(log: Sequence[Entry]) -> bool:
     return any(end is None for _, end in sessions(log))
+
+
+def before_runaway(log: Sequence[Entry]) -> Sequence[Entry]:
+    """The entries up to the session in which the drive stopped heeding anyone; all of them where it never did.
+
+    Nobody but its supply can make such a drive dead: from there on only what the run says of it can be judged.
+    """
+    struck = next((k for k, e in enumerate(log) if e["event"] == "fault" and e["name"] == RUNAWAY), len(log))
+    if struck == len(log):
+        return log
+    begun = [k for k, entry in enumerate(log[:struck]) if entry["event"] == "energised"]
+    return log[: begun[-1]] if begun and is_energised(log[:struck]) else log[:struck]
+
+
+def broken_runaway(log: Sequence[Entry], outcome: str, remedy: str) -> Iterator[str]:
+    """A run that leaves its drive energised ends as a fault, and says what alone helps."""
+    if len(before_runaway(log)) < len(log) and is_energised(log) and (outcome != "faulted" or "isolate" not in remedy):
+        yield f"the drive is live, and the run ended as {outcome} with the remedy {remedy!r}"
 
 
 def broken_supervision(log: Sequence[Entry], allowed: Allowed) -> Iterator[str]:

@@ -285,6 +285,19 @@ def test_ignored_heartbeat_ends_in_the_watchdog(with_faults):
     assert tcp.read(50, 1) == [6]
 
 
+@faults("runs_away@e0.05s")
+def test_a_runaway_drive_heeds_neither_commands_nor_silence(with_faults):
+    tcp = with_faults.tcp
+    tcp.prepare(duration_s=30.0, watchdog_ms=150)
+    tcp.enable()
+    for beat in range(100):
+        tcp.write_one(34, beat + 1)
+    for word in (0x00, 0x02, 0x06):
+        tcp.write_one(32, word)
+    time.sleep(0.3)
+    assert tcp.status() & 0x6F == 0x27
+
+
 @faults("refuse:watchdog_ms")
 def test_refused_item_is_an_exception(with_faults):
     with pytest.raises(Refused) as refused:
