@@ -7,13 +7,14 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from commissioner.cli.secrets import Secrets
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
 from commissioner.link.url import without_secrets
 
@@ -24,7 +25,7 @@ INTERRUPTED = 130
 
 def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     """Carry the verb out and leave with its exit code; with --json every failure is one document, too."""
-    as_json = "--json" in arguments
+    as_json, hide = "--json" in arguments, Secrets(arguments).hide
     signal.signal(signal.SIGTERM, _terminated)
     try:
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
@@ -37,10 +38,10 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     except typer.Exit as stop:
         sys.exit(stop.exit_code)
     except TyperException as usage:
-        if not as_json and hasattr(usage, "show"):
+        error = _usage(usage, arguments)
+        if not as_json and hasattr(usage, "show") and hide(error.what) == error.what:
             usage.show()
             sys.exit(UsageError.exit_code)
-        error = _usage(usage, arguments)
     except (KeyboardInterrupt, typer.Abort):
         error = _stopped()
     except CommissionerError as failure:
@@ -51,7 +52,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
         error = _too_much(arguments)
     except Exception as surprise:
         error = _defect(surprise, arguments)
-    _say(error, as_json)
+    _say(error, as_json, hide)
     sys.exit(error.exit_code)
 
 
@@ -59,9 +60,11 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt(signal.Signals(number).name)
 
 
-def _say(error: CommissionerError, as_json: bool) -> None:
+def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:
     from commissioner.cli import screen
 
+    for fact in ("what", "step", "value", "limit", "remedy"):
+        setattr(error, fact, hide(getattr(error, fact)))
     if as_json:
         screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
     else:
@@ -93,7 +96,7 @@ def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerErr
 
 def _call(arguments: Sequence[str]) -> str:
     """The call as it may be shown and kept."""
-    return " ".join(map(without_secrets, arguments))
+    return " ".join(without_secrets(Secrets(arguments).hide(argument)) for argument in arguments)
 
 
 def _too_much(arguments: Sequence[str]) -> CommissionerError:
@@ -109,7 +112,7 @@ def _defect(surprise: Exception, arguments: Sequence[str]) -> CommissionerError:
         with tempfile.NamedTemporaryFile(
             "w", prefix="commissioner-defect-", suffix=".txt", delete=False, encoding="utf-8"
         ) as file:
-            traceback.print_exception(surprise, file=file)
+            file.write(Secrets(arguments).hide("".join(traceback.format_exception(surprise))))
         where = f"the file {file.name}"
     except OSError:
         where = "what you did"

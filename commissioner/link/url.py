@@ -14,8 +14,11 @@ BAUD_RATES = (1200, 2400, 4800, 9600, 14400, 19200, 38400, 57600, 115200, 230400
 PARITIES = ("E", "O", "N")
 
 
-USERINFO = re.compile(r"(?<=://)(?!/)(?:(?!\?(?:device|ca|cert|key)=).)*@", re.DOTALL)
-"""Up to the last @, since a password may hold any character; an @ in an option's value is none of it."""
+USERINFO = re.compile(
+    r"(?:(?<=://)(?!/)|(?:^|(?<==))(?!\w+://)[^\s/:@=]*:)(?:(?!\?(?:device|ca|cert|key)=).)*@", re.DOTALL
+)
+"""Up to the last @, since a password may hold any character; an @ in an option's value is none of it. Without a scheme only
+where a colon stands between user and password."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import typer
 
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.secrets import Secrets
 from commissioner.errors import DriveFault
 from tests.support.command_line import COMMAND
 
@@ -111,7 +112,54 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     assert json.loads(out)["outcome"] == "aborted" and "Traceback" not in err
 
 
-def test_a_call_that_is_refused_does_not_repeat_the_password_in_it(capsys):
-    code, document = leave(capsys, "check", "--drive", "tcp://bob:hunter2@127.0.0.1:1", "--bogus")
-    assert code == 2
-    assert "hunter2" not in json.dumps(document)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", "--drive", "tcp://bob:hunter2@127.0.0.1:1", "--bogus"),
+        ("check", "tcp://bob:hunter2@127.0.0.1:1"),
+        ("check", "--drive", "bob:hunter2@127.0.0.1:1", "--motor", "motor_2kw2"),
+        ("check", "--drive=bob:hunter2@127.0.0.1:1", "--motor", "motor_2kw2"),
+        ("check", "--drive", ":hunter2@127.0.0.1", "--motor", "motor_2kw2"),
+        ("check", "--drive", "tcp://bob:%68unter2@h@127.0.0.1:1", "--motor", "motor_2kw2"),
+        ("check", "--drive", "tcp://127.0.0.1:1", "--password", "hunter2"),
+        ("check", "--drive", "tcp://127.0.0.1:1", "--password=hunter2"),
+        ("check", "hunter2", "--api-token", "hunter2"),
+        ("hunter2", "--pwd=hunter2"),
+        ("check", "--drive", "tls://127.0.0.1:1?cert=/etc/hostname&k%65y=/home/hunter2/key.pem", "--motor", "motor_2kw2"),
+        ("check", "--motor", "bob:hunter2@127.0.0.1:1", "--drive", "tcp://127.0.0.1:1"),
+        ("identify", "tcp://bob:hunter2@127.0.0.1:1", "--motor", "motor_2kw2"),
+    ],
+)
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_call_that_is_refused_does_not_repeat_the_password_in_it(capsys, monkeypatch, arguments, as_json):
+    monkeypatch.setenv("COLUMNS", "300")
+    if as_json:
+        code, document = leave(capsys, *arguments)
+        said = json.dumps(document)
+    else:
+        with pytest.raises(SystemExit) as left:
+            run_to_exit(app, list(arguments))
+        code, said = left.value.code, "".join(capsys.readouterr())
+    assert code == 2, said
+    assert said and "hunter2" not in said and "%68unter2" not in said
+
+
+def test_the_file_about_a_defect_holds_no_password_either(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    made = typer.Typer()
+
+    @made.command()
+    def verb(drive: str = typer.Option(""), as_json: bool = typer.Option(False, "--json")):
+        raise ZeroDivisionError(f"cannot divide {drive}")
+
+    _, document = leave(capsys, "--drive", "tcp://bob:hunter2@127.0.0.1:1", of=made)
+    (file,) = tmp_path.iterdir()
+    assert "ZeroDivisionError" in file.read_text() and "127.0.0.1" in file.read_text()
+    assert "hunter2" not in file.read_text() + json.dumps(document)
+
+
+def test_what_is_no_secret_is_shown_as_it_was():
+    hide = Secrets(["check", "--drive", "tcp://bob:e@127.0.0.1:1", "--motor", "C:/a@b.toml"]).hide
+    assert hide({"what": ["the drive tcp://bob:e@127.0.0.1:1", 3.0, None]}) == {"what": ["the drive tcp://***@127.0.0.1:1", 3.0, None]}
+    assert hide("every e stays") == "every *** stays"
+    assert Secrets(["check", "--drive", "tcp://127.0.0.1:1"]).hide("check tcp://127.0.0.1:1") == "check tcp://127.0.0.1:1"
