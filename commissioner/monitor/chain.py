@@ -164,23 +164,26 @@ def _invert(
     assert found.shaft is not None
     shaft_speed = 2 * np.pi * found.shaft.frequency_hz
     shaft_std = 2 * np.pi * found.shaft.frequency_std_hz
+    delay_std = audited.sensors.skew_std_s
     lines = _lines(audited, frame, part, combs)
-    lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
+    lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std, delay_std)
     if len(combs) > 1:
         bent = with_wobble(combs, problem, fitted, kept, shaft_speed)
         if bent is not None:
             combs = bent
             lines = _lines(audited, frame, part, combs)
-            lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std)
-    solved = with_sensors(waveform.solve(problem, fitted, kept), audited.sensors, lines, len(combs), problem, start)
+            lines, problem, fitted, kept = estimate(lines, len(combs), start, pairs, shaft_speed, shaft_std, delay_std)
+    solved = with_sensors(
+        waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
+    )
     period = _characteristic(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
     )
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
     ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))
-    whole, whole_std = whole_record_speed(frame, part, found, lines, ripple_rad, fitted.circuit)
-    proof = prove(audited, frame, part, combs, problem, solved)
+    whole, whole_std = whole_record_speed(frame, part, found, lines, ripple_rad, fitted)
+    proof = prove(audited, frame, part, combs, problem, solved, fitted.delay_s)
     return Observation(
         audited,
         frame,

@@ -37,13 +37,16 @@ class Kept:
 
 
 def estimate(
-    lines: Lines, mains: int, start: Start, pairs: int, speed: float, speed_std: float
+    lines: Lines, mains: int, start: Start, pairs: int, speed: float, speed_std: float, delay_std_s: float
 ) -> tuple[Lines, Problem, Fitted, Kept]:
-    """Fit on the orders that the speed shows and the mains harmonics; the waveform's problem leaves out the mains."""
+    """Fit on the orders that the speed shows and the mains harmonics; the waveform's problem leaves out the mains.
+
+    The lines that come back hold the currents without the delay that was found.
+    """
     trimmed, _ = trim(lines, mains, start.circuit, pairs, speed)
-    fitted = fitting.fit(
-        fitting.pose(keep(trimmed, fitting.informative(trimmed, mains)), start.circuit, pairs, speed, speed_std), start
-    )
+    shown = keep(trimmed, fitting.informative(trimmed, mains))
+    fitted = fitting.fit(fitting.pose(shown, start.circuit, pairs, speed, speed_std, delay_std_s), start)
+    lines = fitting.advanced(lines, fitted.delay_s)
     trimmed, kept = trim(lines, mains, fitted.circuit, pairs, speed)
     loads_only = keep(trimmed, trimmed.comb < mains)
     return trimmed, fitting.pose(loads_only, fitted.circuit, pairs, speed, speed_std), fitted, kept
@@ -106,7 +109,7 @@ def band_weights(problem: Problem, fitted: Fitted) -> Vector:
     _, upper, lower = inversion.complex_speed(fitted.circuit, problem.pole_pairs, problem.lines, problem.on)
     error = problem.band_error
     moved_up, moved_low = list(error.gap_upper), list(error.gap_lower)
-    for step in fitting.steps(fitted):
+    for step in fitting.steps(fitted, held=True):
         circuit = fitting.circuit_at(fitted, step)
         _, up, low = inversion.complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
         moved_up.append(up - upper)

@@ -1,14 +1,17 @@
-"""Circuit parameters from running data: theta = (R_s, R_r, L_m, L_l), leakages split as the start says.
+"""Circuit parameters from running data: theta = (R_s, R_r, L_m, L_l), leakages split as the start says, and the sensors' delay.
 
 Schantz & Leeb, (19), (20): a true speed has no imaginary part, and its mean is the shaft speed that the spectrum gave.
 Here each line's imaginary part is divided by its own standard deviation *at the parameters tried*: with fixed weights the
 fit would shrink the leakage because that shrinks the noise. Air-gap effects make lines that no torque made; they enter as
 a model error, a robust loss keeps them from steering, and a prior around the start keeps what the data leave open.
+
+The currents' delay against the voltages (cheap sensors with filters: 100 to 300 us) is a fifth number with a prior of its own: at
+light load it decides what the active power is. Mains harmonics show it, and so does the slip that this power would ask for.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +32,8 @@ PRIOR_FROM_COMMISSIONING = (0.12, 0.15, 0.08, 0.08)
 MEAN_MODEL_ERROR = 1e-4
 """Of synchronous speed: mains harmonics and unbalance put this much into the mean of (14) by their squares."""
 DECADE = np.log(10.0)
+LARGEST_DELAY = 6.0
+"""Standard deviations of the delay's prior."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,10 @@ class Start:
 
 @dataclass(frozen=True)
 class Problem:
-    """The fit's data. `mean_speed_std` is the spectrum's; infinite where no shaft line was found. Errors: see `sidebands`."""
+    """The fit's data. `mean_speed_std` is the spectrum's; infinite where no shaft line was found. Errors: see `sidebands`.
+
+    `delay_std_s`: the delay's prior, around none; 0 holds it there.
+    """
 
     lines: Lines
     on: Torus
@@ -50,11 +58,15 @@ class Problem:
     mean_speed_rad_per_s: float
     mean_speed_std: float
     band_error: BandError
+    delay_std_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class Fitted:
     """The circuit, the covariance of log(R_s, R_r, L_m, L_l), and what the data left to the prior.
+
+    `delay_s` is by how much the currents lag behind the voltages; `log_per_s` how the logarithms go with it, the rest of their
+    covariance being `held_covariance`.
 
     `open_direction` is the unit combination of the logarithms that the data fix worst; `open_share` says which part of its
     prior variance is left (1 = the data say nothing).
@@ -66,13 +78,24 @@ class Fitted:
     open_share: float
     chi_square_per_line: float
     imaginary_share: float
+    held_covariance: NDArray[np.float64]
+    log_per_s: NDArray[np.float64]
+    delay_s: float = 0.0
+    delay_std_s: float = 0.0
 
 
-def pose(lines: Lines, start: TCircuit, pole_pairs: int, mean_speed_rad_per_s: float, mean_speed_std: float) -> Problem:
+def pose(
+    lines: Lines,
+    start: TCircuit,
+    pole_pairs: int,
+    mean_speed_rad_per_s: float,
+    mean_speed_std: float,
+    delay_std_s: float = 0.0,
+) -> Problem:
     """The problem, with the errors of its side bands at the start values."""
     on = torus(lines)
     error = band_error(start, pole_pairs, lines, on, mean_speed_rad_per_s)
-    return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, error)
+    return Problem(lines, on, pole_pairs, mean_speed_rad_per_s, mean_speed_std, error, delay_std_s)
 
 
 def informative(lines: Lines, mains: int) -> NDArray[np.bool_]:
@@ -88,26 +111,33 @@ def fit(problem: Problem, start: Start, first: TCircuit | None = None) -> Fitted
     centre = logs_of(start.circuit)
     split = start.circuit.rotor_leakage_h / start.circuit.stator_leakage_h
     prior = np.array(start.log_std)
+    unit = max(problem.delay_std_s, 1e-12)
 
-    def residual(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([_robust(_misfit(problem, circuit_of(logs, split))), (logs - centre) / prior])
+    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        late = replace(problem, lines=advanced(problem.lines, x[4] * unit)) if problem.delay_std_s else problem
+        return np.concatenate([_robust(_misfit(late, circuit_of(x[:4], split))), (x[:4] - centre) / prior, x[4:]])
 
+    reach = np.append(np.full(4, DECADE), LARGEST_DELAY)
+    middle = np.append(centre, 0.0)
     solved = least_squares(
         residual,
-        centre if first is None else logs_of(first),
+        middle if first is None else np.append(logs_of(first), 0.0),
         method="trf",
-        bounds=(centre - DECADE, centre + DECADE),
-        x_scale=prior,
+        bounds=(middle - reach, middle + reach),
+        x_scale=np.append(prior, 1.0),
         max_nfev=80,
     )
-    circuit = circuit_of(solved.x, split)
-    data = _misfit(problem, circuit)
+    circuit = circuit_of(solved.x[:4], split)
+    delay = float(solved.x[4]) * unit if problem.delay_std_s else 0.0
+    found = replace(problem, lines=advanced(problem.lines, delay))
+    data = _misfit(found, circuit)
     inflation = max(1.0, float(np.median(np.abs(data[2:]) ** 2) / np.log(2))) if data.size > 3 else 1.0
     jacobian = solved.jac.copy()
-    jacobian[: -len(prior)] /= np.sqrt(inflation)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    jacobian[:-5] /= np.sqrt(inflation)
+    full = np.linalg.inv(jacobian.T @ jacobian)
+    covariance, per_unit = full[:4, :4], full[:4, 4] / full[4, 4]
     direction, share = _open(covariance, prior)
-    _, upper, lower = complex_speed(circuit, problem.pole_pairs, problem.lines, problem.on)
+    _, upper, lower = complex_speed(circuit, problem.pole_pairs, found.lines, problem.on)
     imaginary, total = np.sum(np.abs(upper - lower) ** 2), np.sum(np.abs(upper + lower) ** 2)
     return Fitted(
         circuit,
@@ -116,12 +146,22 @@ def fit(problem: Problem, start: Start, first: TCircuit | None = None) -> Fitted
         share,
         float(np.mean(np.abs(data) ** 2)),
         float(np.sqrt(imaginary / total)) if total else 0.0,
+        covariance - np.outer(per_unit, per_unit) * full[4, 4],
+        per_unit / unit,
+        delay,
+        float(np.sqrt(full[4, 4])) * problem.delay_std_s,
     )
 
 
-def steps(fitted: Fitted) -> NDArray[np.float64]:
-    """Four moves of the logarithms whose outer products sum to their covariance."""
-    values, vectors = np.linalg.eigh(fitted.log_covariance)
+def advanced(lines: Lines, delay_s: float) -> Lines:
+    """The lines with the currents `delay_s` earlier."""
+    turn = np.exp(1j * (lines.rate_rad_per_s + lines.supply_rad_per_s) * delay_s)
+    return replace(lines, current_a=lines.current_a * turn, current_influence=lines.current_influence * turn)
+
+
+def steps(fitted: Fitted, held: bool = False) -> NDArray[np.float64]:
+    """Four moves of the logarithms whose outer products sum to their covariance; `held`: with the delay as it was found."""
+    values, vectors = np.linalg.eigh(fitted.held_covariance if held else fitted.log_covariance)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from commissioner.monitor import tracking
 from commissioner.monitor.averaging import Lines
 from commissioner.monitor.combs import DRIFT_KNOWN, Found, mean_supply, told_apart
+from commissioner.monitor.fit import Fitted
 from commissioner.monitor.periods import Periodicity
 from commissioner.monitor.slow_slip import slip_phase
 from commissioner.monitor.supply import TurningFrame
-from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
 
 WANDER_KNOWN = 0.1
@@ -23,12 +23,12 @@ UNSEEN = 0.01
 
 
 def whole_record_speed(
-    frame: TurningFrame, part: slice, found: Found, lines: Lines, ripple_rad: float, circuit: TCircuit
+    frame: TurningFrame, part: slice, found: Found, lines: Lines, ripple_rad: float, fitted: Fitted
 ) -> tuple[float, float]:
     """Mean shaft speed over the whole stretch: the comb followed beyond the segment, (rad/s, standard error).
 
     `ripple_rad`: rms of the shaft angle within the periods; where the stretch ends within one, that much turning more or less
-    is in its mean. The slip outside the segment is first computed with the `circuit` that was fitted to the segment: a load
+    is in its mean. The slip outside the segment is first computed with the circuit that was `fitted` to the segment: a load
     that steps turns the shaft by whole turns against a constant slip, and what is followed then is only the rest.
     """
     shaft = found.shaft
@@ -41,7 +41,9 @@ def whole_record_speed(
     std = float(np.hypot(std, np.sqrt(2.0) * ripple_rad / length))
     if part.start == 0 and part.stop >= time.size:
         return ratio * mean_supply(frame, everything), std
-    turned = _beyond(frame, part, slip_phase(frame, circuit))
+    late = np.exp(1j * lines.supply_rad_per_s * fitted.delay_s)
+    in_time = replace(frame, current_a=frame.current_a * late)
+    turned = _beyond(frame, part, slip_phase(in_time, fitted.circuit))
     phase = ratio * (frame.supply_angle_rad + turned)
     speed = float(phase[-1] - phase[0]) / length
     std = float(np.hypot(std, np.sqrt(2.0) * WANDER_KNOWN * ratio * float(np.std(_detrended(time, turned))) / length))

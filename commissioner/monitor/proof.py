@@ -37,9 +37,18 @@ class Proof:
 
 
 def prove(
-    audited: Audited, frame: TurningFrame, part: slice, combs: tuple[Comb, ...], problem: Problem, solved: Solved
+    audited: Audited,
+    frame: TurningFrame,
+    part: slice,
+    combs: tuple[Comb, ...],
+    problem: Problem,
+    solved: Solved,
+    delay_s: float = 0.0,
 ) -> Proof:
-    """Re-simulation of about a second from the middle of the segment, at the recording's own rate."""
+    """Re-simulation of about a second from the middle of the segment, at the recording's own rate.
+
+    The measured currents are turned forwards by the `delay_s` that was found of them.
+    """
     assert audited.supply is not None
     period = audited.sample_period_s
     time_part = frame.time_s[part]
@@ -50,6 +59,7 @@ def prove(
     time = np.arange(first, first + count) * period
     turn = np.exp(-1j * (audited.supply.angle_rad(time) - frame.start_angle_rad))
     measured, voltage = audited.current_a[window] * turn, audited.voltage_v[window] * turn
+    measured = measured * np.exp(1j * problem.lines.supply_rad_per_s * delay_s)
     phases = {p: np.interp(time, time_part, comb.phase_rad) for p, comb in enumerate(combs)}
     basis = basis_of(problem.lines, phases, count)
     speed = solved.speed.mean_rad_per_s + 2 * np.real(basis[:, problem.on.positive] @ solved.speed.amplitude_rad_per_s)

@@ -16,7 +16,7 @@ from commissioner.monitor.supply import SupplyAngle, harmonic_phasor
 from commissioner.records import Signal
 
 GAIN_STD = 0.005
-SKEW_STD_S = 50e-6
+SKEW_STD_S = 100e-6
 """Where nothing is known: class 0.5 for each group of sensors, and one degree between them (converters one after another,
 isolation amplifiers, transformers of class 1)."""
 LEAST_ASYMMETRY = 0.001

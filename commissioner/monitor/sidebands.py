@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.monitor.averaging import Lines
-from commissioner.monitor.inversion import Torus, moved_speed
+from commissioner.monitor.inversion import Torus, flux_lines, moved_speed
 from commissioner.monitor.supply import Vector
 from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
@@ -23,6 +23,11 @@ deviation); no torque makes it. Mixed eccentricity shows 50 dB below the current
 stator and an oval rotor, 0.8 % of the gap each: their product's half, 75 dB below."""
 LINE_MODEL_ERROR = 0.015
 """Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
+SATURATION = 0.25
+"""Share of a line's magnetizing current likewise: iron answers a ripple of the flux's size with its incremental inductance, 0.5 to
+0.8 of that of its mean flux, a ripple of its direction with the latter."""
+MAINS_MODEL_ERROR = 0.08
+"""The same at harmonics of the mains: there bars have more resistance and less leakage by their skin effect."""
 
 
 @dataclass(frozen=True)
@@ -42,14 +47,19 @@ def band_error(circuit: TCircuit, pole_pairs: int, lines: Lines, on: Torus, mean
     stator_rate = np.abs(lines.rate_rad_per_s + lines.supply_rad_per_s)
     leak = circuit.stator_leakage_h * stator_rate + circuit.rotor_leakage_h * np.abs(lines.rate_rad_per_s)
     drop = np.abs(lines.voltage_v) + leak * np.abs(lines.current_a)
-    wrong = LINE_MODEL_ERROR * drop
-    twice = np.abs(np.abs(lines.rate_rad_per_s / lines.supply_rad_per_s) - 2.0) < 1e-6
+    order = np.abs(lines.rate_rad_per_s / lines.supply_rad_per_s)
+    of_mains = (order > 0.5) & (np.abs(order - np.round(order)) < 1e-6)
+    wrong = np.where(of_mains, MAINS_MODEL_ERROR, LINE_MODEL_ERROR) * drop
+    twice = np.abs(order - 2.0) < 1e-6
     wrong = np.where(twice, np.hypot(wrong, lines.asymmetry * drop[0]), wrong)
-    still = np.zeros((1, lines.order.size), dtype=np.complex128)
-    _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, still, wrong[None, :].astype(np.complex128))
+    still = np.zeros_like(lines.current_a)
+    flux = flux_lines(circuit, lines.current_a, lines.voltage_v, lines.rate_rad_per_s, lines.supply_rad_per_s)
+    own = flux.stator_flux_wb - circuit.stator_leakage_h * lines.current_a
+    iron = SATURATION * np.abs(own) / circuit.magnetizing_inductance_h
+    _, upper, lower = moved_speed(circuit, pole_pairs, lines, on, np.array([still, iron]), np.array([wrong, still]))
     gap = _gap_voltages(circuit, lines, mean_speed_rad_per_s)
     _, gap_upper, gap_lower = moved_speed(circuit, pole_pairs, lines, on, np.zeros_like(gap), gap)
-    return BandError(np.abs(upper[0]), np.abs(lower[0]), gap_upper, gap_lower)
+    return BandError(np.hypot(*np.abs(upper)), np.hypot(*np.abs(lower)), gap_upper, gap_lower)
 
 
 def _gap_voltages(circuit: TCircuit, lines: Lines, mean_speed_rad_per_s: float) -> Vector:

@@ -125,7 +125,7 @@ def _parameter_changes(
     lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
     _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)
     changes = []
-    for step in steps(fitted):
+    for step in steps(fitted, held=True):
         circuit = circuit_at(fitted, step)
         mean, upper, lower = complex_speed(circuit, pairs, lines, on)
         value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
