@@ -83,11 +83,13 @@ def identify(
     start: InverseGamma | None = None,
     winding_temperature_degc: float | None = None,
     assumption: str = EQUAL_LEAKAGE,
+    is_final: bool = True,
 ) -> Identification:
     """Everything a standstill recording says about the motor.
 
     `nameplate` defaults to the recording's metadata. `inverter` (from an earlier staircase) and `start` only give the
-    search a start. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
+    search a start. `is_final` is False for a look that only designs the next test: the inverter's law is not fitted to the
+    samples then. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
     """
     if estimator not in ("pao", "lyapunov", "nls"):
         raise UsageError(
@@ -108,7 +110,9 @@ def identify(
         like = fits[0] if fits else None
         fits.append(fit_axis(stretches, plate, period_s, start, inverter, like))
     free = [f.batch for f in fits]
-    legs = with_known_law(free, [segments(f.stretches) for f in fits], one_inverter(free))
+    legs = one_inverter(free)
+    if is_final:
+        legs = with_known_law(free, [segments(f.stretches) for f in fits], legs)
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
     return _summary(

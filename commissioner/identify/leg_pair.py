@@ -46,6 +46,7 @@ DEAD_TIME: dict[str, Shape] = {
     "hyperbola": _power(1.0),
     "root": _power(2.0),
     "corner": _power(5.0),
+    "ramp": lambda z: np.minimum(z, 1.0),
     "clamped": lambda z: np.asarray(z**3 / (1.0 + z**3)),
 }
 THRESHOLD: dict[str, Shape] = {"hyperbola": _power(1.0), "root": _power(2.0), "tanh": np.tanh}

@@ -87,7 +87,7 @@ def _look(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     recording = assemble(findings.blocks, {}, "first look")
     assert recording is not None
     try:
-        look = identify(recording, job.nameplate, "nls")
+        look = identify(recording, job.nameplate, "nls", is_final=False)
     except DataRefused:
         return
     findings.look = look
