@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from commissioner.diagnose.contradiction import contradiction
 from commissioner.diagnose.record import Facts, Record, Segment
 from commissioner.records import Signal, StandstillRecording
 
@@ -287,6 +288,8 @@ def _judge(
         total = record.samples
         if clipped["samples"] > 0.3 * total:
             return f"{clipped['samples'] / total:.0%} of the samples are clipped", out
+    if (refusal := contradiction(record)) is not None:
+        return refusal, out
     if max(steps, default=0.0) > 0:
         out.append(f"currents come in steps of {max(steps) * 1e3:.3g} mA.")
     if len(excited_lines(record)) == 1:

@@ -14,19 +14,18 @@ from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.evidence import (
     TIE_CHI2,
     HeldOut,
-    Leftover,
     alternatives,
     claim_features,
     confidence,
     hold_out,
-    leftover,
     on_part,
     setting_for,
     sizes_with_spread,
 )
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
-from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.fit import Fit, whiten
+from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
@@ -40,6 +39,10 @@ COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.5
 """Named as a cause: steps beyond a share of the rated peak current that make a quarter of the noise power."""
 TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+MOST_UNANSWERED, FAINT = 0.5, 0.1
+"""Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
+NO_RIVAL = 1e6
+"""Loss in chi2 that stands for having no alternative."""
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
 IRON_CORNER_HZ = 400.0
@@ -121,32 +124,28 @@ def diagnose(
     report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
-        found = search(record, noise, excluded=excluded, report=report, check=_one_motor, go_on=go_on)
+        found = search(record, noise, excluded=excluded, report=report, check=lambda f, r: _before_search(f, r, noise), go_on=go_on)
         _one_state(found.fit, found.record)
-    except _MixedMotors as mixed:
-        return Diagnosis(Verdict.REFUSED, str(mixed), (), (), audit, noise)
+    except _Refused as refusal:
+        return Diagnosis(Verdict.REFUSED, str(refusal), (), (), audit, noise)
     return _conclude(found, audit, noise, excluded)
 
 
 def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str]) -> Diagnosis:
     record, layout = found.record, found.layout
     numbers = 4 + len(found.fit.model.terms)
-    rest = leftover(found.fit.model, record, layout, noise, numbers)
+    rest = leftover(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
     held = hold_out(found.nominal, found.fit, record, layout, noise)
-    part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
-    rivals = alternatives(
-        part_fit, found.accepted, part, layout, setting_for(found.setting, part), noise, record.samples, excluded
-    )
-    causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded) for name in found.accepted]
+    rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
+    doubt = _doubt(rest, _explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
+    causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, doubt) for name in found.accepted]
     causes = _without_truncation(causes, audit)
     causes += _audit_causes(audit, found, noise, {c.name for c in causes})
-    unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE or _is_less_than_left(c, rest))
+    unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest)))
     causes = [c for c in causes if c not in unsure]
-    rest = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
-    count = float(found.fit.normal.count.sum())
-    structured = max(found.nominal.chi2 - count, 0.0)
-    share = 1.0 - min(rest.sigma**2 * count / max(structured, rest.sigma**2 * count, 1.0), 1.0)
-    verdict, reason = _verdict(causes, rest, share, noise)
+    total = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
+    share, rest = _explained_share(found, rest, total.sigma), total
+    verdict, reason = _verdict(causes, rest, share, doubt < 1.0)
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
@@ -156,13 +155,42 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     )
 
 
-def _is_less_than_left(cause: Cause, rest: Leftover) -> bool:
+def _explained_share(found: Found, rest: Leftover, left_sigma: float) -> float:
+    """Share of the structured error power that is not among what is left (`left_sigma`, causes not named included)."""
+    count = float(found.fit.normal.count.sum())
+    structured = max(found.nominal.chi2 - found.fit.chi2, 0.0) + rest.sigma**2 * count
+    return 1.0 - min(left_sigma**2 * count / max(structured, left_sigma**2 * count, 1.0), 1.0)
+
+
+def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
     """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
-    return not cause.from_audit and rest.sigma > max(cause.strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+    return rest.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+
+
+def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
+    """Whether any alternatives could leave the name likely enough: else they need not be sought."""
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    best = max(
+        confidence(claim_features(found.fit, found.accepted, name, rest, loss, total), calibration.WEIGHTS)
+        for loss in (1.0, NO_RIVAL)
+    )
+    return best >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+
+
+def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Alternatives of the causes `asked` about, tried on the first part of every segment."""
+    if not asked:
+        return {}
+    record, layout = found.record, found.layout
+    part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
+    setting = setting_for(found.setting, part)
+    return alternatives(part_fit, found.accepted, part, layout, setting, noise, record.samples, excluded, asked)
 
 
 def _cause(
     found: Found, name: str, rest: Leftover, rivals: Mapping[str, float], noise: Noise, excluded: Sequence[str],
+    doubt: float,
 ) -> Cause:
     gain = found.gains[name]
     count = float(found.fit.normal.count.sum())
@@ -171,8 +199,8 @@ def _cause(
     if name == "rotor_skin_effect" and _is_iron_like(found):
         fixed = ("iron_loss",)
     close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain))
-    features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=1e6), total)
-    sure = confidence(features, calibration.WEIGHTS)
+    features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=NO_RIVAL), total)
+    sure = confidence(features, calibration.WEIGHTS) * doubt
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
     return Cause(
@@ -228,13 +256,24 @@ def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[st
     return out
 
 
+def _doubt(rest: Leftover, share: float) -> float:
+    """Factor on every confidence where what is left is small, yet more than noise makes around the tones, and a larger
+
+    part of all there was to explain than a right name leaves: 1 at the most that one may leave.
+    """
+    is_trace = rest.from_tones_sigma > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
+
+
 def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
     return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)
 
 
-def _verdict(causes: Sequence[Cause], rest: Leftover, share: float, noise: Noise) -> tuple[Verdict, str]:
-    if rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE) or (
-        not any(not c.from_audit for c in causes) and rest.sigma > MOSTLY_EXPLAINED_SIGMA
+def _verdict(causes: Sequence[Cause], rest: Leftover, share: float, leaves_a_trace: bool) -> tuple[Verdict, str]:
+    fitted = any(not c.from_audit for c in causes)
+    if (
+        rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
+        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
@@ -278,12 +317,20 @@ def _limits(found: Found) -> dict[str, float]:
     return out
 
 
-class _MixedMotors(Exception):
-    """The files are not of one motor in one state."""
+class _Refused(Exception):
+    """The data cannot carry an answer: not of one motor in one state, or no answer to the command."""
 
 
-def _one_motor(nominal: Fit, record: Record) -> None:
-    """Before the search: a leakage that differs by half between files is no effect of level."""
+def _before_search(nominal: Fit, record: Record, noise: Noise) -> None:
+    """The currents answer the command at all; and a leakage that differs by half between files is no effect of level."""
+    count = float(nominal.normal.count.sum())
+    white = (whiten(s.currents_a, s.is_good, noise, record.facts.sample_period_s) for s in record.segments)
+    flowing = sum(float(w @ w) for w in white) - count
+    if nominal.chi2 - count > MOST_UNANSWERED * flowing > FAINT * count:
+        raise _Refused(
+            f"the command explains only {max(1.0 - (nominal.chi2 - count) / flowing, 0.0):.0%} of the current's power: "
+            "voltage and current do not belong together, or something else drives the motor"
+        )
     _compare_files(nominal, record, slice(2, 3), 0.4)
 
 
@@ -305,7 +352,7 @@ def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> No
     names = ("R_s", "R_R", "L_sigma", "L_M")
     worst = which.start + int(np.argmax(spread[which]))
     if spread[worst] > most:
-        raise _MixedMotors(
+        raise _Refused(
             f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
             f"(fitted together: {fitted.model.nominal[worst]:.4g}); diagnose them one by one"
         )

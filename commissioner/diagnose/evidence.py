@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, whiten
+from commissioner.diagnose.fit import Fit, bounded_step, fit, limits
+from commissioner.diagnose.leftover import Leftover
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
@@ -21,43 +22,6 @@ Array = NDArray[np.float64]
 TIE_CHI2 = 10.0
 ALTERNATIVE_SHARE = 0.9
 """An alternative is refitted only if it promises this share of the cause's own gain."""
-
-
-@dataclass(frozen=True)
-class Leftover:
-    """Structured error after the fit, in units of the noise rms; 0 where the noise explains everything."""
-
-    sigma: float
-    from_power_sigma: float
-    from_lines_sigma: float
-    strongest_hz: float
-
-
-def leftover(model: Model, record: Record, layout: Layout, noise: Noise, numbers: int) -> Leftover:
-    """Two measures, the larger one counts: total power above the noise (beyond three standard errors of the noise
-    estimate), and power in single frequencies that noise would not show once in a thousand recordings."""
-    power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
-    for k, segment in enumerate(record.segments):
-        residual = segment.currents_a - predict(model, record, k, layout).currents_a
-        white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
-        power += float(white @ white)
-        count += int(segment.is_good.sum()) * record.facts.phases
-        period = record.facts.sample_period_s
-        n = segment.count
-        masked = np.where(segment.is_good, residual, 0.0)
-        spectrum = np.abs(np.fft.rfft(masked, axis=1)[:, 1:]) ** 2 / n / noise.weights(n, period)[:, 1:] ** 2
-        limit = np.log(spectrum.size * len(record.segments)) + 7.0
-        high = spectrum > limit
-        line_power += 2.0 * float((spectrum[high] - 1.0).sum())
-        if high.any():
-            _, column = np.unravel_index(int(np.argmax(spectrum)), spectrum.shape)
-            if float(spectrum.max()) > strongest[0]:
-                strongest = (float(spectrum.max()), float(np.fft.rfftfreq(n, period)[1:][column]))
-    excess = power / max(count - numbers, 1) - 1.0
-    doubt = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
-    by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
-    by_lines = float(np.sqrt(line_power / count))
-    return Leftover(max(by_power, by_lines), by_power, by_lines, strongest[1])
 
 
 @dataclass(frozen=True)
@@ -113,14 +77,14 @@ def _without_segment(one: Fit, k: int, layout: Layout) -> Model:
 
 def alternatives(
     found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
-    excluded: Sequence[str] = (),
+    excluded: Sequence[str], asked: Sequence[str],
 ) -> dict[str, dict[str, float]]:
-    """For every accepted cause: what of the rest (but for `excluded`) takes its place, with the loss in chi2 scaled to
+    """For every accepted cause that is `asked` about: what of the rest (but for `excluded`) takes its place, with the
 
-    the whole recording.
+    loss in chi2 scaled to the whole recording.
     """
     out: dict[str, dict[str, float]] = {}
-    for name in accepted:
+    for name in asked:
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
         gain = without.chi2 - found.chi2
         absent = [n for n in CATALOGUE if n not in accepted and n not in excluded]

@@ -7,7 +7,7 @@ are a subtraction.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,11 @@ def normal_equations(
         return total
 
     def of_segment(k: int) -> tuple[Array, Array, float, int]:
+        # a trial step may be far too long, and the setting of the caller's thread does not hold in another
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return _of_segment(k)
+
+    def _of_segment(k: int) -> tuple[Array, Array, float, int]:
         segment = record.segments[k]
         here = [c for c, term in enumerate(wanted) if term.segment in (-1, segment.uid)]
         rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
@@ -188,10 +193,12 @@ def fit(
     """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance, or
 
     less than a trifle of what the noise does not explain: a model that lacks a cause need not fit to the last digit. Gives
-    up where `wanted_chi2` is out of reach.
+    up where `wanted_chi2` is out of reach. A start that runs away on this record comes back with an infinite chi2.
     """
     damping = 1e-9
     normal = normal_equations(model, record, layout, model.terms, noise)
+    if not np.isfinite(normal.total_gram).all():
+        return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)
     for done in range(rounds):
         enough = max(tolerance, TRIFLE * (normal.total_chi2 - float(normal.count.sum())))
         low, high = limits(model, layout)
@@ -206,8 +213,7 @@ def fit(
                 return Fit(model, normal, False, done)
             trial = model.moved(theta + step)
             # the tangent costs little beside the trajectory: not worth looking at chi2 first
-            with np.errstate(over="ignore", invalid="ignore"):
-                there = normal_equations(trial, record, layout, trial.terms, noise)
+            there = normal_equations(trial, record, layout, trial.terms, noise)
             if np.isfinite(there.total_gram).all() and there.total_chi2 < normal.total_chi2:
                 improved = True
                 break

@@ -25,6 +25,8 @@ SLOW_BINS = 6.0
 """Below so many bins of the shortest noise record the window smears the spectrum; the power law takes over."""
 SLOW_MARGIN = 1.6
 """Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
+RESOLVED = 1e-6
+"""Share of the current's peak below which nothing counts: no sensor is so good, nor is the model stepped more finely."""
 COARSE_ROUNDING = 0.7
 WHITE_WITHIN = 0.12
 """A spectrum flat within this fraction everywhere is taken as white (whitening then costs nothing)."""
@@ -211,6 +213,7 @@ def _noise(
         power.append(spectrum[:, 2:])
     f, p = np.concatenate(frequency), np.concatenate(power, axis=1)
     top = 0.5 / period
+    least = (RESOLVED * record.facts.current_peak_a) ** 2
     edges = np.geomspace(max(float(f.min()), 1e-3), top * 1.0001, _bin_count(float(f.min()), top))
     which = np.digitize(f, edges)
     centres, density = [], []
@@ -218,9 +221,13 @@ def _noise(
         inside = which == k
         if inside.sum() >= 12:
             centres.append(float(np.sqrt(edges[k - 1] * edges[k])))
-            density.append(np.quantile(p[:, inside], quantile, axis=1) / correction)
+            density.append(np.maximum(np.quantile(p[:, inside], quantile, axis=1) / correction, least))
     level = np.array(density).T
-    white = np.array([_level(p[c], quantile) for c in range(phase_count)])
+    white = np.array([_level(p[c], quantile) if p[c].max() > least else 0.0 for c in range(phase_count)])
+    if white.max() < least:
+        flat = np.ones((phase_count, 2))
+        return Noise(np.full(phase_count, np.sqrt(least)), np.array([1.0, top]), flat, source, is_known, 0.0, True, listed)
+    white = np.maximum(white, least)
     relative = level / white[:, None]
     at = np.array(centres)
     low_f, low_level, is_rising = _power_law(f, p / white[:, None])

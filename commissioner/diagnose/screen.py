@@ -95,6 +95,9 @@ def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...
     """Scores from normal equations whose columns are the model's numbers, then the candidates' in order."""
     gram, slope = normal.total_gram, normal.total_slope
     active = 4 + len(model.terms)
+    if not np.isfinite(gram[:active, :active]).all():
+        # a fitted machine faster than the steps can follow: nothing can be said about what it lacks
+        return Screening({}, np.zeros((0, 0)), np.zeros(0), {}, normal)
     root = _inverse_root(gram[:active, :active])
     reduced = root @ gram[:active, active:]
     projected = gram[active:, active:] - reduced.T @ reduced

@@ -128,7 +128,11 @@ def search(
         first, record = search_small.first, search_small.full
         model = _without_curves(_completed(fitted.model, accepted, setting))
     whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record, go_on)
-    start = whole.with_new_flux_before(whole.relayout(fit(model, record, layout, noise)))
+    completed = fit(model, record, layout, noise)
+    if not np.isfinite(completed.chi2):
+        # what fitted the part runs away beyond it
+        completed, accepted = fit(nominal.model, record, layout, noise), ()
+    start = whole.with_new_flux_before(whole.relayout(completed))
     fitted, accepted, last = whole.run(start, accepted)
     first = first or whole.first or last
     if accepted and not losses and "lost_samples" not in excluded:
@@ -302,7 +306,7 @@ class _Search:
         record = full.subset(tuple(range(len(full.segments))), max(s.count for s in self.record.segments))
         old = np.array([s.flux_before_wb for s in self.record.segments])
         new = np.array([s.flux_before_wb for s in record.segments])
-        if np.abs(new - old).max() < 1e-3 * np.abs(new).max():
+        if not np.isfinite(new).all() or np.abs(new - old).max() < 1e-3 * np.abs(new).max():
             return current
         self.full, self.record, self.setting = full, record, replace(self.setting, record=record)
         return fit(current.model, record, self.layout, self.noise)
@@ -314,9 +318,11 @@ class _Search:
         iron, leak = fresh.iron_top_wb / self.layout.iron_top_wb, fresh.leak_top_wb / self.layout.leak_top_wb
         if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
             return current
-        self.layout = fresh
-        self.setting = replace(self.setting, layout=self.layout, iron_flux_wb=flux)
-        return fit(_without_curves(current.model), self.record, self.layout, self.noise)
+        again = fit(_without_curves(current.model), self.record, fresh, self.noise)
+        if not np.isfinite(again.chi2):
+            return current
+        self.layout, self.setting = fresh, replace(self.setting, layout=fresh, iron_flux_wb=flux)
+        return again
 
     def gains(self, fitted: Fit, accepted: Sequence[str]) -> dict[str, float]:
         """Delta chi2 of each accepted effect, the others free (linear, at the fit)."""

@@ -143,9 +143,14 @@ def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="tones on both sides of the corner, 20 Hz to 1 kHz",
 )
 def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
-    """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners fixed at 40, 120 and 400 Hz."""
+    """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners fixed from 12 to 800 Hz, a factor 2 apart.
+
+    No branch carries more than a hundred times the motor's own conductance: a bar's resistance rises tenfold at most.
+    """
+    # the box ends at 6 times the resistance seen at the tones (`nominal.bare_layout`)
+    largest = 600.0 / setting.layout.nominal_box[1][1] if np.isfinite(setting.layout.nominal_box[1][1]) else np.inf
     return tuple(
-        Term("rotor_skin_effect", f"branch_{k}", "S", kinds.BRANCH, k, 0.01, 0.0, np.inf)
+        Term("rotor_skin_effect", f"branch_{k}", "S", kinds.BRANCH, k, 0.01, 0.0, largest)
         for k in range(setting.layout.branch_time_s.size)
     )
 

@@ -10,10 +10,10 @@ from tests.unit.diagnose.conftest import recording
 
 
 def measured(noise=0.01, seed=3, **about):
-    """A recording whose currents follow the command through a resistance, with noise."""
+    """A recording whose currents follow the command through a resistance along each axis, with noise."""
     blank = recording(**about)
     random = np.random.default_rng(seed)
-    shape = np.array([[1.0], [-0.5], [-0.5]])
+    shape = np.cos(np.deg2rad(np.array([[0.0], [120.0], [240.0]]) - blank.axis_deg))
     rows = 0.1 * shape * blank.voltage_axis_v + noise * random.standard_normal((3, blank.time_s.size))
     return replace(blank, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])
 

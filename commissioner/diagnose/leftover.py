@@ -1,0 +1,103 @@
+"""What is left of the error after the fit, judged against the measured noise: in all, line by line, and around the tones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammainccinv
+
+from commissioner.diagnose.fit import whiten
+from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import predict
+from commissioner.diagnose.record import Record
+
+Array = NDArray[np.float64]
+TONE_BINS, BESIDE_BINS = 3, 25
+"""A tone is read with so many bins on each side; what the noise is there, from the bins beyond, up to so many."""
+ONCE_IN = 1e-9
+"""Chance with which noise alone may exceed the limit of one tone."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Structured error after the fit, in units of the noise rms; 0 where the noise explains everything."""
+
+    sigma: float
+    from_power_sigma: float
+    from_lines_sigma: float
+    from_tones_sigma: float
+    strongest_hz: float
+
+
+def leftover(
+    model: Model, record: Record, layout: Layout, noise: Noise, numbers: int, tones_hz: Sequence[float] = ()
+) -> Leftover:
+    """Three measures, the largest counts: total power above the noise (beyond three standard errors of the noise
+
+    estimate), power in single frequencies that noise would not show once in a thousand recordings, and power around
+    each excited tone, all segments and phases together, where what a model misses piles up first.
+    """
+    power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
+    around: list[list[_Around]] = [[] for _ in tones_hz]
+    for k, segment in enumerate(record.segments):
+        residual = segment.currents_a - predict(model, record, k, layout).currents_a
+        white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
+        power += float(white @ white)
+        count += int(segment.is_good.sum()) * record.facts.phases
+        period = record.facts.sample_period_s
+        n = segment.count
+        masked = np.where(segment.is_good, residual, 0.0)
+        spectrum = np.abs(np.fft.rfft(masked, axis=1)[:, 1:]) ** 2 / n / noise.weights(n, period)[:, 1:] ** 2
+        limit = np.log(spectrum.size * len(record.segments)) + 7.0
+        high = spectrum > limit
+        line_power += 2.0 * float((spectrum[high] - 1.0).sum())
+        for rows, one in zip(around, _around_tones(spectrum, n * period, tones_hz), strict=True):
+            rows.append(one)
+        if high.any():
+            _, column = np.unravel_index(int(np.argmax(spectrum)), spectrum.shape)
+            if float(spectrum.max()) > strongest[0]:
+                strongest = (float(spectrum.max()), float(np.fft.rfftfreq(n, period)[1:][column]))
+    excess = power / max(count - numbers, 1) - 1.0
+    doubt = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
+    by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
+    by_lines = float(np.sqrt(line_power / count))
+    by_tones = float(np.sqrt(2.0 * sum(_excess(rows, noise.uncertainty) for rows in around) / count))
+    return Leftover(max(by_power, by_lines, by_tones), by_power, by_lines, by_tones, strongest[1])
+
+
+@dataclass(frozen=True)
+class _Around:
+    """Power in `bins` bins around a tone in units of the noise's, and the mean of `beside` bins next to them."""
+
+    power: float
+    bins: int
+    beside_power: float
+    beside: int
+
+
+def _around_tones(spectrum: Array, seconds: float, tones_hz: Sequence[float]) -> list[_Around]:
+    """`spectrum` (phases, k) of the bins 1, 2, ... in units of the noise's."""
+    bins = np.arange(1, spectrum.shape[1] + 1)
+    far = np.array([np.abs(bins - round(f * seconds)) for f in tones_hz]).reshape(len(tones_hz), bins.size)
+    is_tone = far <= TONE_BINS
+    beside = (far <= BESIDE_BINS) & ~is_tone.any(axis=0)
+    return [
+        _Around(float(spectrum[:, at].sum()), spectrum[:, at].size, float(spectrum[:, by].sum()), spectrum[:, by].size)
+        for at, by in zip(is_tone, beside, strict=True)
+    ]
+
+
+def _excess(rows: Sequence[_Around], uncertainty: float) -> float:
+    """Power around one tone beyond the noise, measured or beside the tone, if chance does not make it (else 0)."""
+    power, bins = sum(r.power for r in rows), sum(r.bins for r in rows)
+    beside = sum(r.beside for r in rows)
+    if not bins:
+        return 0.0
+    level = max(sum(r.beside_power for r in rows) / beside, 1.0) if beside else 1.0
+    doubt = uncertainty + (1.0 / np.sqrt(beside) if beside else 0.0)
+    limit = level * (float(gammainccinv(bins, ONCE_IN)) + 3.0 * doubt * bins)
+    return power - level * bins if power > limit else 0.0

@@ -1,0 +1,94 @@
+"""Recordings that are no answer of a motor at rest are refused by name; what is only odd is diagnosed without a crash."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.audit import prepare
+from commissioner.diagnose.diagnosis import diagnose
+from commissioner.diagnose.leftover import leftover
+from commissioner.diagnose.noise import measure_noise
+from commissioner.diagnose.plant import predict
+from tests.unit.diagnose.conftest import recording
+
+
+@pytest.fixture(scope="module")
+def plain(setting, nominal):
+    """The conftest machine as a recording with white noise."""
+    record, layout = setting.record, setting.layout
+    currents = np.concatenate([predict(nominal, record, k, layout).currents_a for k in range(3)], axis=1)
+    noise = 0.01 * np.random.default_rng(5).standard_normal(currents.shape)
+    return recording(currents=currents + noise)
+
+
+def turning(source):
+    angle = 2.0 * np.pi * 48.3 * source.time_s
+    rows = [5.0 * np.sin(angle - k * 2.0944) for k in range(3)]
+    return replace(
+        source, current_u_a=source.current_u_a + rows[0], current_v_a=source.current_v_a + rows[1],
+        current_w_a=source.current_w_a + rows[2],
+    )  # fmt: skip
+
+
+def scaled(source, u, v, w):
+    return replace(source, current_u_a=u * source.current_u_a, current_v_a=v * source.current_v_a,
+                   current_w_a=w * source.current_w_a)  # fmt: skip
+
+
+REFUSED = {
+    "phase v stands still": lambda r: scaled(r, 1.0, 0.0, 1.0),
+    "against the voltage": lambda r: scaled(r, -1.0, -1.0, -1.0),
+    "does not follow the excited axis": turning,
+    "do not belong together": lambda r: replace(
+        r, voltage_axis_v=np.random.default_rng(1).permutation(r.voltage_axis_v)
+    ),
+}
+
+
+@pytest.mark.parametrize("reason", REFUSED)
+def test_what_no_motor_at_rest_can_answer_is_refused_by_name(plain, reason):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        seen = diagnose([REFUSED[reason](plain)])
+    assert seen.verdict.value == "refused"
+    assert reason in seen.reason
+
+
+ODD = {
+    "no noise at all": lambda r: r,
+    "microamperes": lambda r: scaled(r, 1e-6, 1e-6, 1e-6),
+    "a third of a second": lambda r: replace(
+        r, **{n: getattr(r, n)[:1650] for n in ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a",
+                                                 "current_v_a", "current_w_a", "dc_link_v")}
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_an_odd_recording_ends_in_a_verdict_with_finite_numbers(plain, setting, nominal, kind):
+    source = plain
+    if kind == "no noise at all":
+        record, layout = setting.record, setting.layout
+        source = recording(
+            currents=np.concatenate([predict(nominal, record, k, layout).currents_a for k in range(3)], axis=1)
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        seen = diagnose([ODD[kind](source)])
+    assert seen.causes == ()
+    assert all(np.isfinite(q.value) and np.isfinite(q.std) for q in seen.parameters_after.values())
+    assert seen.verdict.value == "nothing_significant"
+
+
+def test_a_weak_structure_around_the_tones_is_seen_and_noise_is_not(plain, setting, nominal):
+    """A tenth of a per cent too much resistance: a fifteenth of the noise in all, and plainly there at the lowest tone."""
+    record, audit = prepare([plain])
+    noise = measure_noise(record)
+    layout = setting.layout
+    r_s, r_r, l_sigma, l_m = nominal.nominal
+    wrong = replace(nominal, nominal=(1.0013 * r_s, r_r, l_sigma, l_m))
+    right, missed = (leftover(m, record, layout, noise, 4, audit.excited_hz) for m in (nominal, wrong))
+    assert right.sigma == right.from_tones_sigma == 0.0
+    assert 0.02 < missed.from_tones_sigma < 0.3
