@@ -167,7 +167,7 @@ class Inverter:
         self.port.read_retries = 0
         self._go(SHUTDOWN, DriveState.READY_TO_SWITCH_ON)
         self._go(SWITCH_ON, DriveState.SWITCHED_ON)
-        self.journal(Intent(Action.ENERGISE, {"control_word": ENABLE, **self._signal}))
+        self.journal(self.energising())
         self._go(ENABLE, DriveState.OPERATION_ENABLED)
         session = int(self._items.read_number("session_id"))
         if session == before.session:
@@ -176,6 +176,10 @@ class Inverter:
                 limit="a session number that differs from the one before", remedy="check the drive's firmware",
             )
         return StreamCursor(stream(session))
+
+    def energising(self) -> Intent:
+        """What `enable` announces: all of the signal that is loaded."""
+        return Intent(Action.ENERGISE, {"control_word": ENABLE, **self._signal})
 
     def fetch(self, cursor: StreamCursor) -> Window:
         """The next samples, and the watchdog fed, in one transaction. `block` is None where none is ready yet.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import traceback
 from contextlib import suppress
 
-from commissioner.errors import CommissionerError, DriveFault, UsageError
+from commissioner.errors import CommissionerError, DriveFault, UsageError, WriteBackFailed
 from commissioner.link.facts import DisarmReport
 from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
@@ -36,6 +36,15 @@ def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
     return CommissionerError(
         f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
         remedy="please report it with the run folder",
+    )  # fmt: skip
+
+
+def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:
+    """The disk took no more in the middle of a write-back or a restore."""
+    lost = archive_lost(folder.path, failure, "; the drive holds its old or its new parameters")
+    return WriteBackFailed(
+        lost.what, step=lost.step, value=lost.value, limit=lost.limit,
+        remedy="make room, then `commissioner restore` this run",
     )  # fmt: skip
 
 

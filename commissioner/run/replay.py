@@ -1,4 +1,5 @@
-"""Feed an archived run through the pure layers again: the same answers must lead to the same decisions, bit for bit."""
+"""Feed an archived run through the pure layers again: the same answers must lead to the same decisions, the same commands
+and the same result, bit for bit."""
 
 from __future__ import annotations
 
@@ -10,11 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import CommissionerError, DataRefused
+from commissioner.link.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
+from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, WrittenParameter
+from commissioner.report.summary import summarise
+from commissioner.run.acting import Announcer
 from commissioner.run.archive import damaged, plain, read_blocks, read_journal, read_saved
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask
@@ -53,15 +58,43 @@ def replay(folder: Path) -> Replayed:
     journal = read_journal(folder / "journal.jsonl")
     _check_whole(folder, journal)
     job = read_job(folder, journal)
-    archived = [_decision(line["kind"], line["record"]) for line in journal if line["kind"] in _DECISIONS]
-    if not archived:
+    if not any(line["kind"] in _DECISIONS for line in journal):
         raise damaged(folder, "journal.jsonl", "no decision behind the job")
+    archived = [_decision(line["kind"], line["record"]) for line in journal if _is_compared(line)]
+    announcer = Announcer(load_profile(read_saved(folder, "request.json", "profile")["profile"]))
     kinds = {line["kind"] for line in journal}
     is_by_itself = "run_ended" in kinds and "error" not in kinds
     if is_by_itself:
         archived += [_end(line["record"]) for line in journal if line["kind"] == "run_ended"]
-    replayed = list(_decide_again(job, Findings(), journal, folder, with_end=is_by_itself))
+    findings = Findings()
+    replayed = list(_decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself))
+    if is_by_itself and (folder / "result.json").is_file():
+        ended = _ended(folder, next(line["record"] for line in journal if line["kind"] == "run_ended"))
+        formed = summarise(findings, ended, folder.name, job.parameter_names)
+        archived += _result(read_saved(folder, "result.json"), formed)
+        replayed += _result(formed, formed)
     return Replayed(len(archived), _first_difference(archived, replayed, may_go_on=not is_by_itself))
+
+
+def _is_compared(line: Mapping[str, Any]) -> bool:
+    """Decisions, and what was announced as their commands were carried out; what the link adds to a command is not."""
+    if line["kind"] != "about_to":
+        return line["kind"] in _DECISIONS
+    record = line["record"] if isinstance(line["record"], dict) else {}
+    if record.get("action") == "prepare":
+        return not {"mode", "control_word"} & set(record.get("values") or ())
+    return record.get("action") in ("steer", "energise")
+
+
+def _result(document: Mapping[str, Any], formed: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What of a result stands in the run: not the folder's name, nor what a diagnosis added afterwards."""
+    kept = {**_as_read(document), "remarks": _as_read(document.get("remarks") or ())[: len(formed["remarks"])]}
+    return [_decision("result", {key: value for key, value in kept.items() if key not in ("run", "diagnosis")})]
+
+
+def _as_read(value: Any) -> Any:
+    """As it is read back from a file."""
+    return json.loads(json.dumps(plain(value)))
 
 
 def _check_whole(folder: Path, journal: list[dict[str, Any]]) -> None:
@@ -73,6 +106,13 @@ def _check_whole(folder: Path, journal: list[dict[str, Any]]) -> None:
     for number, line in enumerate(journal):
         if line.get("n") != number:
             raise damaged(folder, path.name, f"record {line.get('n')} where {number} belongs")
+
+
+def _ended(folder: Path, record: Any) -> RunEnded:
+    try:
+        return RunEnded(**record)
+    except TypeError as error:
+        raise damaged(folder, "journal.jsonl", f"its end: {error}") from error
 
 
 def _end(record: Any) -> dict[str, Any]:
@@ -112,12 +152,13 @@ _DECISIONS = frozenset(
 )  # fmt: skip
 
 
-def _decision(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
+def _decision(kind: str, record: object) -> dict[str, Any]:
     return {"kind": kind, "record": record}
 
 
 def _decide_again(
-    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path, *, with_end: bool = False
+    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path,
+    announcer: Announcer | None = None, *, with_end: bool = False,
 ) -> Iterator[dict[str, Any]]:
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
     blocks = (block for _, block in read_blocks(folder / "blocks.bin"))
@@ -126,7 +167,9 @@ def _decide_again(
         while True:
             command = steps.send(reply)
             if isinstance(command, ask.Tell):
-                yield json.loads(json.dumps(_decision(kind_of(command.record), plain(command.record))))
+                yield _as_read(_decision(kind_of(command.record), command.record))
+            for intent in announcer.announced(command) if announcer else ():
+                yield _as_read(_decision("about_to", intent))
             reply = _answer(command, replies, blocks)
     except StopIteration as stop:
         if with_end:

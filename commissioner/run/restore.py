@@ -19,6 +19,7 @@ from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive import RunFolder, damaged, read_journal, read_saved
 from commissioner.run.catalogue import RunSummary
+from commissioner.run.ending import note, write_lost
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.replay import read_snapshot
 
@@ -64,8 +65,11 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
             present = inverter.snapshot().in_use
             _check_known(present, snapshot, profile, lines)
-            report = inverter.restore(snapshot, present)
-        journal.journal("snapshot_restored", report, durable=True)
+            try:
+                report = inverter.restore(snapshot, present)
+            except OSError as failure:
+                raise write_lost(failure, journal) from failure
+        note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
     return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)
 
 

@@ -16,8 +16,9 @@ from commissioner.link.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
-from commissioner.run.archive import RunFolder, archive_lost
-from commissioner.run.ending import as_error, ended_by, let_go, note, taken_as_live
+from commissioner.run.acting import set_up
+from commissioner.run.archive import RunFolder
+from commissioner.run.ending import as_error, ended_by, let_go, note, taken_as_live, write_lost
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -32,7 +33,6 @@ TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
 
 JUDGED_REPLIES = (ask.Identify, ask.ReadNameplate, ask.ReadStatus, ask.TakeSnapshot, ask.WriteParameters)
 """What a course decides upon besides the samples: kept, so that `replay` can decide again."""
-CHANNELS = ("voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
 
 Course = Generator[ask.Command, Any, RunEnded]
 Present = Callable[[object], None]
@@ -160,22 +160,11 @@ class Runner:
         return None
 
     def _act(self, command: ask.Command) -> None:
-        inverter = self._inverter
         match command:
             case ask.Tell(record=record):
                 self._tell(record)
-            case ask.SetScale(scale=scale):
-                inverter.set_scale(scale)
-            case ask.SetBias(bias_v=bias):
-                inverter.set_bias(bias)
             case ask.Wait(seconds=seconds):
                 time.sleep(seconds)
-            case ask.ArmWatchdog(timeout_s=timeout):
-                inverter.set_watchdog(1000 * timeout)
-            case ask.SetDriveLimits(current_a=current, voltage_v=voltage, time_s=limit):
-                inverter.set_limits(current_a=current, voltage_v=voltage, time_s=limit)
-            case ask.LoadExcitation():
-                self._load(command)
             case ask.Enable():
                 self._enable()
             case ask.Disarm(reason=reason):
@@ -184,19 +173,7 @@ class Runner:
                     raise live
                 self._stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
-                raise TypeError(f"no such command: {command!r}")
-
-    def _load(self, command: ask.LoadExcitation) -> None:
-        self._inverter.load_excitation(
-            axis_deg=command.axis_deg,
-            tones=command.tones,
-            bias_v=0.0,
-            bias_ramp_v_per_s=command.bias_ramp_v_per_s,
-            scale=0.0,
-            scale_ramp_per_s=command.scale_ramp_per_s,
-            duration_s=command.duration_s,
-            channels=CHANNELS,
-        )
+                set_up(self._inverter, command)
 
     def _take_snapshot(self) -> ParameterSnapshot:
         self._snapshot = self._inverter.snapshot()
@@ -212,11 +189,7 @@ class Runner:
                 self._folder.journal("snapshot_restored", failed.as_dict(), durable=True)
             raise
         except OSError as failure:
-            lost = archive_lost(self._folder.path, failure, "; the drive holds its old or its new parameters")
-            raise WriteBackFailed(
-                lost.what, step=lost.step, value=lost.value, limit=lost.limit,
-                remedy="make room, then `commissioner restore` this run",
-            ) from failure
+            raise write_lost(failure, self._folder) from failure
         self._progress.has_written = True
         self._folder.journal("parameters_written", report, durable=True)
         facts = (report.store_count_after, report.wear_fraction, report.is_stored)

@@ -83,7 +83,7 @@ def test_a_changed_sample_is_reported(fresh, tmp_path, at):
 def test_a_changed_decision_is_reported_as_itself(fresh, tmp_path, kind):
     folder = copy(fresh, tmp_path)
     lines = (folder / "journal.jsonl").read_text().splitlines()
-    decisions = [k for k, line in enumerate(lines) if json.loads(line)["kind"] in replaying._DECISIONS]
+    decisions = [k for k, line in enumerate(lines) if replaying._is_compared(json.loads(line))]
     number = next(n for n, k in enumerate(decisions) if json.loads(lines[k])["kind"] == kind)
     changed = json.loads(lines[decisions[number]])
     key = next(iter(changed["record"]))
@@ -113,7 +113,7 @@ def test_a_folder_without_a_job_is_refused(tmp_path):
 def copy(run, target):
     folder = target / "copy"
     folder.mkdir()
-    for name in ("journal.jsonl", "blocks.bin"):
+    for name in ("journal.jsonl", "blocks.bin", "request.json", "result.json"):
         (folder / name).write_bytes((run / name).read_bytes())
     return folder
 
@@ -142,6 +142,37 @@ def test_a_changed_end_is_reported(fresh, tmp_path):
 
     difference = replay(edit(copy(fresh, tmp_path), change)).difference
     assert difference is not None and difference.archived["kind"] == "run_ended"
+
+
+@pytest.mark.parametrize(("action", "key"), [("prepare", "watchdog_ms"), ("energise", "tones"), ("steer", "amplitude_scale")])
+def test_a_command_that_was_carried_out_otherwise_is_reported(fresh, tmp_path, action, key):
+    was_changed = []
+
+    def change(line):
+        values = line["record"].get("values", {}) if line["kind"] == "about_to" else {}
+        if not was_changed and key in values and line["record"]["action"] == action:
+            was_changed.append(values[key])
+            values[key] = [99.0, *values[key][1:]] if isinstance(values[key], list) else values[key] + 0.25
+        return line
+
+    difference = replay(edit(copy(fresh, tmp_path), change)).difference
+    assert was_changed and difference.archived["kind"] == "about_to"
+    assert difference.archived["record"]["values"][key] != difference.replayed["record"]["values"][key]
+
+
+def test_a_changed_result_is_reported(fresh, tmp_path):
+    path = copy(fresh, tmp_path) / "result.json"
+    document = json.loads(path.read_text())
+    document["flux_guard"]["peak_fraction"] += 0.01
+    path.write_text(json.dumps(document))
+    assert replay(path.parent).difference.archived["kind"] == "result"
+
+
+def test_what_a_diagnosis_added_to_the_result_is_no_difference():
+    formed = {"run": "a", "remarks": ("one",), "diagnosis": None, "energised_s": 3.0}
+    saved = {"run": "b", "remarks": ["one", "more"], "diagnosis": {}, "energised_s": 3.0}
+    assert replaying._result(saved, formed) == replaying._result(formed, formed)
+    assert replaying._result(saved | {"energised_s": 4.0}, formed) != replaying._result(formed, formed)
 
 
 def test_a_record_taken_out_is_refused(fresh, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from commissioner.cli.archive import restore_run
-from commissioner.errors import DataRefused, IdentityMismatch, UsageError
+from commissioner.errors import DataRefused, IdentityMismatch, UsageError, WriteBackFailed
 from commissioner.link.drive_file import load_profile
 from commissioner.link.inverter import Inverter
 from commissioner.records import SampleBlock
@@ -168,3 +168,23 @@ def test_a_block_that_is_written_short_leaves_no_torn_record(bench):
     assert caught.value.errno == errno.ENOSPC
     bench.folder.append(replace(block, first_index=58), 0)
     assert [b.first_index for _, b in read_blocks(bench.folder.path / "blocks.bin")] == [0, 58]
+
+
+@pytest.mark.parametrize("full_at", ["commit", "store", "snapshot_restored"])
+def test_a_disk_that_fills_up_while_restoring_says_what_the_drive_may_hold(bench, monkeypatch, full_at):
+    bench.write()
+    journal = RunFolder.journal
+
+    def filling(folder, kind, record, *, durable=False):
+        if kind == full_at or (kind == "about_to" and record.action.name.lower() == full_at):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        journal(folder, kind, record, durable=durable)
+
+    monkeypatch.setattr(RunFolder, "journal", filling)
+    if full_at == "snapshot_restored":
+        assert bench.restore().written
+        assert bench.held() == bench.snapshot.in_use
+    else:
+        with pytest.raises(WriteBackFailed, match="old or its new parameters"):
+            bench.restore()
+    assert summarise(bench.folder.path).written.startswith("old or new")
