@@ -5,11 +5,13 @@ Findings are values; `Finding.stops` marks those after which there is no torque 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from commissioner.monitor import channels, clock, columns, levels
 from commissioner.monitor.findings import Audited, Finding, Fundamental
-from commissioner.monitor.sensors import trust_of
+from commissioner.monitor.sensors import evened, trust_of
 from commissioner.monitor.supply import (
     SupplyAngle,
     Vector,
@@ -64,11 +66,15 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     straight_v = [sign * voltages[k] for k, sign in zip(pairing.voltage_order, pairing.voltage_sign, strict=True)]
     i, v = _vectors(straight_i, straight_v, recording.voltages_are_line_to_line)
     supply = follow_supply(v, period, raw_frequency)
-    trust = trust_of(straight_i, straight_v, supply, period)
     fundamental = measure_fundamental(i, v, supply, period, pairing.runs_backwards)
     levels.switched_voltage(v, fundamental, findings)
     clock.hidden_jitter(v, supply, fundamental, period, findings)
     levels.plausible_size(fundamental, plate, findings)
+    even_i = evened(straight_i, True, supply, period)
+    even_v = evened(straight_v, recording.voltages_are_line_to_line, supply, period)
+    for even, kind in ((even_i, "current"), (even_v, "voltage")):
+        levels.unlike_gains(even.difference, kind, findings)
+    i, v = _vectors(even_i.signals, even_v.signals, recording.voltages_are_line_to_line)
     return Audited(
         low,
         float(recording.time_s[low]),
@@ -79,7 +85,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         fundamental,
         tuple(findings),
         pairing.channel_map,
-        trust,
+        trust_of(even_i, even_v, supply),
         pairing.lag_deg,
         pairing.rivals_deg,
     )
@@ -121,7 +127,7 @@ def _phasors(
     )
 
 
-def _vectors(currents: list[Signal], voltages: list[Signal], line_to_line: bool) -> tuple[Vector, Vector]:
+def _vectors(currents: Sequence[Signal], voltages: Sequence[Signal], line_to_line: bool) -> tuple[Vector, Vector]:
     star = phase_voltages(*voltages) if line_to_line else (voltages[0], voltages[1], voltages[2])
     i, v = space_vector(*currents), space_vector(*star)
     return i - i.mean(), v - v.mean()

@@ -1,9 +1,8 @@
 """Synchronous averaging: the part of the currents and voltages that repeats with a load, and how sure it is.
 
-`synchronous_average` is the method of Schantz & Leeb, (2) and (3). `separate` is what the chain uses: least squares of
-all combs at once over a Hann window. For one period that fits the record both give the same lines; where lines of two
-combs, or of a comb and a mains harmonic, lie a few resolution cells apart, only the joint fit keeps them apart, and its
-phases may follow a shaft whose speed wanders.
+Schantz & Leeb resample to whole points per period and average (2), (3). `separate` is least squares of all combs at once over a
+window: for one period that fits the record both give the same lines; where lines of two combs, or of a comb and a mains harmonic,
+lie a few resolution cells apart, only the joint fit keeps them apart, and its phases may follow a shaft whose speed wanders.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, linalg
+from scipy import linalg
 from scipy.signal import windows
 
 from commissioner.monitor.supply import TurningFrame, Vector
@@ -59,33 +58,6 @@ class Lines:
     supply_rad_per_s: float
     asymmetry: float = 0.0
     """Share of the mean that unlike sensors turn into a negative sequence."""
-
-
-def synchronous_average(signal: Vector, sample_period_s: float, period_s: float) -> Vector:
-    """One characteristic period, `(N_p,)`: resampled to f_sp = floor(f_s T_p) / T_p by zero padding, then averaged (2), (3).
-
-    The spectrum is evaluated on the finer grid by padding to the next multiple and band-limited interpolation of
-    `scipy.signal.resample`'s kind; the last, incomplete period is dropped.
-    """
-    points = max(int(np.floor(period_s / sample_period_s)), 8)
-    periods = int(signal.size * sample_period_s / period_s)
-    padded = _zero_padded(signal, 8)
-    fine_period = sample_period_s / 8
-    place = np.arange(points * periods) * (period_s / points) / fine_period
-    low = np.minimum(place.astype(np.int64), padded.size - 2)
-    part = place - low
-    sampled = padded[low] * (1 - part) + padded[low + 1] * part
-    return np.asarray(sampled.reshape(periods, points).mean(axis=0), dtype=np.complex128)
-
-
-def _zero_padded(signal: Vector, factor: int) -> Vector:
-    count = signal.size
-    spectrum = fft.fft(signal)
-    padded = np.zeros(factor * count, dtype=np.complex128)
-    half = count // 2
-    padded[: count - half] = spectrum[: count - half]
-    padded[-half:] = spectrum[-half:]
-    return np.asarray(fft.ifft(padded) * factor, dtype=np.complex128)
 
 
 def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders: int) -> Lines:

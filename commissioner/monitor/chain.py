@@ -19,7 +19,7 @@ from commissioner.monitor.fit import Fitted, Problem, Start
 from commissioner.monitor.mean_speed import whole_record_speed
 from commissioner.monitor.members import members_of, pole_count, with_wobble
 from commissioner.monitor.pairing_by_slip import better_order, shaft_search
-from commissioner.monitor.periods import Periodicity, ShaftSearch
+from commissioner.monitor.periods import Periodicity, ShaftSearch, slip_of
 from commissioner.monitor.proof import Proof, prove
 from commissioner.monitor.quiet import SEGMENT_S, quietest
 from commissioner.monitor.slow_slip import slip_phase
@@ -83,7 +83,7 @@ class Observation:
 
     @property
     def slip(self) -> float:
-        return 1 - self.segment_speed_rad_per_s * self.pole_pairs / self.lines.supply_rad_per_s
+        return slip_of(self.segment_speed_rad_per_s, self.lines.supply_rad_per_s, self.pole_pairs)
 
 
 @dataclass(frozen=True)

@@ -138,24 +138,11 @@ def _compare(torque: Signal, count: int, start: int) -> tuple[tuple[Signal, ...]
     return tuple(scaled), 100 * float(areas.max() - areas.min()), 100 * apart
 
 
-def negative_sequence_ratio(current_a: Vector, angle_rad: Signal) -> float:
-    """|I-| / |I+| of a current vector against the supply's angle, over a Hann window: 0 for a symmetric winding and mains."""
-    window = np.hanning(current_a.size + 2)[1:-1]
-    forward = abs(np.sum(window * current_a * np.exp(-1j * angle_rad)))
-    backward = abs(np.sum(window * current_a * np.exp(1j * angle_rad)))
-    return float(backward / max(forward, 1e-300))
-
-
 def negative_sequence_excess(fundamental: Fundamental, circuit: TCircuit, slip: float) -> float:
     """|I- - V- / Z-| / |I+|: the negative-sequence current that the mains' own unbalance does not explain."""
     impedance = stator_impedance(circuit, 2 * np.pi * fundamental.frequency_hz, 2 - slip)
     expected = fundamental.voltage_negative_v / impedance
     return float(abs(fundamental.current_negative_a - expected) / max(abs(fundamental.current_a), 1e-12))
-
-
-def slip_of(speed_rpm: float, supply_hz: float, pole_pairs: int) -> float:
-    """1 - n p / (60 f)."""
-    return 1 - speed_rpm / 60 * pole_pairs / supply_hz
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from commissioner.records import Signal
 
 LARGEST_CLIPPED = 0.002
 """Share of samples that sit on the same extreme value beyond what a sine would put there."""
+NOTED_GAIN = 0.01
 LEAST_CURRENT, LARGEST_CURRENT = 0.12, 3.0
 """Of the rated current: no motor idles on less, none runs in a steady state on more."""
 LARGEST_RIPPLE = 0.35
@@ -46,6 +47,24 @@ def channel_levels(currents: list[Signal], voltages: list[Signal], findings: lis
                         "use a larger range",
                     )
                 )
+
+
+def unlike_gains(difference: Signal, kind: str, findings: list[Finding]) -> None:
+    """Says so where the gains of three channels, whose sum should be zero, were made alike by more than a per cent."""
+    largest = float(np.abs(difference).max())
+    if largest > NOTED_GAIN:
+        findings.append(
+            Finding(
+                "unlike_gains",
+                "corrected",
+                f"the {kind}s do not sum to zero: their gains were taken to differ by "
+                + ", ".join(f"{100 * d:+.1f}" for d in difference)
+                + " % from their mean",
+                largest,
+                NOTED_GAIN,
+                f"calibrate the {kind} sensors against each other",
+            )
+        )
 
 
 def clipped_share(signal: Signal) -> float:

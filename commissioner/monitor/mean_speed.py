@@ -18,6 +18,8 @@ from commissioner.records import Signal
 WANDER_KNOWN = 0.1
 """Relative error of the slip's wander as the fitted circuit computes it: right in the segment, it carries saturation and warmth
 to other loads."""
+SHIFT_KNOWN = 0.05
+"""Relative error of the difference between the segment's speed and that of everything, followed: a load that steps has corners."""
 UNSEEN = 0.01
 """Share of a recording cut at its end: the mean frequency of the rest differs by that share of its wander."""
 
@@ -54,6 +56,7 @@ def whole_record_speed(
     rest, own = told_apart(straight, everything, [_over_all(one, pace) for one in (shaft, *found.loads)])
     demodulated = tracking.demodulate(rest + own[0], time, phase, orders, blocks)
     drift = tracking.track(demodulated, int(np.clip(length / 4, 2, 16)))
+    std = float(np.hypot(std, SHIFT_KNOWN * (speed - ratio * mean_supply(frame, everything))))
     return speed + drift.mean_rad_per_s, float(np.hypot(std, DRIFT_KNOWN * drift.mean_rad_per_s))
 
 

@@ -110,6 +110,11 @@ def find_peaks_above(
     return found
 
 
+def slip_of(shaft_hz: float, supply_hz: float, pole_pairs: int) -> float:
+    """1 - p n / f."""
+    return 1 - shaft_hz * pole_pairs / supply_hz
+
+
 @dataclass(frozen=True)
 class ShaftSearch:
     """Where the shaft line can be: pole pairs, supply frequency, and the slip that the operating point suggests."""
@@ -125,7 +130,7 @@ class ShaftSearch:
 
     def log_prior(self, frequency_hz: float) -> float:
         """Gaussian in slip, cut at synchronous speed."""
-        slip = 1 - frequency_hz / self.synchronous_hz
+        slip = slip_of(frequency_hz, self.supply_hz, self.pole_pairs)
         return -0.5 * ((slip - self.slip) / self.slip_std) ** 2
 
 

@@ -45,7 +45,7 @@ def as_document(
             "start_s": float(observation.frame.time_s[0] + observation.audited.start_s),
             "end_s": float(observation.frame.time_s[-1] + observation.audited.start_s),
         },
-        "sensors": _sensors(observation.audited),
+        "sensors": _sensors(observation),
         "slip": observation.slip,
         "segment": _segment(observation),
         "parameters": _parameters(observation.fitted),
@@ -207,15 +207,16 @@ def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> dict[str,
     }
 
 
-def _sensors(audited: Audited) -> dict[str, object]:
-    """What was taken for the sensors' own errors: part of every std, and never seen in one recording."""
-    trust = audited.sensors
+def _sensors(observation: Observation) -> dict[str, object]:
+    """What was found of the sensors' own errors, and what was taken where one recording shows nothing."""
+    trust, fitted = observation.audited.sensors, observation.fitted
     return {
         "gain_std": trust.gain_std,
         "current_to_voltage_skew_std_s": trust.skew_std_s,
+        "current_delay_s": quantity(fitted.delay_s, fitted.delay_std_s),
         "asymmetry": trust.asymmetry,
-        "sentence": "Gain and delay common to a group of sensors do not show in a recording; each std holds their share. "
-        "The asymmetry is measured: sums that should be zero.",
+        "sentence": "The currents' delay is fitted together with the motor; a gain common to three sensors does not show in a "
+        "recording: each std holds its share. The asymmetry is measured: sums that should be zero.",
     }
 
 

@@ -8,7 +8,7 @@ line-to-line voltages; the sum that is measured is sensor error, and tells its s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ isolation amplifiers, transformers of class 1)."""
 LEAST_ASYMMETRY = 0.001
 LARGEST_ASYMMETRY = 0.03
 """Beyond it the sum of phase voltages is the mains' own zero sequence."""
+STAYS_UNLIKE = 0.3
+"""Of what the sum showed: the part that delays between channels have in it."""
 
 
 @dataclass(frozen=True)
@@ -35,21 +37,48 @@ class Trust:
     asymmetry: float = LEAST_ASYMMETRY
 
 
-def trust_of(currents: Sequence[Signal], voltages: Sequence[Signal], supply: SupplyAngle, period_s: float) -> Trust:
-    """From the fundamental of the sums, over the channels' own; three channels of which one was made up sum to zero and say
-    nothing.
+@dataclass(frozen=True)
+class Evened:
+    """A group's channels with the gains that make their sum zero; `difference` `(3,)` is what each gain had beyond the mean, and
+    `unlike` the share of the mean that is left as a negative sequence.
     """
-    time = np.arange(currents[0].size) * period_s
-    angle = supply.angle_rad(time)
-    shares = [LEAST_ASYMMETRY]
-    for group in (currents, voltages):
-        total = np.sum(group, axis=0)
-        if np.ptp(total) < 1e-9 * np.ptp(group[0]):
-            shares.append(GAIN_STD)
-            continue
-        phasors = [abs(harmonic_phasor(signal - signal.mean(), angle)) for signal in group]
-        shares.append(abs(harmonic_phasor(total - total.mean(), angle)) / (3 * max(float(np.mean(phasors)), 1e-12)))
-    unlike = float(min(np.sqrt(np.sum(np.square(shares))), LARGEST_ASYMMETRY))
+
+    signals: tuple[Signal, ...]
+    difference: Signal
+    unlike: float
+
+
+def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, period_s: float) -> Evened:
+    """Three channels whose sum should be zero (line currents, line-to-line voltages) with the smallest differences of gain that
+    explain the sum's fundamental; as they are where the sum says nothing: one was made up, or a star point may move.
+
+    Real gains make zero and negative sequence alike in size, so with the sum the negative sequence that they make goes as well;
+    what delays between the channels make of it stays.
+    """
+    total = np.sum(group, axis=0)
+    unknown = Evened(tuple(group), np.zeros(3), GAIN_STD)
+    if np.ptp(total) < 1e-9 * np.ptp(group[0]):
+        return unknown
+    angle = supply.angle_rad(np.arange(group[0].size) * period_s)
+    own = np.array([harmonic_phasor(signal - signal.mean(), angle) for signal in group])
+    share = float(abs(own.sum()) / max(np.abs(own).sum(), 1e-12))
+    if not sums_to_zero or share > LARGEST_ASYMMETRY:
+        return replace(unknown, unlike=share)
+    gain = np.ones(3)
+    for _ in range(4):
+        even = own / gain
+        gain *= 1 + np.linalg.pinv(np.array([even.real, even.imag])) @ np.array([even.sum().real, even.sum().imag])
+    gain /= gain.mean()
+    signals = tuple(signal / g for signal, g in zip(group, gain, strict=True))
+    return Evened(signals, gain - 1, STAYS_UNLIKE * share)
+
+
+def trust_of(currents: Evened, voltages: Evened, supply: SupplyAngle) -> Trust:
+    """From how unlike the sensors of the two groups are, and what is taken where nothing is known."""
+    unlike = float(min(np.sqrt(LEAST_ASYMMETRY**2 + currents.unlike**2 + voltages.unlike**2), LARGEST_ASYMMETRY))
+    seen = float(np.sqrt((np.var(currents.difference) + np.var(voltages.difference)) / 3))
     return Trust(
-        float(np.hypot(GAIN_STD, unlike)), float(np.hypot(SKEW_STD_S, unlike / supply.carrier_rad_per_s)), unlike
+        float(np.hypot(GAIN_STD, np.hypot(unlike, seen))),
+        float(np.hypot(SKEW_STD_S, unlike / supply.carrier_rad_per_s)),
+        unlike,
     )

@@ -23,11 +23,12 @@ deviation); no torque makes it. Mixed eccentricity shows 50 dB below the current
 stator and an oval rotor, 0.8 % of the gap each: their product's half, 75 dB below."""
 LINE_MODEL_ERROR = 0.015
 """Share of a line's voltage that the constant-parameter circuit may explain wrongly (rotor skin effect, air-gap waves)."""
-SATURATION = 0.25
+SATURATION = 0.2
 """Share of a line's magnetizing current likewise: iron answers a ripple of the flux's size with its incremental inductance, 0.5 to
 0.8 of that of its mean flux, a ripple of its direction with the latter."""
-MAINS_MODEL_ERROR = 0.08
-"""The same at harmonics of the mains: there bars have more resistance and less leakage by their skin effect."""
+MAINS_MODEL_ERROR = 0.03
+"""The same at harmonics of the mains, where bars have more resistance and less leakage by their skin effect: the fit's robust
+loss has to bear what deep bars make beyond it."""
 
 
 @dataclass(frozen=True)

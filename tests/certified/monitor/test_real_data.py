@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.monitor.audit import inspect
-from commissioner.monitor.indicators import negative_sequence_ratio, rotor_side_bands, slip_of
-from commissioner.monitor.periods import pair_spectrum
-from commissioner.monitor.supply import dominant_frequency_hz, space_vector
+from commissioner.monitor.audit import inspect, measure_fundamental
+from commissioner.monitor.indicators import rotor_side_bands
+from commissioner.monitor.periods import pair_spectrum, slip_of
+from commissioner.monitor.supply import dominant_frequency_hz, follow_supply, space_vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_power
 from commissioner.recordings.importers import read_running
@@ -41,7 +41,7 @@ def test_lias_slip_is_predicted_from_the_plate_within_its_tolerance() -> None:
     f = inspect(recording, LIAS, circuit).fundamental
     slip = slip_at_power(circuit, 2 * np.pi * f.frequency_hz, abs(f.voltage_v), f.power_w)
     assert slip == pytest.approx(0.0401, rel=0.2)
-    assert slip_of(1439.5, 49.99, 2) == pytest.approx(0.0401, abs=2e-4)
+    assert slip_of(1439.5 / 60, 49.99, 2) == pytest.approx(0.0401, abs=2e-4)
 
 
 def test_lias_excerpt_of_two_turns_is_refused_as_too_short() -> None:
@@ -56,8 +56,9 @@ def unbalances() -> dict[str, list[float]]:
     for name in sorted(key[:-2] for key in read if key.endswith(".0")):
         current = space_vector(*(read[f"{name}.{k}"] for k in range(3)))
         frequency = dominant_frequency_hz(current, 1e-3)
-        angle = 2 * np.pi * frequency * np.arange(current.size) * 1e-3
-        out.setdefault(name.split(".")[1].removeprefix("ITSC_"), []).append(negative_sequence_ratio(current, angle))
+        supply = follow_supply(current, 1e-3, frequency)
+        unbalance = measure_fundamental(current, current, supply, 1e-3, backwards=False).current_unbalance
+        out.setdefault(name.split(".")[1].removeprefix("ITSC_"), []).append(unbalance)
     return out
 
 
@@ -95,7 +96,7 @@ def test_slip_and_side_band_position_are_those_of_the_published_tables(name: str
     """2-pole motor: slip in per cent, side bands 2 s f from the supply frequency; speeds are printed to 0.1 1/min."""
     for row in rows(name):
         supply = float(row["f1_Hz"])
-        slip = slip_of(float(row[speed]), supply, 1)
+        slip = slip_of(float(row[speed]) / 60, supply, 1)
         assert 100 * slip == pytest.approx(float(row["slip_pct"]), abs=0.02)
         assert 2 * slip * supply == pytest.approx(float(row[offset]), abs=0.01)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.envelope import shares
-from commissioner.monitor.sensors import GAIN_STD, trust_of
+from commissioner.monitor.sensors import GAIN_STD, evened, trust_of
 from commissioner.monitor.supply import follow_supply, space_vector
 from tests.campaigns.monitor import as_plate, as_recording
 from tests.support.running import refused_in
@@ -53,12 +53,26 @@ def test_unlike_sensors_show_in_sums_that_are_zero() -> None:
     time = np.arange(16000) / 8000
     phases = [np.cos(2 * np.pi * 50 * time - k * 2 * np.pi / 3) for k in range(3)]
     supply = follow_supply(space_vector(*phases), 1 / 8000, 50.0)
-    equal = trust_of(phases, phases, supply, 1 / 8000)
+    made_up = evened(phases, True, supply, 1 / 8000)
+    equal = trust_of(made_up, made_up, supply)
     assert equal.gain_std == pytest.approx(np.hypot(GAIN_STD, equal.asymmetry))
     assert equal.asymmetry < 0.008  # three that sum to zero exactly may be two and their sum: nothing is known
-    unlike = trust_of([1.03 * phases[0], phases[1], 0.98 * phases[2]], phases, supply, 1 / 8000)
+    star = [1.03 * phases[0], phases[1], 0.98 * phases[2]]
+    unlike = trust_of(made_up, evened(star, False, supply, 1 / 8000), supply)
     assert 0.008 < unlike.asymmetry < 0.03
     assert unlike.skew_std_s > equal.skew_std_s
+
+
+def test_gains_are_evened_by_the_sum_that_must_be_zero() -> None:
+    time = np.arange(16000) / 8000
+    phases = [np.cos(2 * np.pi * 50 * time - k * 2 * np.pi / 3) for k in range(3)]
+    supply = follow_supply(space_vector(*phases), 1 / 8000, 50.0)
+    gains = np.array([1.04, 0.98, 0.99])
+    even = evened([g * x for g, x in zip(gains, phases, strict=True)], True, supply, 1 / 8000)
+    assert even.difference == pytest.approx(gains - gains.mean(), abs=1e-3)
+    vector = space_vector(*even.signals)
+    turned = np.exp(1j * supply.angle_rad(time))
+    assert abs(np.mean(vector * turned)) < 2e-3 * abs(np.mean(vector / turned))
 
 
 @pytest.mark.parametrize("pairs", [1, 3])
