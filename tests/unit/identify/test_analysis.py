@@ -270,3 +270,34 @@ def test_an_axis_that_changes_inside_a_segment_is_refused():
     axis = recording().axis_deg.copy()
     axis[5000:] = 60.0
     assert "changes its axis" in str(refused(changed(axis_deg=axis)))
+
+
+def test_a_voltage_column_a_row_late_is_refused_by_what_is_wrong_with_it():
+    good = recording([*TONES, (14.0, 150.3, 0.5)])
+    late = dataclasses.replace(good, voltage_axis_v=np.append(0.0, good.voltage_axis_v[:-1]))
+    error = refused(late)
+    assert "before the voltage" in str(error)
+    assert "shift the voltage column" in error.remedy
+
+
+def test_an_axis_some_degrees_off_is_refused_and_a_few_are_told():
+    assert "named axis" in str(refused(changed(axis_deg=np.full(recording().time_s.size, 20.0))))
+    result = identify(changed(axis_deg=np.full(recording().time_s.size, 26.0)))
+    assert any("+4.0 deg beside axis_deg 26" in remark for remark in result.remarks)
+    assert not any("beside" in remark for remark in identify(recording()).remarks)
+
+
+def test_a_sweep_and_a_square_wave_are_not_one_tone():
+    time = np.arange(25_000) * PERIOD_S
+    for voltage in (25.0 * np.sin(2.0 * np.pi * (0.4 + 7.0 * time) * time), 14.0 * np.sign(np.sin(18.0 * time + 0.1))):
+        current = linear_current(TRUTH, voltage, PERIOD_S)
+        noise = 0.01 * np.random.default_rng(2).standard_normal((3, time.size))
+        phases = [current * np.cos(np.radians(30.0 - shift)) for shift in (0, 120, 240)] + noise
+        names = ("current_u_a", "current_v_a", "current_w_a")
+        result = identify(changed(voltage_axis_v=voltage, **dict(zip(names, phases, strict=True))))
+        assert np.array(result.parameters.as_tuple()) == pytest.approx(TRUTH, rel=0.01)
+
+
+def test_noise_of_a_third_of_the_current_is_no_unbalanced_sum():
+    result = identify(recording(noise=0.3))
+    assert np.all(np.abs(np.array(result.parameters.as_tuple()) - TRUTH) < 4.0 * np.array(result.std))

@@ -1,0 +1,69 @@
+"""The inverter's law on the samples: found where it is a known one, left alone where none describes them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from commissioner.identify.analysis import identify
+from commissioner.identify.leg_pair import DEAD_TIME, THRESHOLD, PairLaw
+from sim.recording import record
+from tests.campaigns.inverter import draw, to_recording
+
+LAW = PairLaw("capacitive", "root", 0.15, 0.1, 6.0)
+VALUES = np.array([12.0, 1.4, 0.3, -0.05])
+
+
+def test_every_law_is_an_odd_sign():
+    for law in (*DEAD_TIME.values(), *THRESHOLD.values()):
+        rising = law(np.array([0.0, 0.01, 0.5, 1e4]))
+        assert rising[0] == 0.0
+        assert np.all(np.diff(rising) > 0.0)
+        assert rising[-1] == pytest.approx(1.0, abs=2e-4)
+
+
+def test_a_step_of_a_knee_is_what_laying_it_down_anew_makes_of_it():
+    current = np.array([-3.0, -0.2, 0.08, 0.5, 5.0])
+    small = VALUES * [1.0, 1.0, 1e-3, 1e-3]
+    law, values = LAW.moved(small)
+    assert values[2:] == pytest.approx([0.0, 0.0])
+    assert law.basis(current) @ values == pytest.approx(LAW.basis(current) @ small, abs=1e-6)
+
+
+def test_what_is_expected_has_the_derivatives_it_states():
+    rows, missed = LAW.expected(VALUES, 13.4)
+    for k in range(LAW.size):
+        moved = VALUES.copy()
+        moved[k] += 1e-6
+        assert (LAW.expected(moved, 13.4)[1] - missed) / 1e-6 == pytest.approx(rows[:, k], abs=1e-5)
+    assert math.isclose(LAW.expected(np.array([1.0, 0.2, 0.0, 0.0]), 1.2)[1][2], 0.0, abs_tol=1e-12)
+
+
+def test_values_no_inverter_has_are_brought_back():
+    kept = LAW.admissible(np.array([10.0, -1.0, 30.0, 2.0]))
+    assert np.all(kept[:2] > 0.0)
+    assert np.all(np.abs(kept[2:]) <= kept[:2])
+
+
+def first_test():
+    """Half of one axis of a campaign's draw (3.7 kW, 3 us at 8 kHz, tones alone; a ramp as law), and its resistance."""
+    scenario = draw(101, "tones")
+    stage = dataclasses.replace(scenario.plant.power_stage, dead_time_shape="clipped")
+    segment = dataclasses.replace(scenario.segments[0], duration_s=6.0)
+    scenario = dataclasses.replace(
+        scenario, plant=dataclasses.replace(scenario.plant, power_stage=stage), segments=(segment,)
+    )
+    columns, metadata, truth = record(scenario, 101)
+    return to_recording(columns, metadata), truth["apparent_stator_resistance_ohm"]
+
+
+def test_a_known_law_tells_the_resistance_behind_a_loss_of_several_times_its_drop():
+    recording, exact = first_test()
+    result = identify(recording, estimator="nls")
+    error, std = result.parameters.stator_resistance_ohm / exact - 1.0, result.std[0] / exact
+    look = identify(recording, estimator="nls", is_final=False)
+    assert std < 0.6 * look.std[0] / exact
+    assert abs(error) < 2.6 * std
