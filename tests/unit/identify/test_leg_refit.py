@@ -49,14 +49,9 @@ def test_values_no_inverter_has_are_brought_back():
 
 
 def first_test():
-    """Half of one axis of a campaign's draw (3.7 kW, 3 us at 8 kHz, tones alone; a ramp as law), and its resistance."""
-    scenario = draw(101, "tones")
-    stage = dataclasses.replace(scenario.plant.power_stage, dead_time_shape="clipped")
-    segment = dataclasses.replace(scenario.segments[0], duration_s=6.0)
-    scenario = dataclasses.replace(
-        scenario, plant=dataclasses.replace(scenario.plant, power_stage=stage), segments=(segment,)
-    )
-    columns, metadata, truth = record(scenario, 101)
+    """One axis of a campaign's draw (4 kW, 3 us at 8 kHz, a hyperbolic tangent, tones alone), and its resistance."""
+    scenario = draw(302, "tones")
+    columns, metadata, truth = record(dataclasses.replace(scenario, segments=scenario.segments[:1]), 302)
     return to_recording(columns, metadata), truth["apparent_stator_resistance_ohm"]
 
 
@@ -65,5 +60,5 @@ def test_a_known_law_tells_the_resistance_behind_a_loss_of_several_times_its_dro
     result = identify(recording, estimator="nls")
     error, std = result.parameters.stator_resistance_ohm / exact - 1.0, result.std[0] / exact
     look = identify(recording, estimator="nls", is_final=False)
-    assert std < 0.6 * look.std[0] / exact
+    assert std < 0.7 * look.std[0] / exact
     assert abs(error) < 2.6 * std
