@@ -87,6 +87,13 @@ def refuse(seen: Refused, file: Path, document: dict[str, Any], as_json: bool) -
     for finding in seen.findings:
         if not finding.stops:
             err.print(f"[dim]{finding.kind}[/] {finding.what}")
+    f = seen.audited.fundamental
+    if f is not None:
+        err.print(
+            f"[dim]what the terminals show all the same[/] {f.frequency_hz:.4g} Hz, {abs(f.voltage_v) / 2**0.5:.4g} V a phase "
+            f"({f.voltage_unbalance:.2%} negative sequence), {abs(f.current_a) / 2**0.5:.4g} A ({f.current_unbalance:.2%}), "
+            f"{f.power_w:.4g} W, {f.reactive_var:.4g} var"
+        )
     raise error
 
 
