@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commissioner.monitor import combs as comb_search
 from commissioner.monitor import feeder, waveform
 from commissioner.monitor import fit as fitting
 from commissioner.monitor.audit import inspect
 from commissioner.monitor.averaging import Comb, Lines, separate
+from commissioner.monitor.characteristic import LoadPeriod, characteristic, load_periods
 from commissioner.monitor.combs import SUPPLY_ORDERS, Found
 from commissioner.monitor.estimate import estimate
 from commissioner.monitor.findings import Audited, Finding
@@ -19,7 +19,7 @@ from commissioner.monitor.fit import Fitted, Problem, Start
 from commissioner.monitor.mean_speed import whole_record_speed
 from commissioner.monitor.members import members_of, pole_count, with_wobble
 from commissioner.monitor.pairing_by_slip import better_order, shaft_search
-from commissioner.monitor.periods import Periodicity, ShaftSearch, slip_of
+from commissioner.monitor.periods import ShaftSearch, slip_of
 from commissioner.monitor.proof import Proof, prove
 from commissioner.monitor.quiet import SEGMENT_S, quietest
 from commissioner.monitor.slow_slip import slip_phase
@@ -29,25 +29,7 @@ from commissioner.monitor.systematic import with_sensors
 from commissioner.monitor.waveform import Solved, Waveform
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
-from commissioner.records import RunningRecording, Signal
-
-POINTS_PER_TURN = 360
-MOST_POINTS = 7200
-
-
-@dataclass(frozen=True)
-class LoadPeriod:
-    """One periodicity as reported: what it is, how long, how sure, how much it moves the shaft."""
-
-    name: str
-    frequency_hz: float
-    frequency_std_hz: float
-    ratio_to_shaft: float
-    follows: str
-    harmonics: int
-    periods_averaged: float
-    speed_ripple_rad_per_s: float
-    evidence: float
+from commissioner.records import RunningRecording
 
 
 @dataclass(frozen=True)
@@ -176,7 +158,7 @@ def _invert(
     solved = with_sensors(
         waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
     )
-    period = _characteristic(
+    period = characteristic(
         audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
     )
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
@@ -198,7 +180,7 @@ def _invert(
         solved,
         period,
         tuple(
-            _load_periods(members, combs, found.shaft.frequency_hz, problem, solved, float(np.ptp(frame.time_s[part])))
+            load_periods(members, combs, found.shaft.frequency_hz, problem, solved, float(np.ptp(frame.time_s[part])))
         ),
         whole,
         whole_std,
@@ -216,56 +198,3 @@ def _lines(audited: Audited, frame: TurningFrame, part: slice, combs: tuple[Comb
     """All lines of the segment, the voltages at load frequencies as the feeder makes them."""
     lines = separate(frame, part, list(combs), SUPPLY_ORDERS)
     return feeder.quieten(replace(lines, asymmetry=audited.sensors.asymmetry), len(combs))
-
-
-def _characteristic(
-    audited: Audited,
-    frame: TurningFrame,
-    part: slice,
-    combs: tuple[Comb, ...],
-    base_hz: float,
-    shaft_hz: float,
-    problem: Problem,
-    solved: Solved,
-    inertia: float | None,
-) -> Waveform:
-    """One longest period from the segment's middle on, at `POINTS_PER_TURN` points a shaft turn."""
-    longest = 1 / min(comb.frequency_hz for comb in combs)
-    count = int(min(max(POINTS_PER_TURN * longest * shaft_hz, POINTS_PER_TURN), MOST_POINTS))
-    time = frame.time_s[part]
-    middle = float(time[time.size // 2])
-    instants = middle + longest * np.arange(count) / count
-    phases = {p: np.interp(instants, time, comb.phase_rad) for p, comb in enumerate(combs)}
-    if len(combs) == 1:
-        phases = {0: 2 * np.pi * np.arange(count) / count + float(np.interp(middle, time, combs[0].phase_rad))}
-    made = waveform.without_unknown_load(waveform.evaluate(problem, solved, instants, phases, inertia))
-    return replace(made, time_s=made.time_s + audited.start_s)
-
-
-def _load_periods(
-    members: list[Periodicity],
-    combs: tuple[Comb, ...],
-    shaft_hz: float,
-    problem: Problem,
-    solved: Solved,
-    length_s: float,
-) -> list[LoadPeriod]:
-    made = []
-    owner: NDArray[np.int64] = problem.lines.comb[problem.on.positive]
-    for p, (member, comb) in enumerate(zip(members, combs, strict=True)):
-        own = solved.speed.amplitude_rad_per_s[owner == p]
-        ripple: Signal = np.abs(own)
-        made.append(
-            LoadPeriod(
-                member.name,
-                member.frequency_hz,
-                member.frequency_std_hz,
-                member.frequency_hz / shaft_hz,
-                comb.follows,
-                int(own.size),
-                length_s * member.frequency_hz,
-                float(np.sqrt(2 * np.sum(ripple**2))),
-                member.evidence,
-            )
-        )
-    return made
