@@ -13,8 +13,6 @@ from commissioner.run.restore import restore
 
 def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool) -> None:
     """Write the run's snapshot back, after asking."""
-    import typer
-
     screen.require_yes(yes, as_json=as_json)
     summary = find_run(runs, run)
     if not yes:
@@ -22,7 +20,7 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
             f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
             "stored. Make sure that it is the same drive."
         )
-        typer.confirm("Write?", abort=True)
+        screen.confirm("Write?", otherwise="nothing was written")
     with screen.busy("writing and reading back"):
         done = restore(summary, drive)
     if as_json:

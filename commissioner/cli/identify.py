@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from commissioner.cli import screen
 from commissioner.errors import UsageError
 
@@ -73,7 +71,7 @@ def identify_and_write(
         show(found.as_json(), [str(path) for path in files])
     if not yes:
         screen.out.print(f"If the result is accepted it will be written into the drive at {drive} and stored.")
-        typer.confirm("Write?", abort=True)
+        screen.confirm("Write?", otherwise="nothing was written")
     with LiveView(screen.err if as_json else screen.out) as view:
         done = write_recorded(drive, profile, plate, plan, found, files, runs=runs, present=view)
     show_and_exit(done, as_json=as_json)

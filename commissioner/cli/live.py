@@ -56,14 +56,14 @@ class LiveView:
                 )
             case told.FirstLook(parameters=(r_s, r_r, l_s, l_m)):
                 self._line(
-                    f"    so far: R_s {r_s:.4g} R_R {r_r:.4g} Ω  L_σ {1e3 * l_s:.4g} L_M {1e3 * l_m:.4g} mH, "
+                    f"    so far: R_s {r_s:.4g} Ω, R_R {r_r:.4g} Ω, L_σ {1e3 * l_s:.4g} mH, L_M {1e3 * l_m:.4g} mH, "
                     f"a leg loses {record.leg_error_v:.3g} V"
                 )
             case told.ExcitationChosen():
                 volts = sum(amplitude for amplitude, _, _ in record.tones)
                 tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)
                 what = "first look: " if record.is_look else ""
-                self._line(f"    {what}{record.seconds:.3g} s of {tones} Hz, {volts:.3g} V in all")
+                self._line(f"    {what}{record.seconds:.3g} s of {tones} Hz, {volts:.3g} V where all peaks meet")
             case told.BiasChosen():
                 self._close()
                 self._line(

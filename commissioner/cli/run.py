@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rich.markup import escape
+
 from commissioner.cli import screen
 from commissioner.cli.angles import parse_axes
 from commissioner.cli.live import LiveView
-from commissioner.run.commission import Commissioned, commission
+from commissioner.errors import CheckFailed
+from commissioner.link.drive_file import load_profile
+from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.plan import ProcedurePlan
+from commissioner.run.commission import Commissioned, commission, require_capabilities
+from commissioner.run.inspection import inspect_drive
 from commissioner.settings import load_motor, load_procedure
 
 DIAGNOSIS_S = 20.0
@@ -60,7 +67,7 @@ def commission_and_show(
     plan = load_procedure(procedure, axes_deg=axes)
     screen.require_yes(yes, as_json=as_json)
     if not yes:
-        _ask(url, plan.total_seconds, write_back)
+        _ask(url, profile, nameplate, plan, write_back=write_back)
     with LiveView(screen.err if as_json else screen.out) as view:
         done = commission(
             url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view,
@@ -69,21 +76,36 @@ def commission_and_show(
     show_and_exit(done, as_json=as_json)
 
 
-def _ask(url: str, seconds: float, write_back: bool) -> None:
-    """A person says yes, or nothing is energised."""
-    import typer
-
+def _ask(url: str, profile: str, nameplate: Nameplate, plan: ProcedurePlan, *, write_back: bool) -> None:
+    """A person sees which drive answers and what will happen, and says yes; or nothing is energised."""
+    require_capabilities(load_profile(profile), write_back=write_back)
+    with screen.busy("asking the drive"):
+        inspection = inspect_drive(url, profile, nameplate, plan)
+    drive, job = inspection.identity, inspection.job
+    assert job is not None, "a drive with excitation has a job"
+    if failed := [check for check in inspection.checks if not check.has_passed]:
+        first = failed[0]
+        raise CheckFailed(
+            f"{drive.drive_type} #{drive.serial_number}: check failed: {first.name}; nothing was energised",
+            step="check", value=first.value, limit=first.limit, remedy=first.remedy,
+        )  # fmt: skip
+    stretched = f", stretched {job.stretch:.1f} times for a slow rotor" if job.stretch > 1.0 else ""
     screen.out.print(
-        f"[bold yellow]The motor at {url} will be energised[/] at standstill on one axis at a time, for about "
-        f"{seconds:.0f} s in all.\nNo torque is made on purpose, but the shaft may still move slightly. "
-        "Guards on, people away, emergency stop tested?"
+        f"[bold]{escape(drive.drive_type)} #{drive.serial_number}[/], motor of {1e-3 * nameplate.rated_power_w:g} kW, "
+        f"{nameplate.rated_voltage_v:g} V, {nameplate.rated_current_a:g} A; {len(inspection.checks)} of "
+        f"{len(inspection.checks)} checks passed.\n"
+        f"[bold yellow]The motor will be energised[/] at standstill, one axis at a time: {len(plan.tests_deg)} tests, about "
+        f"{job.stretch * plan.total_seconds:.0f} s in all{stretched}, never more than {job.total_time_s:.0f} s; up to "
+        f"{job.test_current_a:.1f} A peak, direct current included.\n"
+        "The output goes on and off by itself between the tests. No torque is made on purpose, but the shaft may move."
     )
     screen.out.print(
         "Accepted parameters will be written into the drive."
         if write_back
         else "Nothing will be written into the drive."
     )
-    typer.confirm("Energise?", abort=True)
+    screen.out.print("Energise only with guards on, people away and the emergency stop tested.")
+    screen.confirm("Energise?", otherwise="nothing was energised or written")
 
 
 def show_and_exit(done: Commissioned, *, as_json: bool) -> None:

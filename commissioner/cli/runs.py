@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from commissioner.cli import screen
-from commissioner.errors import DataRefused
+from commissioner.errors import DataRefused, UsageError
 from commissioner.run.archive import damaged, read_blocks, read_saved
 from commissioner.run.catalogue import RunSummary, find_run, read_runs
 
@@ -24,14 +24,10 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
         screen.out.print(f"no runs in {folder}/")
         return
     rows = [
-        (run.run, screen.outcome_mark(run.outcome), run.drive, f"{run.energised_s:.1f} s", run.written, run.reason)
+        (run.run, screen.outcome_mark(run.standing), run.drive, "old or new" if run.written.startswith("old or new") else "")
         for run in found
     ]
-    screen.out.print(
-        screen.table(
-            "", ("run", "outcome", "drive", "energised", "parameters in the drive", "reason"), rows, right=(3,)
-        )
-    )
+    screen.out.print(screen.table("", ("run", "outcome", "drive", "holds"), rows))
 
 
 def show_run(folder: Path, name: str, *, as_json: bool) -> None:
@@ -44,11 +40,11 @@ def show_run(folder: Path, name: str, *, as_json: bool) -> None:
 
 
 def _print(summary: RunSummary, result: dict[str, Any] | None) -> None:
-    screen.out.print(f"[bold]{summary.run}[/]  {screen.outcome_mark(summary.outcome)}  {summary.reason}")
+    screen.out.print(f"[bold]{summary.run}[/]  {screen.outcome_mark(summary.standing)}  {summary.reason}")
     screen.out.print(f"  drive       {summary.drive}\n  energised   {summary.energised_s:.1f} s")
     screen.out.print(f"  parameters  {summary.written}\n  folder      {summary.folder}")
     if result is not None:
-        screen.result(result)
+        screen.result(result, summary.standing)
 
 
 def report_run(folder: Path, name: str, *, as_json: bool) -> None:
@@ -96,6 +92,11 @@ def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> Non
     from commissioner.identify.combine import compare
 
     first, second = find_run(folder, before), find_run(folder, after)
+    if first.run == second.run:
+        raise UsageError(
+            "a run cannot be compared with itself", step="compare", value=first.run, limit="two runs",
+            remedy=f"`commissioner runs list --runs {folder}` shows the ids",
+        )  # fmt: skip
     comparison = compare(_combined(first), _combined(second))
     if as_json:
         screen.emit({"before": first.run, "after": second.run, "comparison": comparison})

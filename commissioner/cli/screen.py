@@ -14,7 +14,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from commissioner.errors import CommissionerError, UsageError
+from commissioner.errors import Aborted, CommissionerError, UsageError
+from commissioner.report.summary import finding_sentences, standing
 from commissioner.run.archive import plain
 
 out = Console(highlight=False)
@@ -34,6 +35,14 @@ def require_yes(yes: bool, *, as_json: bool) -> None:
             "nobody can be asked with --json", step="confirm", value="--json without --yes", limit="--yes",
             remedy="add --yes once you have made sure that the drive may be energised or written",
         )  # fmt: skip
+
+
+def confirm(question: str, *, otherwise: str) -> None:
+    """Aborted unless a person says yes; `otherwise` says what a no leaves behind."""
+    import typer
+
+    if not typer.confirm(question):
+        raise Aborted(otherwise, step="confirm", value="no", limit="yes", remedy="start again when ready")
 
 
 @contextmanager
@@ -90,6 +99,8 @@ def wear(count: int, fraction: float) -> str:
 
 _MARKS = {
     "commissioned": "[green]✓ commissioned[/]",
+    "accepted, not written": "[yellow]✓ accepted, not written[/]",
+    "restored since": "[yellow]✓ restored since[/]",
     "rejected": "[yellow]✗ rejected[/]",
     "aborted": "[yellow]■ aborted[/]",
     "faulted": "[red]✗ faulted[/]",
@@ -103,15 +114,15 @@ ROWS = (
 )
 
 
-def outcome_mark(outcome: str) -> str:
+def outcome_mark(standing: str) -> str:
     """The outcome in its colour; a run that was cut off is red."""
-    return _MARKS.get(outcome, f"[red]? {outcome}[/]")
+    return _MARKS.get(standing, f"[red]? {standing}[/]")
 
 
-def result(document: Mapping[str, Any]) -> None:
-    """A run's result as the technician reads it."""
+def result(document: Mapping[str, Any], standing_now: str = "") -> None:
+    """A run's result as the technician reads it; `standing_now` where something has happened since."""
     out.print()
-    out.print(f"[bold]{outcome_mark(document['outcome'])}[/]  {escape(str(document['reason']))}")
+    out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")
     if error:
         for name in ("step", "value", "limit", "remedy"):
@@ -122,16 +133,18 @@ def result(document: Mapping[str, Any]) -> None:
             table(
                 "",
                 ("", "value", "std error", "in the drive before", "change", "written"),
-                _rows(document),
+                _rows(document, "restored since" if standing_now == "restored since" else "yes"),
                 right=(1, 2, 3, 4),
             )
         )
-        for remark in document.get("remarks", ()):
+        for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(remark)}")
+        if standing(document) == "accepted, not written":
+            out.print("  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones")
     out.print(f"  energised {document['energised_s']:.1f} s in all")
 
 
-def _rows(document: Mapping[str, Any]) -> Iterable[Sequence[str]]:
+def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:
     before = document.get("before") or {}
     written = {row["field"] for row in document.get("written", ())}
     for name, words, factor, unit in ROWS:
@@ -146,5 +159,5 @@ def _rows(document: Mapping[str, Any]) -> Iterable[Sequence[str]]:
             f"{100 * std / abs(value):.2f} %",
             "" if old is None else f"{factor * old:.4g} {unit}",
             "" if not old else f"{100 * (value / old - 1):+.1f} %",
-            "yes" if name in written else "",
+            done if name in written else "",
         )

@@ -31,8 +31,11 @@ class LongerTest:
             if b < 0.95 * a
         ]
         if not gains:
-            return f"a longer test would buy nothing: tests of {self.seconds:.3g} s leave the same standard errors"
-        return f"tests of {self.seconds:.3g} s would bring the standard errors from " + ", ".join(gains)
+            return (
+                f"a longer test would buy nothing: {self.seconds:.3g} s of tones on each axis instead of "
+                f"{self.seconds / TIMES:.3g} s leave the same standard errors"
+            )
+        return f"{self.seconds:.3g} s of tones on each axis would bring the standard errors from " + ", ".join(gains)
 
 
 def longer_test(

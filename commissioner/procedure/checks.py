@@ -134,7 +134,11 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
 def _below(name: str, value: float, limit: float, remedy: str) -> CheckResult:
     """NaN means that no sensor is fitted, which is not a failure."""
     return CheckResult(
-        name, math.isnan(value) or value <= limit, "no sensor" if math.isnan(value) else round(value, 1), limit, remedy
+        name,
+        math.isnan(value) or value <= limit,
+        "no sensor" if math.isnan(value) else round(value, 1),
+        f"at most {limit:g} °C" if math.isfinite(limit) else "no limit known",
+        remedy,
     )
 
 
@@ -148,6 +152,6 @@ def _same_motor(drive_nameplate: Mapping[str, float], nameplate: Nameplate) -> I
             f"{key} in the drive",
             abs(value - wanted) <= NAMEPLATE_TOLERANCE * wanted,
             round(value, 4),
-            wanted,
+            f"{wanted:g} within {NAMEPLATE_TOLERANCE:.0%}",
             f"check which motor is connected; correct --motor or the drive's {key}",
         )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from commissioner.procedure.verdict import Values
 from commissioner.records import Signal
 from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PLOT_STYLE, PURPLE, RED
 
@@ -27,12 +28,12 @@ def convergence(tests: Sequence[Sequence[Mapping[str, Any]]]) -> Figure:
     """The four estimates with two standard errors over motor time, one colour per test."""
     figure, panels = _panels(2, 2, 5.2)
     for index, (panel, (_, label, factor)) in enumerate(zip(panels.flat, PANELS, strict=True)):
-        for number, test in enumerate(test for test in tests if test):
+        for number, test in enumerate(tests):
             time = np.array([row["time_s"] for row in test])
             value = factor * np.array([row["parameters"][index] for row in test], dtype=float)
             spread = 2 * factor * np.array([row["std"][index] or np.nan for row in test], dtype=float)
             colour = AXIS_COLOURS[number % len(AXIS_COLOURS)]
-            panel.plot(time, value, color=colour, label=_label(number, test))
+            panel.plot(time, value, color=colour, label=test[0]["label"])
             panel.fill_between(time, value - spread, value + spread, color=colour, alpha=0.15, linewidth=0)
         panel.set_ylabel(label)
         _settle(panel, tests, index, factor)
@@ -93,10 +94,10 @@ def fluxes(tests: Sequence[Sequence[Mapping[str, Any]]], limit_wb: float) -> Fig
         panel.axvline(start, color=MUTED, linewidth=0.5)
         start = float(time[-1])
     panel.axhline(limit_wb, color=RED, linestyle="--", label="limit")
-    panel.set_ylim(0, 1.15 * limit_wb)
+    panel.set_ylim(0, 1.3 * limit_wb)
     panel.set_xlabel("time under test / s, tests one after the other")
     panel.set_ylabel("stator flux / Wb")
-    panel.legend(ncols=3, loc="lower right")
+    panel.legend(ncols=3, loc="upper right")
     return figure
 
 
@@ -113,16 +114,16 @@ def currents(time_s: Signal, current_a: Signal, residual_a: Signal, title: str) 
     return figure
 
 
-def axes_side_by_side(axes: Sequence[Mapping[str, Any]], combined: Mapping[str, Any]) -> Figure:
-    """Each orientation's estimate with its 95 % interval beside the combined value."""
+def axes_side_by_side(axes: Sequence[tuple[float, Values]], combined: Mapping[str, Any]) -> Figure:
+    """Each orientation's estimate with its 95 % interval beside the combined value, all at one flux."""
     figure, panels = _panels(1, 4, 2.6)
     for panel, (name, label, factor) in zip(panels.flat, PANELS, strict=True):
-        for position, axis in enumerate(axes):
-            quantity = axis["parameters"][name]
+        for position, (_, values) in enumerate(axes):
+            quantity = values[name]
             panel.errorbar(
                 position,
-                factor * quantity["value"],
-                yerr=1.96 * factor * (quantity["std"] or 0.0),
+                factor * quantity.value,
+                yerr=1.96 * factor * (quantity.std or 0.0),
                 fmt="o",
                 color=BLUE,
                 capsize=3,
@@ -133,7 +134,7 @@ def axes_side_by_side(axes: Sequence[Mapping[str, Any]], combined: Mapping[str, 
         panel.axhspan(low, high, color=GREEN, alpha=0.18, linewidth=0)
         panel.axhline(factor * total["value"], color=GREEN)
         panel.set_title(label)
-        panel.set_xticks(range(len(axes)), [f"{axis['axis_deg']:g}°" for axis in axes])
+        panel.set_xticks(range(len(axes)), [f"{axis_deg:g}°" for axis_deg, _ in axes])
         panel.set_xlim(-0.6, len(axes) - 0.4)
     return figure
 
@@ -146,7 +147,3 @@ def _panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Fig
         figure = NewFigure(figsize=(9.2, height))
         panels = figure.subplots(rows, columns, squeeze=False, **options)
     return figure, panels
-
-
-def _label(number: int, test: Sequence[Mapping[str, Any]]) -> str:
-    return f"test {number + 1}, {test[0]['axis_deg']:g}°"

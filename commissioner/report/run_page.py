@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.steps import Findings
+from commissioner.procedure.verdict import evidence_of
 from commissioner.records import Signal
 from commissioner.report import figures
 from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
+from commissioner.report.summary import diagnosis_sentences, finding_sentences, standing
 
 _TONES: dict[str, Tone] = {"commissioned": "good", "rejected": "warn", "aborted": "warn", "faulted": "bad"}
+_STANDING = {"accepted, not written": "Measured and accepted, not written: the drive holds its old values"}
 _NAMES = (
     ("stator_resistance_ohm", "Stator resistance R_s", 1.0, "Ω"),
     ("rotor_resistance_ohm", "Rotor resistance R_R", 1.0, "Ω"),
@@ -30,11 +34,11 @@ def run_page(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], fi
         Page(
             title=f"commissioner · run {result['run']}",
             headline=_headline(result),
-            tone=_TONES.get(outcome, "bad"),
-            facts=list(_facts(result)),
+            tone="warn" if standing(result) in _STANDING else _TONES.get(outcome, "bad"),
+            facts=list(_facts(result, journal)),
             sections=[section for section in _sections(result, journal, findings) if section.parts],
             footer="SI units; per-phase star equivalent, rotor quantities referred to the stator; inverse-Gamma "
-            "circuit. Intervals are 95 %.",
+            f"circuit. Intervals are 95 %. commissioner {version('commissioner')}.",
         )
     )
 
@@ -42,10 +46,18 @@ def run_page(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], fi
 def _headline(result: Mapping[str, Any]) -> str:
     reason = str(result["reason"])
     sentence = reason[:1].upper() + reason[1:]
-    return f"{str(result['outcome']).capitalize()}. {sentence}."
+    return f"{_STANDING.get(standing(result), str(result['outcome']).capitalize())}. {sentence}."
 
 
-def _facts(result: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _facts(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    if journal:
+        yield "Begun (UTC)", str(journal[0]["utc"])[:16].replace("T", " ")
+    plate = next((line["record"]["nameplate"] for line in journal if line["kind"] == "job"), None)
+    if plate:
+        yield "Motor", (
+            f"{1e-3 * plate['rated_power_w']:g} kW, {plate['rated_voltage_v']:g} V {plate['connection']}, "
+            f"{plate['rated_current_a']:g} A, {plate['rated_speed_rpm']:g} 1/min"
+        )
     drive = result.get("drive") or {}
     if drive:
         yield "Drive", f"{drive['drive_type']} #{drive['serial_number']}"
@@ -54,20 +66,25 @@ def _facts(result: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if peak:
         yield "Largest flux, of the limit", f"{100 * peak:.0f} %"
     written = result.get("written") or ()
-    yield "Parameters in the drive", "new values, read back and stored" if written else "unchanged"
+    yield "Parameters in the drive", "new values, read back, at the end of this run" if written else "unchanged"
 
 
 def _sections(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings) -> Iterator[Section]:
     tests = _tests(journal)
     yield Section("Result", list(_result_parts(result)))
     yield Section("What objects", list(_objections(result)))
-    yield Section("Axes side by side", list(_axes_parts(result)))
+    yield Section("What a simulation would have got wrong", list(_diagnosis_parts(result)))
+    yield Section("Axes side by side", list(_axes_parts(result, findings)))
     if tests:
         limit = (result.get("flux_guard") or {}).get("limit_wb")
         yield Section(
             "Course of the tests",
             [
-                picture(figures.convergence(tests), "Online estimate of each test with two standard errors."),
+                picture(
+                    figures.convergence(tests),
+                    "Online estimate of each test with two standard errors, at whatever flux it has reached; the result "
+                    "above is fitted to all samples together.",
+                ),
                 *_flux_parts(tests, limit),
             ],
         )
@@ -107,13 +124,39 @@ def _result_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
         )
     yield Table(("Parameter", "Value", "95 % interval", "In the drive before", "Change", "Read back"), rows)
     yield from _conditions(result)
-    yield from result.get("remarks") or ()
+    yield from (f"{sentence[:1].upper()}{sentence[1:]}." for sentence in finding_sentences(result))
+    about_samples = set(_diagnosis_sentences(result))
+    yield from (
+        f"{remark[:1].upper()}{remark[1:]}." for remark in result.get("remarks") or () if remark not in about_samples
+    )
+
+
+def _diagnosis_sentences(result: Mapping[str, Any]) -> list[str]:
+    return diagnosis_sentences(result["diagnosis"], result["parameters"]) if result.get("diagnosis") else []
+
+
+def _diagnosis_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
+    """What `diagnose` said about the run's samples, and how to see all of it."""
+    diagnosis = result.get("diagnosis")
+    if not diagnosis:
+        return
+    yield (
+        "An autotune without these causes would have written other values. This run does not depend on the diagnosis: "
+        "it measured the inverter's loss, the delay and the iron itself."
+    )
+    for sentence in _diagnosis_sentences(result):
+        yield f"{sentence[:1].upper()}{sentence[1:]}."
+    yield from diagnosis.get("remarks") or ()
+    yield f"All of it, with curves: commissioner diagnose {result['run']}/recording.parquet (in the folder of the runs)."
 
 
 def _conditions(result: Mapping[str, Any]) -> Iterator[str | Table]:
     """What the values hold for: flux, circuit, inverter."""
     rated, held = result["rated_flux_wb"]["stator_peak"], result["holds_for_stator_flux_wb"]
-    yield f"L_M and R_R are secant values at a peak stator flux of {held:.3g} Wb, {100 * held / rated:.0f} % of the rated."
+    yield (
+        f"L_M and R_R hold at a peak stator flux of {held:.3g} Wb, {100 * held / rated:.0f} % of the rated"
+        + ("; nearer to it the iron saturates further and L_M is lower." if held < 0.95 * rated else ".")
+    )
     leg = (result.get("inverter") or {}).get("leg_error_v")
     if leg:
         yield f"Each inverter leg loses {leg['value']:.3g} V to dead time and device drop; it was identified and taken off."
@@ -138,13 +181,14 @@ def _objections(result: Mapping[str, Any]) -> Iterator[Table]:
         yield Table(("Objection", "Seen", "Limit", "Remedy"), rows, tones=["warn"] * len(rows))
 
 
-def _axes_parts(result: Mapping[str, Any]) -> Iterator[Table | Picture]:
-    axes = result.get("axes") or ()
-    if not axes or not result.get("parameters"):
+def _axes_parts(result: Mapping[str, Any], findings: Findings) -> Iterator[Table | Picture]:
+    found = findings.identification
+    if found is None or not result.get("parameters"):
         return
     yield picture(
-        figures.axes_side_by_side(axes, result["parameters"]),
-        "Each test's estimate with its 95 % interval (blue) and the combined value (green).",
+        figures.axes_side_by_side(evidence_of(found).at_one_flux, result["parameters"]),
+        f"Each test's estimate at a peak stator flux of {found.holds_for_flux_wb:.3g} Wb with its 95 % interval (blue), "
+        "and the combined value (green).",
     )
 
 
@@ -229,18 +273,23 @@ def _told(record: Mapping[str, Any]) -> str:
     parts = []
     for key, value in record.items():
         if isinstance(value, float):
-            parts.append(f"{key} {value:.4g}")
+            parts.append(f"{key.replace('_', ' ')} {value:.4g}")
+        elif isinstance(value, bool):
+            parts.append(f"{key.replace('_', ' ')}: {'yes' if value else 'no'}")
         elif isinstance(value, str | int) and value != "":
-            parts.append(f"{key} {value}")
+            parts.append(f"{key.replace('_', ' ')} {value}")
     return ", ".join(parts)
 
 
 def _tests(journal: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
-    """The online estimates, one list per test."""
+    """The online estimates, one list per test, each with the test's `label`."""
     tests: list[list[Mapping[str, Any]]] = []
+    label, number = "", 0
     for line in journal:
         if line["kind"] == "excitation_chosen":
+            number += not line["record"]["is_look"]
+            label = "first look" if line["record"]["is_look"] else f"test {number}, {line['record']['axis_deg']:g}°"
             tests.append([])
         elif line["kind"] == "estimate_updated" and tests:
-            tests[-1].append(line["record"])
+            tests[-1].append(line["record"] | {"label": label})
     return [test for test in tests if test]

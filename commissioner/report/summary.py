@@ -41,12 +41,31 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
     return document
 
 
+def standing(result: Mapping[str, Any]) -> str:
+    """The outcome; of a result that was accepted, whether it was written as well."""
+    outcome = str(result["outcome"])
+    return "accepted, not written" if outcome == "commissioned" and not result.get("written") else outcome
+
+
+def finding_sentences(result: Mapping[str, Any]) -> list[str]:
+    """What the axes' comparison saw, each with its size."""
+    return [
+        f"{f['sentence']}, by {100 * abs(f['relative_size']):.2g} ± {100 * f['relative_std']:.2g} %"
+        for f in result.get("findings") or ()
+    ]
+
+
 def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
     """What the diagnosis of the run's samples means for the run's `parameters`, a sentence each."""
     names = [" or ".join((c["name"], *c["equivalent"])).replace("_", " ") for c in diagnosis["causes"]]
-    if not names:
-        return []
-    out = [f"a simulation with the four parameters alone misses, in these samples: {', '.join(names)}"]
+    out = []
+    if not diagnosis.get("is_complete", True):
+        out.append(
+            "the diagnosis of the samples was stopped before every cause was tried, on a busy computer; the parameters "
+            "do not depend on it. `commissioner diagnose` on the run's recording.parquet finishes it"
+        )
+    if names:
+        out.append(f"a simulation with the four parameters alone misses, in these samples: {', '.join(names)}")
     for moved in diagnosis["moved"]:
         unit, factor = ("ohm", 1.0) if moved["parameter"].endswith("_ohm") else ("mH", 1e3)
         name = moved["parameter"].rpartition("_")[0].replace("_", " ")

@@ -9,6 +9,8 @@ from typing import Any
 from commissioner.errors import UsageError
 from commissioner.run.archive import read_document, read_journal
 
+RESTORED = "as before (restored)"
+
 
 @dataclass(frozen=True)
 class RunSummary:
@@ -22,6 +24,15 @@ class RunSummary:
     energised_s: float
     written: str
     result: dict[str, Any] | None = None
+
+    @property
+    def standing(self) -> str:
+        """The outcome, and whether the drive holds what came of it."""
+        if self.outcome != "commissioned" or self.written.startswith("old or new"):
+            return self.outcome
+        if self.written.startswith(RESTORED):
+            return "restored since"
+        return "commissioned" if self.written.startswith("new") else "accepted, not written"
 
 
 def read_runs(root: Path) -> list[RunSummary]:
@@ -96,7 +107,7 @@ def _written(records: list[dict[str, Any]]) -> str:
         if line["kind"] == "parameters_written":
             said = "new" + _kept(line["record"]) + _wear(line["record"])
         elif line["kind"] == "snapshot_restored":
-            said = "as before (restored)" + _wear(line["record"])
+            said = RESTORED + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
             said = "old or new: read the drive, or `commissioner restore` this run"
     return said

@@ -13,6 +13,7 @@ from commissioner.link.inverter import Inverter
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import CheckResult, judge_drive, judge_idle
 from commissioner.procedure.plan import ProcedurePlan
+from commissioner.procedure.steps import Job
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.job import make_job, open_drive
@@ -20,13 +21,14 @@ from commissioner.run.job import make_job, open_drive
 
 @dataclass(frozen=True)
 class Inspection:
-    """What `check` saw."""
+    """What `check` saw; `job`: what a run would do, of a drive that can energise for us."""
 
     identity: DriveIdentity
     nameplate: Mapping[str, float]
     parameters: Mapping[str, float]
     watchdog: Mapping[str, Any]
     checks: tuple[CheckResult, ...]
+    job: Job | None = None
 
 
 def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: ProcedurePlan) -> Inspection:
@@ -38,6 +40,7 @@ def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: Proce
         statuses = [inverter.read_status()]
         time.sleep(plan.supervision.standstill_dwell_s)
         statuses.append(inverter.read_status())
+        job = None
         if "excite" in profile.capabilities:
             job = make_job(profile, nameplate, plan, port, write_back=False)
             checks = judge_drive(identity, statuses, plate, nameplate, job.drive_limits, job.test_current_a)
@@ -46,7 +49,7 @@ def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: Proce
         parameters = inverter.snapshot().in_use
     watchdog = profile.watchdog
     known = dataclasses.asdict(watchdog) if watchdog else {"none": "the drive file describes none"}
-    return Inspection(identity, plate, parameters, known, checks)
+    return Inspection(identity, plate, parameters, known, checks, job)
 
 
 def _shown(profile: DriveProfile, status: DriveStatus) -> DriveStatus | None:
