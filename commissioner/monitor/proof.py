@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from commissioner.monitor.averaging import Comb
 from commissioner.monitor.findings import Audited
@@ -47,7 +48,7 @@ def prove(
 ) -> Proof:
     """Re-simulation of about a second from the middle of the segment, at the recording's own rate.
 
-    The measured currents are turned forwards by the `delay_s` that was found of them.
+    The measured currents are read `delay_s` later, which is how late their sensors were found to be.
     """
     assert audited.supply is not None
     period = audited.sample_period_s
@@ -58,8 +59,10 @@ def prove(
     window = slice(first, first + count)
     time = np.arange(first, first + count) * period
     turn = np.exp(-1j * (audited.supply.angle_rad(time) - frame.start_angle_rad))
-    measured, voltage = audited.current_a[window] * turn, audited.voltage_v[window] * turn
-    measured = measured * np.exp(1j * problem.lines.supply_rad_per_s * delay_s)
+    every = np.arange(audited.current_a.size) * period
+    near = slice(max(first - 8, 0), first + count + 8)
+    measured = CubicSpline(every[near], audited.current_a[near])(time + delay_s) * turn
+    voltage = audited.voltage_v[window] * turn
     phases = {p: np.interp(time, time_part, comb.phase_rad) for p, comb in enumerate(combs)}
     basis = basis_of(problem.lines, phases, count)
     speed = solved.speed.mean_rad_per_s + 2 * np.real(basis[:, problem.on.positive] @ solved.speed.amplitude_rad_per_s)
