@@ -16,6 +16,8 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.001, 0.01, 0.1)
 HEAT_LEAK_S = 20.0
+SETTLED = 4.0
+"""Thermal time constants in a recording, for a temperature that settles within it."""
 SPEED_KNOTS_S, MOST_SPEED_KNOTS = 0.4, 40
 """A shaft held by its load swings below about 1 Hz: cubic splines of this spacing follow it to a per cent."""
 HARMONICS = {"mains": (3, 5, 7), "ripple": (2,)}
@@ -78,7 +80,7 @@ def _three_phases(segment: Segment) -> Array:
 def _heat(record: Record, rotor: Sequence[Array]) -> Named:
     """Doses in minutes at rated current, carried over segments: own phase, mean of phases, own phase with a leak, plain time
 
-    (to the same end as the mean), rotor, rotor in plain time.
+    and time towards a settled temperature (to the same end as the mean), rotor, rotor in plain and in settling time.
     """
     period, rated = record.facts.sample_period_s, record.facts.rated_current_peak_a / np.sqrt(2.0)
     own, leaky, cage = np.zeros(3), np.zeros(3), 0.0
@@ -98,18 +100,20 @@ def _heat(record: Record, rotor: Sequence[Array]) -> Named:
         ])
         cage_dose = cage + np.cumsum(rotor_rate) - rotor_rate
         mean = np.repeat(dose.mean(axis=0)[None], 3, axis=0)
-        time = np.repeat(_since_start(record, segment)[None], 3, axis=0)
-        out.append(np.vstack([dose, mean, leak, time, cage_dose[None], time[:1]]).T)
+        since = _since_start(record, segment)
+        settling = np.expm1(-SETTLED * since) / np.expm1(-SETTLED)
+        time, settling = (np.repeat(x[None], 3, axis=0) for x in (since, settling))
+        out.append(np.vstack([dose, mean, leak, time, settling, cage_dose[None], time[:1], settling[:1]]).T)
         own, leaky, cage = dose[:, -1], leak[:, -1], float(cage_dose[-1])
         last_time, last_file = float(segment.time_s[-1]), segment.file
     for file in {s.file for s in record.segments}:
         rows = [k for k, s in enumerate(record.segments) if s.file == file]
-        for column, of in ((slice(9, 12), slice(3, 6)), (slice(13, 14), slice(12, 13))):
+        for column, of in ((slice(9, 15), slice(3, 6)), (slice(16, 18), slice(15, 16))):
             scale = float(out[rows[-1]][-1, of].mean())
             for k in rows:
                 out[k][:, column] *= scale
-    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky", "time") for p in "uvw")
-    return (*names, "rotor_heat", "rotor_heat_time"), out
+    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky", "time", "settling") for p in "uvw")
+    return (*names, "rotor_heat", "rotor_heat_time", "rotor_heat_settling"), out
 
 
 def _since_start(record: Record, segment: Segment) -> Array:

@@ -64,9 +64,9 @@ class Fit:
         return self.normal.total_chi2
 
     def set_apart(self, effect: str) -> tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]:
-        """Information of all numbers, the rows of one effect's, the rows of the others, and the others' own inverse."""
+        """Information of all numbers, the rows of one effect's, the rows of the others that can move, and their inverse."""
         is_mine = np.array([False] * 4 + [t.effect == effect for t in self.model.terms])
-        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine)
+        mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine & self.model.is_free)
         gram = self.normal.total_gram
         inner = np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
         return gram, mine, others, np.asarray(inner, dtype=np.float64)

@@ -121,6 +121,15 @@ class Model:
         scaled = [v / t.step for v, t in zip(self.values, self.terms, strict=True)]
         return np.array([*np.log(self.nominal), *scaled])
 
+    @cached_property
+    def is_free(self) -> NDArray[np.bool_]:
+        """(4 + terms,) numbers that can move both ways: one that rests on its bound imitates nothing beyond it."""
+        rests = [
+            min(abs(v - t.lower), abs(v - t.upper)) < 1e-9 * t.step
+            for t, v in zip(self.terms, self.values, strict=True)
+        ]
+        return np.array([True] * 4 + [not r for r in rests])
+
     def moved(self, theta: Array) -> Model:
         nominal = np.exp(theta[:4])
         values = tuple(float(x) * t.step for x, t in zip(theta[4:], self.terms, strict=True))

@@ -98,10 +98,11 @@ def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...
     if not np.isfinite(gram[:active, :active]).all():
         # a fitted machine faster than the steps can follow: nothing can be said about what it lacks
         return Screening({}, np.zeros((0, 0)), np.zeros(0), {}, normal)
-    root = _inverse_root(gram[:active, :active])
-    reduced = root @ gram[:active, active:]
+    free = np.flatnonzero(model.is_free)
+    root = _inverse_root(gram[np.ix_(free, free)])
+    reduced = root @ gram[free, active:]
     projected = gram[active:, active:] - reduced.T @ reduced
-    left = slope[active:] - reduced.T @ (root @ slope[:active])
+    left = slope[active:] - reduced.T @ (root @ slope[free])
     power = np.diag(gram)[active:]
     is_visible = np.diag(projected) > np.maximum(VISIBLE * power, 1e-6)
     columns, scores, at = {}, {}, 0
@@ -115,6 +116,17 @@ def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...
         own = [terms[k - every.start] for k in kept]
         scores[name] = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting)
     return Screening(scores, projected, left, columns, normal)
+
+
+def joint_net(screening: Screening, names: Sequence[str]) -> float:
+    """What several effects together promise to first order, less their price."""
+    kept = [k for n in names for k in screening.columns[n]]
+    terms = [t for n in names for t in screening.scores[n].terms]
+    lower, upper = (np.array([(x - t.start) / t.step for t, x in zip(terms, bounds, strict=True)])
+                    for bounds in ([t.lower for t in terms], [t.upper for t in terms]))
+    gram, slope = screening.projected[np.ix_(kept, kept)], screening.slope[kept]
+    step = bounded_step(gram, slope, lower, upper, 1e-9)
+    return float(2.0 * step @ slope - step @ gram @ step) - sum(price(screening.scores[n].numbers) for n in names)
 
 
 def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting: Setting) -> Score:

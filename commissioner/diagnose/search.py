@@ -6,12 +6,14 @@ never has to mend the shape of an earlier one.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit, fit
@@ -30,7 +32,7 @@ from commissioner.diagnose.nominal import (
     with_ranges,
 )
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.screen import Screening, price, required_chi2, screen
+from commissioner.diagnose.screen import STATISTICAL_FLOOR, Screening, joint_net, price, required_chi2, screen
 
 MOST_CAUSES = 6
 MATERIAL_SHARE = 1e-4
@@ -48,6 +50,12 @@ SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05}
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side."""
+LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
+"""Causes that only turn and scale the excited lines: any two of them can look like a third."""
+REGROUPED, HOPEFUL = 4, 1.3
+"""Groups refitted at most; and the factor by which a refit may gain more than promised."""
+TONE_TO_TONE = 0.05
+"""As CLASS_GUARD, for a ripple whose side lines fall from one tone to another, beside linear causes."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
@@ -120,14 +128,16 @@ def search(
     model = nominal.model
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
+    regrouped: set[frozenset[str]] = set()
     if part.samples < 0.7 * record.samples:
         small = explored(record)
         start = fit(nominal.model, small, layout, noise, rounds=6)
         search_small = _Search(small, layout, replace(setting, record=small), noise, names, report, record, go_on)
         fitted, accepted, _ = search_small.run(start, ())
-        first, record = search_small.first, search_small.full
+        first, record, regrouped = search_small.first, search_small.full, search_small.regrouped
         model = _without_curves(_completed(fitted.model, accepted, setting))
     whole = _Search(record, layout, replace(setting, record=record), noise, names, report, record, go_on)
+    whole.regrouped = regrouped
     completed = fit(model, record, layout, noise)
     if not np.isfinite(completed.chi2):
         # what fitted the part runs away beyond it
@@ -195,6 +205,8 @@ class _Search:
         self.record, self.layout, self.setting, self.noise = record, layout, setting, noise
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
         self.below: list[str] = []
+        self.regrouped: set[frozenset[str]] = set()
+        self.ripple_meets_tones = _meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in record.segments]) ** 2)))
 
@@ -218,7 +230,11 @@ class _Search:
             step = None if is_over else self._forward(current, screening, refused)
             if step is None:
                 current, accepted, _ = self._backward(current, accepted, accepted)
-                return current, accepted, screening
+                other = None if is_over else self._regrouped(current, accepted)
+                if other is None:
+                    return current, accepted, screening
+                current, accepted = other
+                continue
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
@@ -231,14 +247,14 @@ class _Search:
         ranked = [s for s in screening.ranked() if s.name not in refused]
         losses = {n: loss_without(current, n) for n in {t.effect for t in current.model.terms if t.effect}}
         promising = [
-            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * _guard(losses, s.name))
+            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name))
         ]
         best = self._large_delay(current, refused)
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
-            wanted = max(_guard(losses, score.name), self.threshold(score.numbers))
+            wanted = max(self._guard(losses, score.name), self.threshold(score.numbers))
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
             trial = fit(
                 current.model.with_terms(CATALOGUE[score.name].terms(self.setting)), self.record, self.layout, self.noise,
@@ -254,6 +270,50 @@ class _Search:
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
         return None if best is None else (best[1], best[2])
+
+    def _regrouped(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...]] | None:
+        """The accepted linear causes exchanged for another one or two of them, where that fits clearly better: one by one
+
+        they are taken in the order of their gain, and the first may have stood for two others.
+        """
+        mine = tuple(n for n in accepted if n in LINEAR)
+        if not 1 <= len(mine) <= 2 or frozenset(accepted) in self.regrouped:
+            return None
+        self.regrouped.add(frozenset(accepted))
+        bare = current.model
+        for name in mine:
+            bare = bare.without(name)
+        without = fit(bare, self.record, self.layout, self.noise, tolerance=1.0)
+        pool = [n for n in LINEAR if n in self.names]
+        screening = screen(without.model, self.record, self.layout, self.noise, self.setting, pool)
+        # what merely joins the accepted ones has been tried, and guarded, on the way forward
+        groups = [
+            g for size in (1, 2) for g in itertools.combinations(screening.scores, size)
+            if not set(mine) <= set(g) and set(g) != SAME_ORDER
+        ]
+        promised = sorted(((joint_net(screening, g), g) for g in groups), key=lambda x: -x[0])
+        wanted = current.chi2 + sum(price(screening.scores[n].numbers) for n in mine if n in screening.scores) - STATISTICAL_FLOOR
+        for net, group in promised[:REGROUPED]:
+            if without.chi2 - HOPEFUL * net > wanted:
+                break
+            numbers = sum(price(screening.scores[n].numbers) for n in group)
+            terms = [t for n in group for t in CATALOGUE[n].terms(self.setting)]
+            trial = fit(
+                without.model.with_terms(terms), self.record, self.layout, self.noise, wanted_chi2=wanted - numbers
+            )
+            is_sound = all(
+                self._is_plausible(trial.model, n) and loss_without(trial, n) > self.threshold(screening.scores[n].numbers)
+                for n in group
+            )
+            self.report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
+            if trial.chi2 + numbers < wanted and is_sound:
+                return trial, (*(n for n in accepted if n not in mine), *group)
+        return None
+
+    def _guard(self, losses: Mapping[str, float], name: str) -> float:
+        """What `_guard` says; and a ripple whose side lines fall from tone to tone changes impedances as linear causes do."""
+        share = TONE_TO_TONE if name == "dc_link_ripple" and self.ripple_meets_tones else 0.0
+        return max(_guard(losses, name), share * max((losses.get(n, 0.0) for n in LINEAR), default=0.0))
 
     def _large_delay(self, current: Fit, refused: set[str]) -> tuple[float, str, Fit] | None:
         """A delay of a sample and more turns the phases so far that no first-order promise shows it: tried outright."""
@@ -327,6 +387,15 @@ class _Search:
     def gains(self, fitted: Fit, accepted: Sequence[str]) -> dict[str, float]:
         """Delta chi2 of each accepted effect, the others free (linear, at the fit)."""
         return {name: loss_without(fitted, name) for name in accepted}
+
+
+def _meets_tones(record: Record, setting: Setting) -> bool:
+    """Whether two excited tones lie the ripple's frequency (or twice it) apart, within two lines of the longest segment."""
+    tones = np.array(excited_lines(record))
+    apart = np.abs(np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()]))
+    width = 2.0 / max(s.count * record.facts.sample_period_s for s in record.segments)
+    ripples = [m * f for name, f in setting.lines_hz.items() if name.startswith("ripple") for m in (1.0, 2.0)]
+    return any(bool((np.abs(apart - f) < width).any()) for f in ripples)
 
 
 def _guard(losses: Mapping[str, float], name: str) -> float:

@@ -186,7 +186,7 @@ def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def stator_heating(setting: Setting) -> tuple[Term, ...]:
     """R_x = R_s (1 + k integral i_x^2 / I_N^2 dt): relative rise per minute at rated current, k >= 0, each phase by its
 
-    own current, by the mean of the three, with a leak of 20 s, and in proportion to time (a dictionary).
+    own current, by the mean of the three, with a leak of 20 s, in proportion to time, and settling (a dictionary).
     """
     names = [n for n in setting.record.channel_names if n.startswith("heat_") and n.endswith("_u")]
     return tuple(
@@ -205,7 +205,7 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
 def rotor_heating(setting: Setting) -> tuple[Term, ...]:
     """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current; or in proportion
 
-    to time.
+    to time, or settling.
     """
     names = [n for n in setting.record.channel_names if n.startswith("rotor_heat")]
     return tuple(
