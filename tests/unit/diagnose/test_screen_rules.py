@@ -1,0 +1,47 @@
+"""What a promise may count on: numbers on a bound imitate nothing, several effects promise what they promise together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import predict
+from commissioner.diagnose.record import Record
+from commissioner.diagnose.screen import joint_net, screen
+
+WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
+
+
+@pytest.fixture(scope="module")
+def late(setting, nominal):
+    """The conftest machine, its currents 40 us late."""
+    terms = CATALOGUE["sampling_delay"].terms(setting)
+    model = replace(nominal.with_terms(terms), values=(4e-5,))
+    record = setting.record
+    segments = tuple(
+        replace(s, currents_a=predict(model, record, k, setting.layout).currents_a) for k, s in enumerate(record.segments)
+    )
+    return Record(segments, record.facts, record.channel_names, record.channels)
+
+
+def promised(model, record, setting, names):
+    return screen(model, record, setting.layout, WHITE, replace(setting, record=record), names)
+
+
+def test_rotor_paths_at_zero_do_not_hide_a_delay(late, setting, nominal):
+    alone = promised(nominal, late, setting, ["sampling_delay"]).scores["sampling_delay"].delta_chi2
+    beside = nominal.with_terms(CATALOGUE["rotor_skin_effect"].terms(setting))
+    assert not beside.is_free[4:].any()
+    assert promised(beside, late, setting, ["sampling_delay"]).scores["sampling_delay"].delta_chi2 == pytest.approx(alone, rel=1e-6)
+    moved = replace(beside, values=tuple(0.01 for _ in beside.values))
+    assert moved.is_free.all()
+
+
+def test_a_group_promises_at_least_what_each_of_it_does(late, setting, nominal):
+    screening = promised(nominal, late, setting, ["sampling_delay", "iron_loss", "cable_capacitance"])
+    delay = screening.scores["sampling_delay"]
+    assert joint_net(screening, ["sampling_delay"]) == pytest.approx(delay.net, rel=1e-6)
+    both = joint_net(screening, ["sampling_delay", "cable_capacitance"])
+    assert both + 30.0 >= delay.net * (1.0 - 1e-9)
