@@ -168,8 +168,8 @@ def strike(fault: Fault, drive: Firmware) -> None:
     elif fault.name == "power_cycle":
         drive.power_cycle()
     elif fault.name == "overrun":
-        drive.run_until_sample(drive.produced + drive.setup.ring_capacity)
         drive.run_until_sample(drive.produced + int(float(fault.argument or 0)))
+        drive.samples.forget()
     elif fault.name == "sample_gap":
         drive.samples.gaps.append((drive.produced, int(float(fault.argument or 1))))
     else:

@@ -23,6 +23,7 @@ class SampleRing:
         self.ring, self.flags = np.zeros((capacity, CHANNELS), np.int16), np.zeros(capacity, np.uint8)
         self.gaps: list[tuple[int, int]] = []
         self.next_unread = 0
+        self.first_kept = 0
         self.overruns = 0
         self.has_ended = True
 
@@ -49,7 +50,7 @@ class SampleRing:
 
     def window(self, wanted: int, samples: int, session: int, link_v: float, *, is_running: bool) -> list[int]:
         """Header, CRC and data from sample `wanted` on; the oldest kept sample instead where that one is gone."""
-        oldest = max(0, self.produced - self.capacity)
+        oldest = max(self.first_kept, self.produced - self.capacity)
         self.overruns += max(0, oldest - self.next_unread)
         first = max(wanted, oldest)
         first, count = self._around_gaps(first, max(0, min(samples, self.produced - first)))
@@ -62,8 +63,13 @@ class SampleRing:
         words = [*header, crc, *data.tolist()]
         return words + [0] * (self.map.window_words - len(words))
 
+    def forget(self) -> None:
+        """Fault knob: all that nobody has read yet is overwritten, as in a ring that is shorter than it claims."""
+        self.first_kept = self.produced
+
     def behind_gaps(self, index: int) -> int:
-        """The sample of this index, or the first that exists behind the gap it was lost in."""
+        """The sample of this index, or the first that exists behind what was lost."""
+        index = max(index, self.first_kept)
         for start, length in self.gaps:
             if start <= index < start + length:
                 index = start + length

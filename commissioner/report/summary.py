@@ -70,7 +70,7 @@ def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, A
         unit, factor = ("ohm", 1.0) if moved["parameter"].endswith("_ohm") else ("mH", 1e3)
         name = moved["parameter"].rpartition("_")[0].replace("_", " ")
         out.append(
-            f"{name} would have come out as {factor * moved['four_parameters']:.4g} {unit} instead of "
+            f"without them {name} would have come out as {factor * moved['four_parameters']:.4g} {unit} instead of "
             f"{factor * parameters[moved['parameter']]['value']:.4g} {unit}, mostly for {moved['cause'].replace('_', ' ')}"
         )
     return out

@@ -28,6 +28,18 @@ def taken_as_live(state: str) -> DriveFault:
     )  # fmt: skip
 
 
+def still_live(live: DriveFault, error: CommissionerError | None) -> CommissionerError:
+    """What ended the run, as the fault that it is while the drive does not confirm that its output is off."""
+    if error is None or error is live:
+        return live
+    if error.outcome != live.outcome:
+        live.what = f"{error.what}; {live.what}"
+        live.remedy = f"{live.remedy}; {error.remedy}"
+        return live
+    error.remedy = f"{live.remedy}; {error.remedy}"
+    return error
+
+
 def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
     """A disk that takes no more, or a defect of ours, whose traceback goes to the journal."""
     if isinstance(surprise, OSError):

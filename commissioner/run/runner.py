@@ -18,7 +18,7 @@ from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParamete
 from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
 from commissioner.run.archive import RunFolder
-from commissioner.run.ending import as_error, ended_by, let_go, note, taken_as_live, write_lost
+from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -94,9 +94,7 @@ class Runner:
                 self._progress.facts = replace(self._progress.facts, run_ended=True)
                 live = self._disarm(error.what if error is not None else "the run has ended")
         if live is not None:
-            ended, error = None, error or live
-            if error.remedy != live.remedy:
-                error.remedy = f"{live.remedy}; {error.remedy}"
+            ended, error = None, still_live(live, error)
         if ended is None:
             assert error is not None
             ended = ended_by(error, self._folder, self.energised_s)

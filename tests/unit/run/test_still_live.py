@@ -81,6 +81,16 @@ def test_a_run_that_failed_for_another_reason_says_both(folder):
     assert "isolate" in ended.error["remedy"] and "check the cable" in ended.error["remedy"]
 
 
+def test_a_stopped_run_is_a_fault_while_its_drive_is_live(folder):
+    def course():
+        yield ask.Wait(0.0)
+        raise Aborted("stopped by the operator", step="run", remedy="start again when ready")
+
+    ended = perform(folder, Drive(live_from=1), course())
+    assert ended.outcome == "faulted" and "stopped by the operator" in ended.reason
+    assert "isolate" in ended.error["remedy"] and "start again" in ended.error["remedy"]
+
+
 def test_a_drive_that_was_never_energised_is_not_called_live(folder):
     def course():
         yield ask.Wait(0.0)
