@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from commissioner.errors import DriveFault, ReplyTimeout
+from commissioner.errors import Aborted, DriveFault, ReplyTimeout
 from commissioner.link.facts import DisarmReport, WriteReport
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
