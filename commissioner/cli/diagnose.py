@@ -36,14 +36,20 @@ def diagnose(files: Sequence[Path], motor: str | None = None, out: Path | None =
 
 
 def _recordings(tables: Sequence[Table], motor: str | None, out: Path | None, as_json: bool) -> None:
+    from commissioner.cli.diagnose_progress import BEGIN, Progress
     from commissioner.diagnose.diagnosis import diagnose as analyse
     from commissioner.diagnose.document import as_document
+    from commissioner.report.diagnose_uncertain import uncertain
 
     recordings, remarks = _standstill(tables, motor)
     _same_motor(recordings)
-    seen = analyse(recordings, report=_silent if as_json else _progress)
+    progress = Progress(is_quiet=as_json)
+    progress.say(BEGIN)
+    seen = analyse(recordings, report=progress)
     document = as_document(seen, None)
     document["audit"] = [*remarks, *document["audit"]]
+    document["uncertain"] = uncertain(seen, progress.withdrawn({c.name for c in (*seen.causes, *seen.unsure)}))
+    document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if out is not None:
         from commissioner.report.diagnose_page import page_of
         from commissioner.report.page import render
@@ -52,16 +58,6 @@ def _recordings(tables: Sequence[Table], motor: str | None, out: Path | None, as
         page = render(page_of(seen, document, ", ".join(Path(t.source).name for t in tables)))
         _write(out, document, seen.model, page)
     _finish(document, out, as_json)
-
-
-def _silent(sentence: str) -> None:
-    return None
-
-
-def _progress(sentence: str) -> None:
-    from commissioner.cli.screen import err
-
-    err.print(f"[dim]{sentence}[/]")
 
 
 def _standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[StandstillRecording], list[str]]:
@@ -175,66 +171,8 @@ def _finish(document: Mapping[str, Any], out: Path | None, as_json: bool) -> Non
     if as_json:
         emit(document)
     else:
-        _show(document, out)
+        from commissioner.cli.diagnose_screen import show
+
+        show(document, out)
     if document["verdict"] == "refused":
         raise typer.Exit(3)
-
-
-COLOURS = {"explained": "green", "nothing_significant": "green", "not_distinguishable": "yellow"}
-MOST_LIMITS = 6
-
-
-def _show(document: Mapping[str, Any], out: Path | None) -> None:
-    """The short human view: sentence, error, causes, what would have been seen, what next."""
-    from commissioner.cli.screen import out as screen
-    from commissioner.report.diagnose_page import headline, in_words, next_sentence, number
-
-    colour = COLOURS.get(document["verdict"], "red")
-    screen.print(f"[bold {colour}]{_escaped(headline(document))}[/]")
-    for sentence in in_words(document):
-        screen.print(_escaped(sentence))
-    gain = document["gain"]
-    if gain["rmse_before_a"] is not None:
-        before, after = (f"{number(gain[k] * 1e3)}" for k in ("rmse_before_a", "rmse_after_a"))
-        change = f"{before} -> {after} mA" if document["causes"] else f"{before} mA"
-        noise = f", noise {number(gain['noise_floor_a'] * 1e3)} mA" if gain["noise_floor_a"] else ""
-        screen.print(f"error {change} rms on data left out{noise}")
-    if document["causes"]:
-        screen.print(_table_of_causes(document))
-    elif document.get("detection_limit_sizes"):
-        screen.print(f"would have been seen: {_limits(document)}")
-    for sentence in (*document.get("remarks", ()), *document.get("audit", ())):
-        screen.print(f"[dim]{_escaped(sentence)}[/]")
-    if document["next_experiment"]:
-        screen.print(f"next  {_escaped(next_sentence(document['next_experiment']))}")
-    if out is not None:
-        screen.print(f"[dim]report[/] {_escaped(str(out))}", soft_wrap=True)
-
-
-def _escaped(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)
-
-
-def _table_of_causes(document: Mapping[str, Any]) -> Any:
-    from commissioner.cli.screen import table
-    from commissioner.report.diagnose_page import percent, quantity, sure
-
-    def row(cause: Mapping[str, Any]) -> tuple[str, ...]:
-        size = next((quantity(value, key) for key, value in cause["parameters"].items()), "")
-        share = percent(cause["gain_share"]) if cause.get("found_by") != "audit" else "-"
-        return cause["name"], size, share, sure(cause["confidence"]), ", ".join(n.replace("_", " ") for n in cause["equivalent"])
-
-    rows = [row(cause) for cause in document["causes"]]
-    header = ("cause", "size", "share", "name right", *(["or as well"] if any(r[-1] for r in rows) else []))
-    return table("", header, [r[: len(header)] for r in rows], right=(2, 3))
-
-
-def _limits(document: Mapping[str, Any]) -> str:
-    """The detection limits of the commonest causes."""
-    from commissioner.report.diagnose_page import limit_words
-
-    common = ("dead_time", "leakage_saturation", "magnetizing_saturation", "rotor_skin_effect", "sampling_delay", "sensor_offset")
-    known = [n for n in (*common, *document["detection_limit_sizes"]) if n in document["detection_limit_sizes"]]
-    return ", ".join(f"{n} from {limit_words(document, n)}" for n in dict.fromkeys(known[:MOST_LIMITS]))

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 
 BEFORE, AFTER = "simulation as it was", "with the named causes"
 TOTAL_WIDTH = 9.4
-BAND = 2.58
-"""99 % of a normal variable."""
-CLASS_WORDS = {"excited": "excited", "odd": "odd\ndistortion", "even": "even\ndistortion", "other": "all others"}
+BAND, NOISE_BAND = 2.58, 1.96
+"""99 % and 95 % of a normal variable."""
+VISIBLE = 0.02
+"""Thinnest band that shows, as a share of a panel's height."""
+CLASS_WORDS = {"excited": "the test's\nown", "odd": "odd\ndistortion", "even": "even\ndistortion", "other": "all others"}
 Array = NDArray[np.float64]
 Wanted = ParamSpec("Wanted")
 
@@ -46,15 +48,24 @@ def over_quantities(seen: Residuals, has_causes: bool) -> Figure:
     for axes, curve in zip(figure.subplots(2, 2).flat, seen.curves, strict=True):
         _pair(axes, curve.at, curve.before_a * 1e3, curve.after_a * 1e3, has_causes)
         if curve.spread_a.any():
-            low, high = (curve.after_a - 2 * curve.spread_a) * 1e3, (curve.after_a + 2 * curve.spread_a) * 1e3
-            axes.fill_between(curve.at, low, high, color=BLUE, alpha=0.15, linewidth=0)
+            band = NOISE_BAND * curve.spread_a * 1e3
+            axes.fill_between(curve.at, -band, band, color=MUTED, alpha=0.35, linewidth=0)
             axes.axhline(0.0, color=MUTED, linewidth=0.8)
         else:
             axes.set_ylim(0, None)
         axes.set_xlabel(curve.label)
         axes.set_ylabel("size of the error / mA rms" if "flux" in curve.label else "mean error / mA")
-    figure.axes[0].legend()
+    _legend_above(figure, figure.axes[0])
     return figure
+
+
+def shade_is_visible(seen: Residuals, has_causes: bool) -> bool:
+    """Whether a panel's noise band is thick enough to be seen beside the curves."""
+    for curve in seen.curves:
+        drawn = np.concatenate([curve.before_a, curve.after_a if has_causes else curve.before_a, [0.0]])
+        if 2 * NOISE_BAND * float(curve.spread_a.max()) > VISIBLE * float(np.ptp(drawn)):
+            return True
+    return False
 
 
 @_styled
@@ -74,8 +85,8 @@ def over_time_and_axis(seen: Residuals, has_causes: bool, noise_a: float) -> Fig
     right.set_xticks(at, [f"{a:.0f}°" for a in seen.by_axis_deg])
     right.set_xlim(-0.8, at.size - 0.2)
     right.set(xlabel="axis")
-    left.set_ylim(0, 1.25 * 1e3 * float(max(seen.time_before_a.max(), seen.time_after_a.max(), noise_a)))
-    left.legend(ncols=3, loc="upper left")
+    left.set_ylim(0, 1.05 * 1e3 * float(max(seen.time_before_a.max(), seen.time_after_a.max(), noise_a)))
+    _legend_above(figure, left)
     return figure
 
 
@@ -84,16 +95,18 @@ def spectrum(seen: Spectrum, tones_hz: Sequence[float], has_causes: bool) -> Fig
     """Lines of the error with the excited frequencies marked and the noise; beside it the classes of frequency."""
     figure = _figure(3.3)
     axes, bars = figure.subplots(1, 2, width_ratios=(2.2, 1))
-    axes.loglog(seen.frequency_hz, seen.before_a * 1e3, color=ORANGE, linewidth=0.7, label=BEFORE)
+    axes.loglog(seen.frequency_hz[:-1], seen.before_a[:-1] * 1e3, color=ORANGE, linewidth=0.7, label=BEFORE)
     if has_causes:
-        axes.loglog(seen.frequency_hz, seen.after_a * 1e3, color=BLUE, linewidth=0.7, label=AFTER)
+        axes.loglog(seen.frequency_hz[:-1], seen.after_a[:-1] * 1e3, color=BLUE, linewidth=0.7, label=AFTER)
     axes.loglog(seen.frequency_hz, seen.noise_a * 1e3, color=INK, linestyle="--", linewidth=1.0, label="noise")
     for tone in tones_hz:
         axes.axvline(tone, color=MUTED, linewidth=0.5, alpha=0.5, zorder=0)
     top = 1e3 * float(max(seen.before_a.max(), seen.noise_a.max()))
-    axes.set_ylim(0.1e3 * float(seen.noise_a.min()), 8.0 * top)
-    axes.set(xlabel="frequency / Hz (thin lines: excited)", ylabel="line of the error / mA rms")
-    axes.legend(loc="upper right", ncols=3)
+    axes.set_ylim(0.1e3 * float(seen.noise_a.min()), 2.0 * top)
+    axes.set(xlabel="frequency / Hz (thin upright lines: the test's own)", ylabel="error at each frequency / mA rms")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_formatter("{x:g}")
+    _legend_above(figure, axes)
     names = [k for k in CLASS_WORDS if k in seen.by_class]
     at = np.arange(len(names))
     shift = 0.2 if has_causes else 0.0
@@ -120,11 +133,14 @@ def correlation(seen: Correlation, has_causes: bool) -> Figure:
     _pair(axes, seen.lag_s * 1e3, seen.before, seen.after, has_causes)
     largest = float(np.abs(np.concatenate([seen.before, seen.after])).max())
     if largest > 10.0 * BAND:
+        powers = 10.0 ** np.arange(1, 1 + int(np.log10(2.0 * largest)))
         axes.set_yscale("symlog", linthresh=BAND)
+        axes.set_yticks([*-powers[::-1], 0.0, *powers])
+        axes.minorticks_off()
         axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_ylim(-max(2.0 * largest, 2.0 * BAND), max(4.0 * largest, 2.0 * BAND))
+    axes.set_ylim(-max(2.0 * largest, 2.0 * BAND), max(2.0 * largest, 2.0 * BAND))
     axes.set(xlabel="how long the current's error comes after the voltage / ms", ylabel="tie to the voltage,\ntimes the noise")
-    axes.legend(ncols=3, loc="upper right")
+    _legend_above(figure, axes)
     return figure
 
 
@@ -169,8 +185,13 @@ def over_points(points: Sequence[Mapping[str, float]], is_locked: bool, has_caus
             axes.axhline(0.0, color=MUTED, linewidth=0.8)
             axes.set_xlabel(label if what == "power" else "")
         row[0].set_ylabel(f"error of the {what} / %")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), ncols=2, loc="outside upper center")
+    _legend_above(figure, panels[0, 0], columns=2)
     return figure
+
+
+def _legend_above(figure: Figure, axes: Axes, columns: int = 4) -> None:
+    """The legend outside the panels, where no curve runs."""
+    figure.legend(*axes.get_legend_handles_labels(), ncols=columns, loc="outside upper center")
 
 
 def _pair(axes: Axes, x: Array, before: Array, after: Array, has_causes: bool, style: str = "-") -> None:

@@ -12,7 +12,8 @@ from commissioner.diagnose.record import Facts, Record, Segment
 from commissioner.diagnose.residuals import residuals
 from commissioner.diagnose.screen import Score, Screening
 from commissioner.report import diagnose_figures as figures
-from commissioner.report.diagnose_page import headline, limit_words, next_sentence, number, percent, quantity, sure
+from commissioner.report.diagnose_numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
+from commissioner.report.diagnose_words import headline, next_promise, next_sentence
 from commissioner.report.page import picture
 
 PERIOD, SAMPLES, SIGMA = 2.5e-4, 4000, 0.01
@@ -23,27 +24,33 @@ TRUE = (2.0, 1.5, 0.01, 0.2)
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ({"value": 1.69412, "std": 0.0213, "unit": "us"}, "1.694 ± 0.021 us"),
-        ({"value": 0.11623, "std": 0.00402, "unit": "1"}, "11.62 ± 0.40 %"),
-        ({"value": 123456.0, "std": 1234.0, "unit": "rad/s"}, "123500 ± 1200 rad/s"),
-        ({"value": 0.5, "std": None, "unit": "A"}, "0.5 A"),
-        ({"value": 3.1e-7, "std": 1e-9, "unit": "F"}, "3.1e-07 ± 1e-09 F"),
+        ({"value": 1.69412, "std": 0.0213, "unit": "us"}, "1.694 ± 0.042 µs"),
+        ({"value": 0.11623, "std": 0.00402, "unit": "1"}, "11.62 ± 0.79 %"),
+        ({"value": 123456.0, "std": 1234.0, "unit": "rad/s"}, "123500 ± 2400 rad/s"),
+        ({"value": 0.5, "std": None, "unit": "A"}, "0.5000 A"),
+        ({"value": 3.1e-7, "std": 1e-9, "unit": "F"}, "3.1e-07 ± 2e-09 F"),
     ],
 )  # fmt: skip
-def test_a_size_has_the_digits_of_its_error(entry, words):
+def test_a_size_has_the_digits_of_its_interval(entry, words):
     assert quantity(entry) == words
+
+
+def test_a_sizes_name_keeps_the_phase_and_loses_the_unit():
+    keys = ("offset_v_a", "half_current_a", "gain_w_over_u", "amplitude_50_hz_a", "drift_u_a_per_min", "voltage_v")
+    assert [quantity_name(k) for k in keys] == ["offset v", "half current", "w against u", "amplitude 50 Hz", "drift u", "voltage"]
 
 
 def test_numbers_have_no_tails_and_nothing_is_certain():
     assert number(0.00012345) == "0.0001234" and number(27.1234567) == "27.12" and number(0.0, 2) == "0"
     assert percent(0.99999) == "over 99.9 %" and percent(0.0002) == "under 0.1 %" and percent(0.446) == "44.6 %"
     assert sure(1.0) == "over 99 %" and sure(0.83) == "83 %"
+    assert [part_word(s, 0.83) for s in (0.83, 0.3, 0.02, 0.002)] == ["main", "large", "small", "tiny"]
 
 
 def test_a_detection_limit_is_read_in_the_unit_of_its_size():
     limits = {"sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}}, "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}}}
     document = {"detection_limit_sizes": limits}
-    assert limit_words(document, "sensor_offset") == "71 uA"
+    assert limit_words(document, "sensor_offset") == "71 µA"
     assert limit_words(document, "dc_link_sag") == "0.12 %"
     assert limit_words(document, "clipping") == "-"
 
@@ -51,7 +58,8 @@ def test_a_detection_limit_is_read_in_the_unit_of_its_size():
 def test_a_next_experiment_promises_only_what_was_predicted():
     plan = {"splits": ["sampling_delay", "sensor_lag"], "do": "excite higher lines", "predicted_sigma": None}
     assert next_sentence(plan) == "To tell sampling delay from sensor lag: excite higher lines."
-    assert "more than 100 times" in next_sentence(plan | {"predicted_sigma": 843.2})
+    assert "times its own uncertainty" not in next_promise(plan)
+    assert "more than 100 times" in next_promise(plan | {"predicted_sigma": 843.2, "repeats": 1})
 
 
 def test_a_refusal_has_a_headline():
@@ -125,7 +133,7 @@ def test_masked_samples_make_no_error(seen):
 @pytest.mark.parametrize("has_causes", [True, False])
 def test_without_causes_only_the_error_as_it_is_is_drawn(seen, has_causes):
     figure = figures.correlation(seen.correlation, has_causes)
-    labels = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
+    labels = {text.get_text() for text in figure.legends[0].get_texts()}
     assert (figures.AFTER in labels) == has_causes
     assert picture(figures.spectrum(seen.spectrum, TONES, has_causes), "x").markup.startswith("<svg")
 

@@ -1,0 +1,117 @@
+"""Names and sizes of causes as people say them; causes that the data cannot tell apart are one entry under both names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.report.diagnose_numbers import PLAIN_NUMBERS, quantity, quantity_name, short, sure
+from commissioner.report.diagnose_plain import LEGS, PLAIN, Plain
+
+Cause = Mapping[str, Any]
+TOGETHER = frozenset({"dead_time", "device_drop"})
+"""Every inverter has both, and both do the same at one switching frequency and link voltage."""
+LATE = frozenset({"sampling_delay", "sensor_lag"})
+COMMON: Mapping[frozenset[str], Mapping[str, str]] = {
+    TOGETHER: {"voltage_v": "lost per leg", "half_current_a": "half of it reached at"},
+    LATE: {"delay_us": "delay in all", "time_constant_us": "delay in all"},
+}
+"""What the members of a class share: the only sizes that are known while nobody knows which of them it is."""
+COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
+
+
+def spoken(name: str) -> str:
+    """`dc_link_sag` as `DC link sag`."""
+    words = name.replace("_", " ")
+    return f"DC{words[2:]}" if words.startswith("dc ") else words
+
+
+def said(text: str) -> str:
+    """A sentence with the catalogue's names as people say them."""
+    for name in sorted(CATALOGUE, key=len, reverse=True):
+        text = text.replace(name, spoken(name))
+    return text
+
+
+def members(cause: Cause) -> frozenset[str]:
+    """The cause and what fits as well."""
+    return frozenset((cause["name"], *cause["equivalent"]))
+
+
+def class_name(cause: Cause) -> str:
+    """`dead time + device drop, together`; `sampling delay or sensor lag`; a cause alone by its own name."""
+    if members(cause) == TOGETHER:
+        return "dead time + device drop, together"
+    return " or ".join(spoken(n) for n in (cause["name"], *cause["equivalent"]))
+
+
+def listed(names: list[str]) -> str:
+    """`a, b and c`."""
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)
+
+
+def sure_words(cause: Cause) -> str:
+    """How likely the name is; of a class, that it is one of its members."""
+    if not cause["equivalent"]:
+        return sure(cause["confidence"])
+    if members(cause) == TOGETHER:
+        return f"{sure(cause['confidence'])} that it is one of the two or both"
+    count = len(members(cause))
+    return f"{sure(cause['confidence'])} that it is one of the {COUNTS.get(count, count)}"
+
+
+def sizes(cause: Cause) -> list[tuple[str, str]]:
+    """What is measured and how much; of a class only what its members share, with no member's own number."""
+    if cause["equivalent"]:
+        shared = COMMON.get(members(cause), {})
+        return [(shared[k], quantity(v, k)) for k, v in cause["parameters"].items() if k in shared]
+    return [(quantity_name(k), quantity(v, k)) for k, v in cause["parameters"].items()]
+
+
+def size_words(cause: Cause) -> str:
+    """All sizes on one line."""
+    known = sizes(cause)
+    if not known:
+        return "depends on which of them it is" if cause["equivalent"] else "-"
+    return "; ".join(f"{name} {size}" for name, size in known)
+
+
+def main_size(cause: Cause) -> str:
+    """The one size of the headline: of several sensors or directions the largest."""
+    shared = COMMON.get(members(cause), {}) if cause["equivalent"] else cause["parameters"]
+    entries = [(k, v) for k, v in cause["parameters"].items() if k in shared]
+    if not entries:
+        return ""
+    unit = entries[0][1]["unit"]
+    alike = [(k, v) for k, v in entries if v["unit"] == unit and (k not in PLAIN_NUMBERS or k == entries[0][0])]
+    key, entry = max(alike, key=lambda item: abs(item[1]["value"])) if members(cause) != TOGETHER else entries[0]
+    return short(entry, key)
+
+
+def plain_of(cause: Cause) -> Plain:
+    """The words of the cause, or of its class."""
+    if members(cause) == TOGETHER:
+        return LEGS
+    own = PLAIN[cause["name"]]
+    if not cause["equivalent"]:
+        return own
+    if members(cause) == LATE:
+        return Plain("The current comes {size} late (sampling delay or sensor lag)", own.motor, "", PLAIN["sampling_delay"].measurement)
+    others = [PLAIN[n] for n in cause["equivalent"]]
+    is_one_side = all(o.motor == own.motor for o in others)
+    return Plain(
+        f"Part of the error is {class_name(cause)}; this recording cannot say which", own.motor if is_one_side else "",
+        is_normal=own.is_normal and all(o.is_normal for o in others),
+    )
+
+
+def sentence(cause: Cause) -> str:
+    """What the cause does, with its size, without a full stop; brackets without a size are left out."""
+    size = main_size(cause)
+    text = plain_of(cause).says
+    if size:
+        return text.format(size=size)
+    import re
+
+    return re.sub(r" by \{size\}|: \{size\}[^:]*$| ?\([^()]*\{size\}[^()]*\)|\{size\} ?", "", text)

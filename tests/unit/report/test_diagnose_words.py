@@ -1,0 +1,157 @@
+"""What the page and the terminal say for every kind of result: explained, tied, unexplained, unfinished, nothing, refused."""
+
+import pytest
+
+from commissioner.diagnose.document import refused_document
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure
+from commissioner.diagnose.record import Facts
+from commissioner.report import diagnose_sections as sections
+from commissioner.report.diagnose_names import class_name, plain_of, sentence, size_words, spoken, sure_words
+from commissioner.report.diagnose_plain import PLAIN
+from commissioner.report.diagnose_words import actions, headline, meaning, remarks, tone
+from commissioner.report.page import Page, Table, render
+
+FACTS = Facts(2e-4, 5.0, 1500.0, 0.8, 5.0, 5000.0, 540.0, 3)
+LOST = {"voltage_v": (7.9, 0.07, "V"), "half_current_a": (0.1, 0.005, "A"), "time_us": (2.9, 0.03, "us")}
+OVER = "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
+
+
+def cause(name, sizes=None, equivalent=(), share=0.8, strength=19.0, confidence=0.98):
+    """One entry of the document's `causes`."""
+    parameters = {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in (sizes or {}).items()}
+    return {
+        "name": name, "title": "", "parameters": parameters, "gain_share": share, "confidence": confidence, "equivalent": list(equivalent),
+        "strength_over_noise": strength, "delta_chi2": 1e6, "alternatives": {}, "found_by": "fit",
+    }
+
+
+def document(verdict, causes=(), **more):
+    """What `diagnose` writes, as far as the words need it."""
+    gain = {"held_out": 0.9999, "rmse_before_a": 0.33, "rmse_after_a": 0.0104, "noise_floor_a": 0.0103, "explained_share": 0.9999}
+    limits = dict.fromkeys(("sensor_offset", "sensor_lag", "leakage_saturation"), 1.0)
+    return {
+        "verdict": verdict, "reason": "a reason with sensor_offset", "kind": "recording", "causes": list(causes), "gain": gain,
+        "remarks": [], "audit": [], "next_experiment": None, "parameters_before": {}, "parameters_after": {}, "uncertain": [],
+        "detection_limits": limits, "detection_limit_sizes": {}, "cannot_tell": [], "line_levels_db": {}, "dc_link_v": 540.0, **more,
+    }
+
+
+LEGS = cause("dead_time", LOST, ["device_drop"])
+LATE = cause("sampling_delay", {"delay_us": (120.0, 1.0, "us")}, ["sensor_lag"])
+
+
+def test_a_leg_voltage_is_named_as_what_it_is_and_as_normal():
+    words = headline(document("not_distinguishable", [LEGS]))
+    assert words.startswith("The inverter loses 7.9 V per leg (dead time and device drop together). That is normal.")
+    assert "over 99.9 %" in words and tone(document("not_distinguishable", [LEGS])) == "good"
+
+
+def test_much_leg_voltage_is_not_called_normal():
+    words = headline(document("not_distinguishable", [LEGS], dc_link_v=48.0))
+    assert "normal" not in words and "16.5 % of its DC link is much" in words
+
+
+@pytest.mark.parametrize(
+    ("one", "name", "certain", "shown", "hidden"),
+    [
+        (LEGS, "dead time + device drop, together", "one of the two", "lost per leg 7.90", "2.9"),
+        (LATE, "sampling delay or sensor lag", "98 % that it is one of the two", "delay in all 120.0", "time"),
+        (cause("iron_loss", {"conductance_ms": (1.5, 0.1, "mS")}, ["rotor_skin_effect"]), "iron loss or rotor skin effect",
+         "one of the two", "depends on which", "1.5"),
+    ],
+)  # fmt: skip
+def test_a_tie_has_the_name_certainty_and_size_of_the_class(one, name, certain, shown, hidden):
+    assert class_name(one) == name and certain in sure_words(one)
+    assert shown in size_words(one) and hidden not in size_words(one)
+
+
+def test_a_tie_of_unlike_causes_is_said_without_a_size():
+    one = cause("sensor_nonlinearity", {"even_at_full_scale": (0.01, 1e-4, "1")}, ["leakage_saturation"])
+    seen = document("not_distinguishable", [one])
+    assert "sensor nonlinearity or leakage saturation; this recording cannot say which" in headline(seen)
+    assert tone(seen) == "warn" and "1.0 %" not in headline(seen)
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "nothing_significant", "explained"])
+def test_an_unfinished_search_says_so_and_never_that_no_cause_does_it(verdict):
+    seen = document(verdict, [LEGS] if verdict == "explained" else [], remarks=[OVER])
+    words = headline(seen) + " ".join(meaning(seen))
+    assert words.startswith("Not finished") and "commissioner diagnose" in words
+    assert "no cause in the catalogue" not in words and tone(seen) == "warn" and remarks(seen) == []
+    assert "no cause was found" not in str(sections.causes(seen).parts).lower()
+
+
+def test_an_unexplained_error_keeps_what_is_known_beside_it():
+    words = headline(document("unexplained", [LEGS]))
+    assert "no cause in the catalogue makes" in words and "dead time + device drop" in words
+
+
+def test_what_is_uncertain_or_behind_a_class_does_not_stand_among_the_absent():
+    seen = document("not_distinguishable", [LATE], uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"]}])
+    absent = [row[0] for row in sections.not_found(seen).parts[0].rows]
+    assert absent == ["leakage saturation"]
+    assert "inverter off" in sections.uncertain_names(seen)[0].parts[0].rows[0][2]
+
+
+def test_parameters_are_given_without_interval_and_not_for_the_drive():
+    value = {"value": 0.32, "std": 0.001}
+    saturated = cause("magnetizing_saturation", {"extra_current_a": (0.6, 0.01, "A")})
+    seen = document("explained", [saturated], parameters_before={"magnetizing_inductance_h": {"value": 0.16, "std": 0.01}},
+                    parameters_after={"magnetizing_inductance_h": value})
+    words, table = sections.parameters(seen).parts
+    assert "do not enter these in a drive" in words and "unsaturated" in words
+    assert isinstance(table, Table) and table.rows[0][1:] == ("160.0 mH", "320.0 mH", "-50.0 %")
+
+
+def test_causes_below_the_noise_ask_for_no_action():
+    small = cause("sensor_gain_mismatch", {"gain_v_over_u": (-0.005, 1e-4, "1")}, share=1e-5, strength=0.1)
+    assert [who for who, _ in actions(document("explained", [LEGS, small]))] == ["for the drive"]
+
+
+@pytest.mark.parametrize("name", list(CATALOGUE))
+def test_every_cause_has_a_sentence_with_and_without_a_size_and_what_decides_it(name):
+    bare, sized = cause(name), cause(name, {"size": (2.0, 0.1, "V")})
+    for one in (bare, sized, cause(name, equivalent=["clock_drift"])):
+        words = sentence(one)
+        assert "{" not in words and "_" not in words and "()" not in words and not words.endswith((" ", ":", ","))
+    assert DECIDES[name].endswith(".") and (PLAIN[name].motor or plain_of(bare).motor)
+    assert "_" not in spoken(name)
+
+
+@pytest.mark.parametrize("names", [
+    ("dead_time", "device_drop"), ("sampling_delay", "sensor_lag"), ("iron_loss", "rotor_skin_effect"), ("sensor_offset", "sensor_drift"),
+    ("inductance_anisotropy", "sensor_gain_mismatch"), ("remanence", "shaft_motion"),
+])  # fmt: skip
+def test_every_tie_has_a_procedure_with_a_command_and_what_it_changes(names):
+    how = procedure(names, FACTS)
+    assert len(how.steps) >= 2 and how.command.startswith("commissioner diagnose ") and how.changes_values
+    assert not any(n in step for n in names if "_" in n for step in how.steps)
+
+
+def test_the_procedure_for_the_legs_has_the_drives_own_numbers():
+    class Tied:
+        name, equivalent, strength_sigma, delta_chi2 = "dead_time", ("device_drop",), 19.0, 3e8
+
+    class Seen:
+        facts, segments = FACTS, ()
+
+    plan = next_experiment("not_distinguishable", [Tied], Seen)
+    assert "from 5000 to 2500 Hz" in plan["steps"][0] and plan["repeats"] == 1
+    assert "switching frequency" in plan["do"] and plan["predicted_sigma"] > 100.0
+
+
+def test_a_refusal_and_a_null_are_said_plainly():
+    assert "cannot carry" in headline(refused_document("too short", "recording"))
+    assert meaning(refused_document("sensor_offset too large", "recording")) == ["sensor offset too large"]
+    null = document("nothing_significant")
+    assert headline(null).startswith("Nothing significant") and tone(null) == "good" and actions(null) == []
+
+
+def test_underscore_names_never_reach_the_page():
+    seen = document("unexplained", [LEGS, LATE], remarks=["Something about sensor_offset and dc_link_sag."])
+    seen["next_experiment"] = next_experiment("unexplained", [], None)
+    parts = [*sections.what_it_means(seen), sections.causes(seen), sections.next_test(seen), sections.not_found(seen)]
+    html = render(Page("t", headline(seen), tone(seen), [], parts)).partition("<main>")[2]
+    assert not [name for name in CATALOGUE if "_" in name and name in html]
+    assert "<code>commissioner diagnose" in html
