@@ -8,6 +8,7 @@ from commissioner.cli import screen
 from commissioner.errors import DataRefused
 from commissioner.run.catalogue import find_run
 from commissioner.run.replay import replay
+from commissioner.run.reporting import mark_restored
 from commissioner.run.restore import restore
 
 
@@ -23,6 +24,7 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
         screen.confirm("Write?", otherwise="nothing was written")
     with screen.busy("writing and reading back"):
         done = restore(summary, drive)
+    mark_restored(summary)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from jinja2 import Environment
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,6 +96,11 @@ def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
     return Picture(head + rest.partition("</metadata>")[2], caption)
 
 
+def with_notice(page: str, sentence: str) -> str:
+    """A rendered page with a sentence above its headline, for what has happened since."""
+    return page.replace("<main>", f'<main><section class="notice"><p>{escape(sentence)}</p></section>', 1)
+
+
 def render(page: Page) -> str:
     """The page as HTML. Text is escaped; only pictures made by `picture` pass as markup."""
     return _TEMPLATE.render(page=page, kind=lambda part: type(part).__name__, markup=Markup)
@@ -108,6 +113,7 @@ _TEMPLATE = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).f
 * { box-sizing:border-box } body { font:15px/1.5 system-ui,"DejaVu Sans",sans-serif; color:var(--ink); background:#f4f6f9; margin:0 }
 main { max-width:1020px; margin:0 auto; padding:28px 20px 60px }
 header,section { background:#fff; border:1px solid var(--rule); border-radius:10px; padding:20px 26px; margin:0 0 16px }
+.notice { border-left:6px solid var(--warn); font-weight:600 } .notice p { margin:0 }
 header { border-top:6px solid var(--{{ page.tone }}) } h1 { font-size:15px; color:var(--muted); margin:0 0 6px; font-weight:600 }
 .headline { font-size:22px; line-height:1.3; font-weight:650; margin:0 0 14px } h2 { font-size:17px; margin:0 0 10px }
 dl { display:grid; grid-template-columns:repeat(auto-fit,minmax(170px,1fr)); gap:10px 22px; margin:0 }

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import closing, suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 from commissioner.procedure.findings import RunEnded
+from commissioner.report.page import with_notice
 from commissioner.report.run_page import run_page
 from commissioner.report.summary import summarise
 from commissioner.run.archive import RunFolder, plain, read_journal
 from commissioner.run.catalogue import RunSummary
 from commissioner.run.replay import learn_again
+
+
+def mark_restored(run: RunSummary) -> None:
+    """The report says on top that the drive holds its old values again; a disk that is full leaves it as it is."""
+    page = Path(run.folder) / "report.html"
+    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    with suppress(OSError), closing(RunFolder(page.parent)) as folder:
+        text = page.read_text("utf-8")
+        folder.save_text(page.name, with_notice(text, f"Restored on {when}: the drive holds the values it had before this run."))
 
 
 def make_report(run: RunSummary) -> None:
