@@ -9,18 +9,18 @@ from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.residuals import Residuals
 from commissioner.report import diagnose_figures as figures
 from commissioner.report.diagnose_names import class_name, spoken
-from commissioner.report.diagnose_words import Document
+from commissioner.report.diagnose_words import Document, first_capital
 from commissioner.report.folded import folded
 from commissioner.report.page import Picture, Section, picture
 
 
-def where(left: Residuals, has_causes: bool, noise_a: float) -> Section:
+def where(document: Document, left: Residuals, has_causes: bool, noise_a: float) -> Section:
     """Error over current, voltage, flux, slope; over time and axis."""
     after = " Blue: what is left with the named causes; it should lie on zero." if has_causes else ""
     shade = " Shaded: the range that noise alone leaves (19 of 20 cases)." if figures.shade_is_visible(left, has_causes) else (
         " The noise is thinner than the lines." if has_causes else ""
     )
-    return Section("Where the simulation is wrong", [
+    return Section("Where the simulation is wrong" if document["verdict"] != "nothing_significant" else "The error is noise", [
         f"Orange: measured minus simulated current, with the four numbers fitted as well as they can be.{after} The fit hides a part of "
         "every cause, so these shapes are a hint and no proof; the names come from trying every cause of the catalogue.",
         picture(figures.over_quantities(left, has_causes), f"Error over current, voltage, flux and how fast the current changes.{shade} "
@@ -54,7 +54,7 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
                 "earlier. Inside the grey band nothing linear is left to model; distortion does not show here."),
         *_levels(document),
     ]
-    shown = [f"{class_name(c).capitalize()}: {CATALOGUE[c['name']].signature}. Source: {CATALOGUE[c['name']].source}." for c in document["causes"]]
+    shown = [f"{first_capital(class_name(c))}: {CATALOGUE[c['name']].signature}. Source: {CATALOGUE[c['name']].source}." for c in document["causes"]]
     never = "; ".join(s.replace(" | ", ", or ") for s in document["cannot_tell"])
     parts = [folded("Which causes look alike in this recording", same)] if same else []
     parts.append(folded("The error's tie to the voltage, and levels before any model", tie))

@@ -89,6 +89,11 @@ def main_size(cause: Cause) -> str:
     return short(entry, key)
 
 
+def size_name(cause: Cause) -> str:
+    """What the first size is called."""
+    return next((name for name, _ in sizes(cause)), "")
+
+
 def plain_of(cause: Cause) -> Plain:
     """The words of the cause, or of its class."""
     if members(cause) == TOGETHER:

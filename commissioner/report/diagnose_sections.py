@@ -15,6 +15,7 @@ from commissioner.report.diagnose_words import (
     meaning,
     next_promise,
     next_sentence,
+    of_cause,
     ordered,
     remarks,
 )
@@ -41,12 +42,14 @@ def what_it_means(document: Document) -> list[Section]:
     return [Section("What it means", [*words, *table])] if words or table else []
 
 
-def causes(document: Document) -> Section:
-    """One row per cause or class; the share behind a word, the number on hovering."""
+def causes(document: Document) -> list[Section]:
+    """One row per cause or class; the share as a word, its number on hovering. Nothing where the headline says all."""
     found = ordered(document)
     if not found:
-        tried = "no cause was found." if is_finished(document) else "no cause has been found yet."
-        return Section("Causes", [f"{tried.capitalize()} What these data would have shown is listed further down."])
+        if document["verdict"] == "nothing_significant" and is_finished(document):
+            return []
+        tried = "No cause was found." if is_finished(document) else "No cause has been found yet."
+        return [Section("Causes", [f"{tried} What these data would have shown is listed further down."])]
     largest = max(c["gain_share"] for c in found)
     rows, tones = [], list[Tone]()
     for cause in found:
@@ -61,15 +64,15 @@ def causes(document: Document) -> Section:
             limit_words(document, cause["name"]) if is_fit else "-",
         ))
         tones.append("warn" if cause["confidence"] < SURE else "good")
-    said_of_others = [f"{class_name(c).capitalize()}: {plain_of(c).motor}" for c in found[1:] if plain_of(c).motor]
-    return Section("Causes", [
+    said_of_others = [of_cause(c) for c in found[1:] if plain_of(c).motor]
+    return [Section("Causes", [
         Table(
             ("cause", "size", "part of the error", "its error", "sure of the name", "next best name", "smallest detectable"),
             rows, tones, caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
             "not add up to 100 %. Next best name: the other cause that explains most of the same.",
         ),
         *dict.fromkeys(said_of_others),
-    ])
+    ])]
 
 
 def _best_alternative(cause: Cause) -> str:
@@ -92,17 +95,17 @@ def uncertain_names(document: Document) -> list[Section]:
     ])]
 
 
-def next_test(document: Document) -> Section:
-    """The procedure of the next experiment, numbered."""
+def next_test(document: Document) -> list[Section]:
+    """The procedure of the next experiment, numbered; nothing where nothing is open."""
     plan = document["next_experiment"]
     if not plan:
-        return Section("What to measure next", ["Nothing is left open by these data."])
+        return []
     steps = [coded(f"{k}. {step}") for k, step in enumerate(plan.get("steps", ()), 1)]
     command = [coded(f"`{plan['command']}`")] if plan.get("command") else []
     rows = [("how often", next_promise(plan))]
     if plan.get("changes_values"):
         rows.append(("does it change the motor's values?", plan["changes_values"]))
-    return Section("What to measure next", [coded(next_sentence(plan)), *steps, *command, Table(("", ""), rows)])
+    return [Section("What to measure next", [coded(next_sentence(plan)), *steps, *command, Table(("", ""), rows)])]
 
 
 def not_found(document: Document) -> Section:
@@ -143,14 +146,14 @@ def points_causes(document: Document) -> Section:
     """The causes of a points table, with the chance that scatter alone made them up."""
     found = ordered(document)
     if not found:
-        return Section("Causes", ["No cause passed the rules."])
+        return Section("Causes", ["No cause was found in these points."])
     largest = max(c["gain_share"] for c in found)
     rows = [
         (class_name(c), size_words(c), hinted(part_word(c["gain_share"], largest), f"{percent(c['gain_share'])} comes back without it"),
          chance(c["p_value"]))
         for c in found
     ]
-    others = [f"{class_name(c).capitalize()}: {plain_of(c).motor}" for c in found[1:]]
+    others = [of_cause(c) for c in found[1:]]
     return Section("Causes", [
         str(document["reason"]),
         Table(("cause", "size", "part of the error", "chance that scatter made it up"), rows, ["good"] * len(rows), caption=PLUS_MINUS),

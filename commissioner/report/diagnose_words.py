@@ -16,6 +16,7 @@ from commissioner.report.diagnose_names import (
     plain_of,
     said,
     sentence,
+    size_name,
 )
 from commissioner.report.diagnose_numbers import number, percent
 from commissioner.report.page import Tone
@@ -35,7 +36,8 @@ def ordered(document: Document) -> list[Cause]:
 
 def is_finished(document: Document) -> bool:
     """Whether every cause was tried."""
-    return not any(remark.startswith(UNFINISHED) for remark in document.get("remarks", ()))
+    said_so = any(remark.startswith(UNFINISHED) for remark in document.get("remarks", ()))
+    return bool(document.get("is_complete", True)) and not said_so
 
 
 def headline(document: Document) -> str:
@@ -58,8 +60,8 @@ def headline(document: Document) -> str:
 
 def _points_headline(document: Document) -> str:
     if not document["causes"]:
-        return str(document["reason"])
-    named = [f"{class_name(c)} ({size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
+        return str(document["reason"]).replace(" (1 causes tested)", " (one cause tested)")
+    named = [f"{class_name(c)} ({size_name(c)} {size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
     return f"Constant parameters are not enough for these points; what is missing: {listed(named)}."
 
 
@@ -105,10 +107,31 @@ def meaning(document: Document) -> list[str]:
         out.append(f"Go on without a time limit: `{GO_ON}`. What is named here may still change.")
     elif document["verdict"] == "unexplained":
         out.append(said(str(document["reason"])))
-    out += list(dict.fromkeys(f"{plain_of(c).motor}" for c in causes[:1] if plain_of(c).motor))
-    if causes and document["kind"] != "points":
-        out.append(_explained(document, causes))
+    is_points = document["kind"] == "points"
+    if document["verdict"] == "nothing_significant" and is_finished(document) and not is_points:
+        out.append("Drive, motor and measurement behave as the four values say, to within the noise. Nothing to do.")
+    if causes and plain_of(causes[0]).motor:
+        is_named = not is_points and document["verdict"] != "unexplained" and is_finished(document)
+        out.append(plain_of(causes[0]).motor if is_named else of_cause(causes[0]))
+    if causes:
+        out.append(_of_points(document) if is_points else _explained(document, causes))
     return out
+
+
+def of_cause(cause: Cause) -> str:
+    """What one cause means for the motor, after its name."""
+    return f"{first_capital(class_name(cause))}: {plain_of(cause).motor}"
+
+
+def first_capital(text: str) -> str:
+    """`DC link sag` stays, `dead time` becomes `Dead time`."""
+    return text[:1].upper() + text[1:]
+
+
+def _of_points(document: Document) -> str:
+    gain = document["gain"]
+    before, after = (f"{number(gain[f'rmse_{k}_a'], 2)} A ({percent(gain[f'relative_error_{k}'])})" for k in ("before", "after"))
+    return f"On points kept aside for checking, the error goes from {before} with constant parameters to {after}."
 
 
 def _explained(document: Document, causes: list[Cause]) -> str:
