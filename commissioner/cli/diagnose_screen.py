@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from commissioner.cli.screen import out as screen
 from commissioner.cli.screen import table
-from commissioner.report.diagnose_names import class_name, members, said, sizes, spoken, sure_words
+from commissioner.report.diagnose_names import TOGETHER, class_name, members, said, sizes, spoken, sure_words
 from commissioner.report.diagnose_numbers import PLUS_MINUS, limit_words, number, part_word, sure
 from commissioner.report.diagnose_words import (
     actions,
@@ -37,15 +37,22 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
     else:
         _error(document)
     _uncertain(document)
-    if limits := _limits(document):
+    if document["verdict"] == "nothing_significant" and (limits := _limits(document)):
         screen.print(f"[dim]would have been seen: {limits}[/]")
     for who, what in actions(document):
         screen.print(f"[bold]{who}[/]  {escape(what)}")
-    _next(document)
+    if out is None or not is_only_together(document):
+        _next(document)
     for sentence in (*remarks(document), *document.get("audit", ())):
         screen.print(f"[dim]{escape(said(sentence))}[/]")
     if out is not None:
         screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)
+
+
+def is_only_together(document: Mapping[str, Any]) -> bool:
+    """The next test would only part what every inverter has anyway; its steps are on the page."""
+    plan = document["next_experiment"]
+    return bool(plan) and frozenset(plan["splits"]) == TOGETHER
 
 
 def _error(document: Mapping[str, Any]) -> None:

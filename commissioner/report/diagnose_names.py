@@ -47,7 +47,8 @@ def class_name(cause: Cause) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """`a, b and c`."""
+    """`a, b and c`, a class in it without its `together`."""
+    names = [n.removesuffix(", together") for n in names]
     return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)
 
 

@@ -18,6 +18,7 @@ from commissioner.report.diagnose_words import (
     of_cause,
     ordered,
     remarks,
+    tone,
 )
 from commissioner.report.folded import coded, hinted
 from commissioner.report.page import Section, Table, Tone
@@ -37,7 +38,7 @@ NAMES = (
 def what_it_means(document: Document) -> list[Section]:
     """The paragraphs under the headline and up to three rows of what to do."""
     rows = [(who.replace(" ", "\u00a0"), coded(what)) for who, what in actions(document)]
-    table = [Table(("", "what to do"), rows, ["good"] * len(rows))] if rows else []
+    table = [Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else []
     words = [coded(s) for s in (*meaning(document), *remarks(document))]
     return [Section("What it means", [*words, *table])] if words or table else []
 
@@ -48,8 +49,11 @@ def causes(document: Document) -> list[Section]:
     if not found:
         if document["verdict"] == "nothing_significant" and is_finished(document):
             return []
-        tried = "No cause was found." if is_finished(document) else "No cause has been found yet."
-        return [Section("Causes", [f"{tried} What these data would have shown is listed further down."])]
+        tried = "No cause can be named." if is_finished(document) else "No cause has been named yet."
+        below = "What helped to lower the error stands in the next block" if document.get("uncertain") else (
+            "What these data would have shown is listed further down"
+        )
+        return [Section("Causes", [f"{tried} {below}."])]
     largest = max(c["gain_share"] for c in found)
     rows, tones = [], list[Tone]()
     for cause in found:

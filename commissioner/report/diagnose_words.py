@@ -106,7 +106,7 @@ def meaning(document: Document) -> list[str]:
     if not is_finished(document):
         out.append(f"Go on without a time limit: `{GO_ON}`. What is named here may still change.")
     elif document["verdict"] == "unexplained":
-        out.append(said(str(document["reason"])))
+        out.append(_left_over(document))
     is_points = document["kind"] == "points"
     if document["verdict"] == "nothing_significant" and is_finished(document) and not is_points:
         out.append("Drive, motor and measurement behave as the four values say, to within the noise. Nothing to do.")
@@ -116,6 +116,12 @@ def meaning(document: Document) -> list[str]:
     if causes:
         out.append(_of_points(document) if is_points else _explained(document, causes))
     return out
+
+
+def _left_over(document: Document) -> str:
+    left = document["gain"]["structured_error_over_noise"] or 0.0
+    how_much = f"What is left is {number(left, 2)} x the noise and belongs to the test: it is not chance."
+    return f"{how_much} Until its cause is found, the motor's values may carry a part of it: check them before you enter them."
 
 
 def of_cause(cause: Cause) -> str:
@@ -173,8 +179,10 @@ def next_promise(plan: Mapping[str, Any]) -> str:
     clear = plan.get("predicted_sigma")
     times = "more than 100" if clear and clear > 100 else f"about {clear:.0f}" if clear else ""
     repeats = plan.get("repeats", 2)
-    count = "One new recording is enough" if repeats == 1 else f"Record it {repeats} times"
-    shown = f": the difference will be {times} times its own uncertainty (10 are plenty)" if times else ", so that chance shows"
+    count = "One new recording is enough" if repeats == 1 else "Record it twice" if repeats == 2 else f"Record it {repeats} times"
+    shown = f": the difference will be {times} times its own uncertainty (10 are plenty)" if times else (
+        "; what differs between equal recordings is chance"
+    )
     return f"{count}{shown}."
 
 

@@ -2,12 +2,15 @@
 
 import pytest
 
-from commissioner.diagnose.document import refused_document
+from commissioner.diagnose.audit import Audit
+from commissioner.diagnose.diagnosis import Diagnosis, Verdict
+from commissioner.diagnose.document import as_document, refused_document
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure
 from commissioner.diagnose.record import Facts
 from commissioner.report import diagnose_sections as sections
 from commissioner.report.diagnose_names import class_name, plain_of, sentence, size_words, spoken, sure_words
+from commissioner.report.diagnose_page import page_of
 from commissioner.report.diagnose_plain import PLAIN
 from commissioner.report.diagnose_words import actions, headline, meaning, remarks, tone
 from commissioner.report.page import Page, Table, render
@@ -28,7 +31,8 @@ def cause(name, sizes=None, equivalent=(), share=0.8, strength=19.0, confidence=
 
 def document(verdict, causes=(), **more):
     """What `diagnose` writes, as far as the words need it."""
-    gain = {"held_out": 0.9999, "rmse_before_a": 0.33, "rmse_after_a": 0.0104, "noise_floor_a": 0.0103, "explained_share": 0.9999}
+    gain = {"held_out": 0.9999, "rmse_before_a": 0.33, "rmse_after_a": 0.0104, "noise_floor_a": 0.0103, "explained_share": 0.9999,
+            "structured_error_over_noise": 11.3}
     limits = dict.fromkeys(("sensor_offset", "sensor_lag", "leakage_saturation"), 1.0)
     return {
         "verdict": verdict, "reason": "a reason with sensor_offset", "kind": "recording", "causes": list(causes), "gain": gain,
@@ -79,7 +83,7 @@ def test_an_unfinished_search_says_so_and_never_that_no_cause_does_it(verdict):
     words = headline(seen) + " ".join(meaning(seen))
     assert words.startswith("Not finished") and "commissioner diagnose" in words
     assert "no cause in the catalogue" not in words and tone(seen) == "warn" and remarks(seen) == []
-    assert "no cause was found" not in str([s.parts for s in sections.causes(seen)]).lower()
+    assert "no cause can be named" not in str([s.parts for s in sections.causes(seen)]).lower()
 
 
 def test_an_unexplained_error_keeps_what_is_known_beside_it():
@@ -146,6 +150,18 @@ def test_a_refusal_and_a_null_are_said_plainly():
     assert meaning(refused_document("sensor_offset too large", "recording")) == ["sensor offset too large"]
     null = document("nothing_significant")
     assert headline(null).startswith("Nothing significant") and tone(null) == "good" and actions(null) == []
+
+
+def test_a_class_in_a_list_reads_as_one_name():
+    words = headline(document("explained", [LEGS, cause("sensor_offset")], remarks=[OVER]))
+    assert "dead time + device drop and sensor offset." in words
+
+
+def test_the_page_of_a_refusal_has_the_reason_and_the_data():
+    seen = Diagnosis(Verdict.REFUSED, "too short for sensor_offset", (), (), Audit(()))
+    page = page_of(seen, as_document(seen, None), "file.csv")
+    assert page.tone == "bad" and [s.title for s in page.sections] == ["What it means", "The data"]
+    assert "too short for sensor offset" in page.sections[0].parts
 
 
 def test_underscore_names_never_reach_the_page():
