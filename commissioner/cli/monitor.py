@@ -100,7 +100,10 @@ def refuse(seen: Refused, file: Path, document: dict[str, Any], as_json: bool) -
 def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -> None:
     """The human view: what turns how fast against what, how sure, and what was put right."""
     from commissioner.cli.screen import out, quantity, table
+    from commissioner.monitor.findings import miswired
 
+    for finding in miswired(seen.findings):
+        out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
     period = seen.period
     rpm = 30 / 3.141592653589793
     rows = [
@@ -122,12 +125,14 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
         )
     else:
         rows.append(("load torque", document["waveforms"]["load_torque"]))
-    rows.append(("currents re-simulated to", f"{seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)"))
+    if seen.inertia_kg_m2 is not None:
+        rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
+    rows.append(("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)"))
     out.print(table("", ("", ""), rows))
     out.print(
         table(
             "Periods",
-            ("what", "Hz", "of the shaft", "speed ripple", "follows"),
+            ("what", "Hz", "of the shaft", "speed ripple", "varies with"),
             [
                 (
                     p.name,
@@ -166,7 +171,7 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
     )
     out.print(document["cannot_be_fixed"]["sentence"])
     for finding in seen.findings:
-        if finding.kind == "corrected" or (finding.kind == "note" and finding.code != "frequency_wander"):
+        if (finding not in miswired(seen.findings) and finding.kind == "corrected") or (finding.kind == "note" and finding.code != "frequency_wander"):
             out.print(f"[yellow]{finding.kind}[/] {finding.what}")
     if verdict is not None:
         colour = "red" if verdict.names else "green"

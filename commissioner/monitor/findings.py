@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from commissioner.monitor.sensors import Trust
 from commissioner.monitor.supply import SupplyAngle, Vector
+
+WIRING = ("crossed_channels", "polarity")
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,11 @@ class Finding:
     @property
     def stops(self) -> bool:
         return self.kind == "refused"
+
+
+def miswired(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """What was put right here and should be put right at the probes."""
+    return tuple(f for f in findings if f.kind == "corrected" and f.code in WIRING)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ from commissioner.motor.circuit import EQUAL_LEAKAGE
 
 OPEN = 0.25
 """A combination that keeps more than this share of its prior variance was not fixed by the data."""
+LARGE_WEIGHT = 0.2
+"""A parameter with less weight (of a unit vector) is not named as part of that combination."""
 WORDS = {
     "stator_resistance_ohm": "R_s",
     "rotor_resistance_ohm": "R_r",
@@ -122,15 +124,18 @@ def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
         for name, weight in zip(NAMES, fitted.open_direction, strict=True)
         if abs(weight) > 0.05
     ]
+    named = [WORDS[n] for n, w in zip(NAMES, fitted.open_direction, strict=True) if abs(w) > LARGE_WEIGHT]
+    symbols = " and ".join(named) + (" together" if len(named) > 1 else "")
     std = float(np.sqrt(fitted.open_direction @ fitted.log_covariance @ fitted.open_direction))
     return {
         "combination": " * ".join(parts),
         "relative_std": std,
         "share_from_prior": fitted.open_share,
         "sentence": (
-            f"The data hardly fix {' * '.join(parts)}: {fitted.open_share:.0%} of its prior uncertainty is left."
+            f"This recording hardly fixes {symbols}: {fitted.open_share:.0%} of what was unsure before is left. "
+            "Take them from a commissioning run."
             if fitted.open_share > OPEN
-            else f"Least known is {' * '.join(parts)}, to {std:.1%}; the data fix all four parameters."
+            else f"Least known: {symbols}, to {std:.1%}; all four are usable."
         ),
     }
 

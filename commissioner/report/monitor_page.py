@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from commissioner.monitor.chain import Observation
+from commissioner.monitor.findings import miswired
 from commissioner.monitor.indicators import Indicator, Pulses
 from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend import History, Verdict
@@ -13,6 +14,13 @@ from commissioner.report import monitor_figures as figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
 
 RPM = 30 / 3.141592653589793
+_MOTOR = (
+    ("stator resistance R_s", 1.0, "Ω"),
+    ("rotor resistance R_R", 1.0, "Ω"),
+    ("leakage inductance L_σ", 1e3, "mH"),
+    ("magnetizing inductance L_M", 1e3, "mH"),
+    ("rotor time constant", 1e3, "ms"),
+)
 
 
 def page_of(
@@ -25,7 +33,7 @@ def page_of(
     name: str,
 ) -> Page:
     """One self-contained page; all figures inline."""
-    tone: Tone = "bad" if verdict is not None and verdict.names else "good"
+    tone: Tone = "bad" if verdict is not None and verdict.names else "warn" if miswired(seen.findings) else "good"
     return Page(
         title=f"Running motor: {name}",
         headline=_headline(seen, verdict),
@@ -49,8 +57,10 @@ def _headline(seen: Observation, verdict: Verdict | None) -> str:
     period = seen.period
     swing = 0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * RPM
     text = f"{seen.mean_speed_rad_per_s * RPM:.2f} 1/min, moving by ±{swing:.3g} 1/min within the period, at {seen.mean_torque_nm:.3g} N m."
+    if wiring := miswired(seen.findings):
+        text = f"Check the probes: {'; '.join(f.what for f in wiring)} (put right here). {text}"
     if verdict is None:
-        return text
+        return f"{text} Nothing to compare with yet: --baseline FILE --learn makes this recording the first of its past."
     return f"{text} Against its past: {verdict.state.value}{' (' + ', '.join(verdict.names) + ')' if verdict.names else ''}."
 
 
@@ -59,11 +69,16 @@ def _facts(seen: Observation) -> list[tuple[str, str]]:
         ("mean speed", f"{seen.mean_speed_rad_per_s * RPM:.3f} ± {max(seen.mean_speed_std * RPM, 5e-4):.3f} 1/min"),
         (
             "mean torque",
-            f"{seen.mean_torque_nm:.2f} ± {seen.mean_torque_std:.2f} N m ({seen.mean_torque_sensor_std:.2f} from sensors)",
+            f"{seen.mean_torque_nm:.2f} ± {seen.mean_torque_std:.2f} N m ({seen.mean_torque_sensor_std:.2f} of it by sensor gain)",
         ),
         ("slip", f"{100 * seen.slip:.3f} %"),
         ("supply", f"{seen.lines.supply_rad_per_s / 6.283185307179586:.4f} Hz"),
-        ("currents re-simulated to", f"{seen.proof.relative_rms:.1%} rms"),
+        ("measured current, simulated to", f"{seen.proof.relative_rms:.1%} rms"),
+        *(
+            [("inertia used; load torque scales with it", f"{seen.inertia_kg_m2:.3g} kg m²")]
+            if seen.inertia_kg_m2 is not None
+            else []
+        ),
     ]
 
 
@@ -88,7 +103,7 @@ def _shaft(seen: Observation) -> Section:
                     "speed ripple rms / (1/min)",
                     "harmonics",
                     "periods averaged",
-                    "follows",
+                    "varies with",
                 ),
                 [
                     (
@@ -121,7 +136,7 @@ def _proof(seen: Observation, document: dict[str, Any]) -> Section:
             f"Against the speed column of the recording (never an input): mean off by {r['mean_speed_relative_error']:+.4%}, "
             f"ripple off by {r['ripple_relative_error']:.1%} of its rms."
         )
-    return Section("Proof without an encoder", parts)
+    return Section("Check: the current simulated at this speed against the measured one", parts)
 
 
 def _spectrum(seen: Observation) -> Section:
@@ -187,10 +202,10 @@ def _motor(seen: Observation, document: dict[str, Any]) -> Section:
         "The motor as it runs now",
         [
             Table(
-                ("parameter (inverse-Gamma)", "value", "standard deviation"),
+                ("parameter (inverse-Gamma circuit)", "value", "standard deviation"),
                 [
-                    (key, f"{q['value']:.5g}", f"{q['std']:.2g} ({q['std'] / q['value']:.1%})")
-                    for key, q in parameters.items()
+                    (words, f"{factor * q['value']:.4g} {unit}", f"{q['std'] / q['value']:.1%}")
+                    for (key, q), (words, factor, unit) in zip(parameters.items(), _MOTOR, strict=True)
                 ],
                 caption=f"Fitted to this recording, started from: {seen.start.origin}.",
             ),
