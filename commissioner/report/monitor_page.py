@@ -14,6 +14,7 @@ from commissioner.report import monitor_figures as figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
 
 RPM = 30 / 3.141592653589793
+_WIRING = {"crossed_channels": "channels are crossed", "polarity": "a channel is inverted"}
 _MOTOR = (
     ("stator resistance R_s", 1.0, "Ω"),
     ("rotor resistance R_R", 1.0, "Ω"),
@@ -38,7 +39,7 @@ def page_of(
         title=f"Running motor: {name}",
         headline=_headline(seen, verdict),
         tone=tone,
-        facts=_facts(seen),
+        facts=_facts(seen, verdict),
         sections=[
             _shaft(seen),
             _proof(seen, document),
@@ -58,13 +59,13 @@ def _headline(seen: Observation, verdict: Verdict | None) -> str:
     swing = 0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * RPM
     text = f"{seen.mean_speed_rad_per_s * RPM:.2f} 1/min, moving by ±{swing:.3g} 1/min within the period, at {seen.mean_torque_nm:.3g} N m."
     if wiring := miswired(seen.findings):
-        text = f"Check the probes: {'; '.join(f.what for f in wiring)} (put right here). {text}"
+        text = f"Check the probes: {' and '.join(_WIRING[f.code] for f in wiring)} (put right here, see the last section). {text}"
     if verdict is None:
-        return f"{text} Nothing to compare with yet: --baseline FILE --learn makes this recording the first of its past."
+        return text
     return f"{text} Against its past: {verdict.state.value}{' (' + ', '.join(verdict.names) + ')' if verdict.names else ''}."
 
 
-def _facts(seen: Observation) -> list[tuple[str, str]]:
+def _facts(seen: Observation, verdict: Verdict | None) -> list[tuple[str, str]]:
     return [
         ("mean speed", f"{seen.mean_speed_rad_per_s * RPM:.3f} ± {max(seen.mean_speed_std * RPM, 5e-4):.3f} 1/min"),
         (
@@ -79,6 +80,7 @@ def _facts(seen: Observation) -> list[tuple[str, str]]:
             if seen.inertia_kg_m2 is not None
             else []
         ),
+        *([("against its past", "no past given (--baseline FILE --learn)")] if verdict is None else []),
     ]
 
 
