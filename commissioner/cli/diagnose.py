@@ -130,9 +130,9 @@ def _points(tables: Sequence[Table], out: Path | None, as_json: bool) -> None:
         from commissioner.report.diagnose_page import points_page
         from commissioner.report.page import render
 
-        for one, table in zip(documents, tables, strict=True):
-            name = Path(table.source).stem
-            _write(out, document, {}, render(points_page(one, name)), page_name=f"report_{name}.html")
+        for one, file in zip(documents, _names(tables), strict=True):
+            name = str(Path(file).with_suffix(""))
+            _write(out, document, {}, render(points_page(one, name)), page_name=f"report_{name.replace('/', '_')}.html")
     _finish(document, out, as_json)
 
 
@@ -146,8 +146,15 @@ def _joined(documents: Sequence[dict[str, Any]], tables: Sequence[Table]) -> dic
         "verdict": verdict,
         "reason": " ".join(d["reason"] for d in documents),
         "causes": [c for d in documents for c in d["causes"]],
-        "tables": {Path(t.source).name: d for t, d in zip(tables, documents, strict=True)},
+        "tables": dict(zip(_names(tables), documents, strict=True)),
     }
+
+
+def _names(tables: Sequence[Table]) -> list[str]:
+    """The files' names, with their folder where two are called the same."""
+    paths = [Path(t.source) for t in tables]
+    names = [p.name for p in paths]
+    return [p.name if names.count(p.name) == 1 else f"{p.parent.name}/{p.name}" for p in paths]
 
 
 def _write(

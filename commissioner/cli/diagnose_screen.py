@@ -28,7 +28,17 @@ MOST_LIMITS = 6
 
 
 def show(document: Mapping[str, Any], out: Path | None) -> None:
-    """Headline, meaning, causes, uncertain names, what to do, what next."""
+    """Headline, meaning, causes, uncertain names, what to do, what next; of several tables one after the other."""
+    for name, one in document.get("tables", {}).items():
+        screen.print(f"[bold]{escape(name)}[/]")
+        _one(one, is_on_page=out is not None)
+    if "tables" not in document:
+        _one(document, is_on_page=out is not None)
+    if out is not None:
+        screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)
+
+
+def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     screen.print(f"[bold {COLOURS.get(tone(document), 'red')}]{escape(headline(document))}[/]")
     for sentence in meaning(document):
         screen.print(escape(sentence))
@@ -41,15 +51,13 @@ def show(document: Mapping[str, Any], out: Path | None) -> None:
         screen.print(f"[dim]would have been seen: {limits}[/]")
     for who, what in actions(document):
         screen.print(f"[bold]{who}[/]  {escape(what)}")
-    if out is None or not is_only_together(document):
+    if not (is_on_page and _is_only_together(document)):
         _next(document)
     for sentence in (*remarks(document), *document.get("audit", ())):
         screen.print(f"[dim]{escape(said(sentence))}[/]")
-    if out is not None:
-        screen.print(f"[dim]report[/] {escape(str(out))}", soft_wrap=True)
 
 
-def is_only_together(document: Mapping[str, Any]) -> bool:
+def _is_only_together(document: Mapping[str, Any]) -> bool:
     """The next test would only part what every inverter has anyway; its steps are on the page."""
     plan = document["next_experiment"]
     return bool(plan) and frozenset(plan["splits"]) == TOGETHER

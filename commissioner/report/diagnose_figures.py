@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.alike import Alike
 from commissioner.diagnose.residuals import Correlation, Residuals, Spectrum
+from commissioner.report.diagnose_names import spoken
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ def look_alikes(seen: Alike, named: Sequence[str]) -> Figure:
     figure = _figure(min(1.9 + 0.27 * count, 6.0), width=min(3.4 + 0.38 * count, TOTAL_WIDTH))
     axes = figure.subplots()
     axes.imshow(seen.share, cmap="Blues", vmin=0.0, vmax=1.15, aspect="auto")
-    words = [n.replace("_", " ") for n in seen.names]
+    words = [spoken(n) for n in seen.names]
     axes.set_xticks(range(count), words, rotation=40, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(count), words)
     for label, name in zip([*axes.get_xticklabels(), *axes.get_yticklabels()], seen.names * 2, strict=True):

@@ -54,7 +54,7 @@ def test_a_recording_is_diagnosed_and_its_model_plays_what_was_measured(files, t
     assert document["verdict"] == "not_distinguishable" and document["causes"][0]["equivalent"] == ["device_drop"]
     assert any("banana" in sentence for sentence in document["audit"])
     page = (tmp_path / "report.html").read_text()
-    assert "dead time or device drop" in page and "http" not in page.split("</style>")[1].replace("http://www.w3.org", "")
+    assert "dead time + device drop, together" in page and "http" not in page.split("</style>")[1].replace("http://www.w3.org", "")
     again = tmp_path / "again.csv"
     assert call("simulate", document["model_file"], "--out", str(again), "--like", str(files / "good.csv"), "--json").code == 0
     measured, played = table(files / "good.csv"), table(again)
