@@ -109,7 +109,7 @@ def run(
 
 @app.command()
 def identify(
-    files: Annotated[list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz or Parquet.")],
+    files: Annotated[list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
     write_back: Annotated[

@@ -56,10 +56,15 @@ def busy(doing: str) -> Iterator[None]:
 
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
-    err.print(f"[bold red]{escape(error.what)}[/]")
+    err.print(f"[bold red]{escape(printable(error.what))}[/]")
     for name, text in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
         if text not in (None, ""):
-            err.print(f"  [dim]{name:<7}[/]{escape(shown(text))}")
+            err.print(f"  [dim]{name:<7}[/]{escape(printable(shown(text)))}")
+
+
+def printable(text: str) -> str:
+    """Without the control characters that a stranger's file may hold: they could steer the terminal."""
+    return "".join(character if character.isprintable() or character == "\n" else "?" for character in text)
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:

@@ -16,7 +16,7 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.foreign_csv import parse_csv, read_text
 from commissioner.recordings.names import is_per_minute, key_of, meaning_of, uses_rst
-from commissioner.recordings.table import CONTRACT_COLUMNS, Table, read_table, to_running
+from commissioner.recordings.table import CONTRACT_COLUMNS, READ, Table, read_table, to_running
 from commissioner.recordings.units import scale_of, unit_in
 from commissioner.records import RunningRecording, Signal
 
@@ -67,7 +67,7 @@ def import_table(path: Path) -> Table:
             f"{path}: {NOT_READ[suffix]} files are not read",
             step="read recording",
             value=suffix,
-            limit="CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4, COMTRADE",
+            limit=READ,
             remedy="export the recording as CSV or Parquet",
         )
     if suffix in _BINARY:

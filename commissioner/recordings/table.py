@@ -39,6 +39,9 @@ class Table:
     source: str
 
 
+READ = "CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4 or COMTRADE"
+
+
 def read_table(path: Path) -> Table:
     """The table in `path`. Raises UsageError where there is no such file, DataRefused where it is not a table."""
     if not path.is_file():
@@ -52,6 +55,8 @@ def read_table(path: Path) -> Table:
     try:
         if path.suffix == ".parquet":
             return _read_parquet(path)
+        if _is_binary(path):
+            raise _refuse(path, "the file holds bytes, not text", path.suffix or "no ending", READ, "give the recording, not a picture of it")
         return _read_csv(path)
     except (
         pa.ArrowInvalid,
@@ -68,9 +73,18 @@ def read_table(path: Path) -> Table:
             path,
             "the file is not a readable table",
             reason,
-            "CSV with one header line, or Parquet",
-            "export the recording again in the documented format",
+            READ,
+            "export the recording again; `commissioner simulate motor_2kw2 --out example.csv` writes one to compare with",
         ) from error
+
+
+def _is_binary(path: Path) -> bool:
+    """A zero byte in the first lines, unless it is half a character of UTF-16."""
+    if path.suffix == ".gz":
+        return False
+    with path.open("rb") as file:
+        head = file.read(4096)
+    return b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff")
 
 
 def check_ending(path: Path) -> None:
@@ -135,6 +149,11 @@ def to_running(table: Table) -> RunningRecording:
     is_line = phase[0] not in columns
     voltages = line if is_line else phase
     currents = ("current_u_a", "current_v_a", "current_w_a")
+    if "voltage_axis_v" in columns and is_line and not any(name in columns for name in line):
+        raise _refuse(
+            Path(table.source), "this is a recording at standstill", "voltage_axis_v", "three voltages of a running motor",
+            "`commissioner identify` or `commissioner diagnose` reads it",
+        )
     _require(table, _all_but_one(currents, columns), "a running-motor recording")
     _require(table, ("time_s", *(_all_but_one(line, columns) if is_line else phase)), "a running-motor recording")
     empty = np.full(columns["time_s"].size, np.nan)
