@@ -145,7 +145,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     causes = [c for c in causes if c not in unsure]
     total = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
     share, rest = _explained_share(found, rest, total.sigma), total
-    verdict, reason = _verdict(causes, rest, share, doubt < 1.0)
+    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=doubt < 1.0, is_complete=found.is_complete)
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
@@ -269,13 +269,20 @@ def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
     return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)
 
 
-def _verdict(causes: Sequence[Cause], rest: Leftover, share: float, leaves_a_trace: bool) -> tuple[Verdict, str]:
+def _verdict(
+    causes: Sequence[Cause], rest: Leftover, share: float, *, leaves_a_trace: bool, is_complete: bool
+) -> tuple[Verdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
         rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
         or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
+        if not is_complete:
+            return Verdict.UNEXPLAINED, (
+                f"Not finished: the time allowed was over before every cause was tried; a structured error of {rest.sigma:.2g} "
+                f"times the noise is left so far{', beside ' + names if names else ''}."
+            )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
         return Verdict.UNEXPLAINED, (
             f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes."
