@@ -2,6 +2,10 @@
 
 import pytest
 
+from commissioner.diagnose.diagnosis import diagnose
+from commissioner.diagnose.document import as_document
+from commissioner.recordings.table import read_table, to_standstill
+from commissioner.report.summary import diagnosis_sentences
 from tests.support.command_line import call
 from tests.support.sim_process import SimProcess
 
@@ -36,3 +40,12 @@ def test_the_whole_diagnosis_and_the_sentence_are_in_the_run_folder(ended):
     (folder,) = (path.parent for path in runs.glob("*/diagnosis.json"))
     assert any("would have come out" in remark for remark in answer.json["remarks"])
     assert "would have come out" in (folder / "report.html").read_text()
+
+
+def test_a_diagnosis_whose_time_is_over_does_not_say_that_nothing_fits(ended):
+    answer, runs = ended
+    (path,) = runs.glob("*/recording.parquet")
+    document = as_document(diagnose([to_standstill(read_table(path))], go_on=lambda: False), None)
+    assert not document["is_complete"]
+    assert document["reason"].startswith("Not finished")
+    assert "stopped before every cause was tried" in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
