@@ -17,11 +17,11 @@ class Plain:
     is_normal: bool = False
 
 
-FINE = "The motor is fine; this is the measurement's error."
+FINE = "This is the measurement's error, not the motor's."
 LATE = "Nothing to repair: one or two sampling periods are usual. A delay that is known can be taken off the current's time."
 LEGS = Plain(
     "The inverter loses {size} per leg (dead time and device drop together)",
-    "The motor is fine. At low speed the torque ripples a little and a stator resistance measured through this inverter can "
+    "This is no fault of the motor. At low speed the torque ripples a little and a stator resistance measured through this inverter can "
     "come out wrong; at higher speed it hardly matters.",
     "Switch the drive's dead-time compensation on if it has one, and record again: this error must become smaller.",
     is_normal=True,
@@ -31,18 +31,18 @@ PLAIN: Mapping[str, Plain] = {
     "device_drop": Plain("The inverter's switches and diodes take {size} from every leg", LEGS.motor, LEGS.drive, is_normal=True),
     "dc_link_sag": Plain(
         "The DC link sags by {size} at rated power, and nothing makes up for it",
-        "The motor is fine. Under load it gets less voltage than the drive believes.",
+        "This is no fault of the motor. Under load it gets less voltage than the drive believes.",
         "Switch DC-link (bus voltage) compensation on; if the sag is new, check the supply.",
         "Record the DC-link voltage too (column dc_link_v).",
     ),
     "dc_link_ripple": Plain(
-        "Ripple of the DC link ({size}) reaches the motor", "The motor is fine. Its torque can hum at the ripple's frequency.",
+        "Ripple of the DC link ({size}) reaches the motor", "This is no fault of the motor. Its torque can hum at the ripple's frequency.",
         "If the ripple is new, check the three mains phases and the link's capacitors.",
         "Record the DC-link voltage too (column dc_link_v).",
     ),
     "cable_capacitance": Plain(
         "The motor cable draws a current of its own ({size} per phase)",
-        "The motor is fine. The drive's sensors see a current that never reaches it.",
+        "This is no fault of the motor. The drive's sensors see a current that never reaches it.",
         measurement="Usual for long or shielded cables. Measure at the motor's end where it matters.",
     ),
     "magnetizing_saturation": Plain(
@@ -56,7 +56,7 @@ PLAIN: Mapping[str, Plain] = {
         "Every iron has some. It costs a little power at low frequency and moves no parameter much.", is_normal=True,
     ),
     "remanence": Plain(
-        "The iron still held flux when the test began ({size})", "The motor is fine.",
+        "The iron still held flux when the test began ({size})", "This is no fault of the motor.",
         measurement="Wait ten seconds with the inverter off between two tests.",
     ),
     "leakage_saturation": Plain(
@@ -76,12 +76,12 @@ PLAIN: Mapping[str, Plain] = {
     ),
     "stator_heating": Plain(
         "The stator winding warmed during the test (its resistance rose by {size} at rated current)",
-        "The motor is fine. R_s holds for the temperature of the test.",
+        "This is no fault of the motor. R_s holds for the temperature of the test.",
         "Enter R_s with the winding's temperature where the drive asks for it.", "Pause between the tests.", True,
     ),
     "rotor_heating": Plain(
         "The rotor warmed during the test (its resistance rose by {size} at rated current)",
-        "The motor is fine. R_R holds for the temperature of the test.", measurement="Pause between the tests.", is_normal=True,
+        "This is no fault of the motor. R_R holds for the temperature of the test.", measurement="Pause between the tests.", is_normal=True,
     ),
     "shaft_motion": Plain(
         "The shaft moved during the test ({size})", "The values of a shaft that moves are not those of one at rest.",
