@@ -47,6 +47,9 @@ LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
 IRON_CORNER_HZ = 400.0
 SAME_ORDER_TIE = 0.1
+NEARLY_ALL, LEFT_TIE = 0.001, 0.1
+"""A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
+the unknown rest may favour either."""
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -198,7 +201,8 @@ def _cause(
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     if name == "rotor_skin_effect" and _is_iron_like(found):
         fixed = ("iron_loss",)
-    close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain))
+    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
+    close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain, unsettled))
     features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=NO_RIVAL), total)
     sure = confidence(features, calibration.WEIGHTS) * doubt
     if not noise.is_known:
