@@ -26,7 +26,7 @@ def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[dict[str
         return []
     named = {n for c in seen.causes for n in (c.name, *c.equivalent)}
     why: dict[str, str] = {}
-    for cause in seen.unsure:
+    for cause in sorted(seen.unsure, key=lambda c: -c.strength_sigma):
         why[cause.name] = (
             f"It helps the fit (its error: {number(cause.strength_sigma, 2)} x the noise), but is more likely another cause in disguise."
         )
