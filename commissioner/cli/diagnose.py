@@ -49,7 +49,6 @@ def _recordings(tables: Sequence[Table], motor: str | None, out: Path | None, as
     document = as_document(seen, None)
     document["audit"] = [*remarks, *document["audit"]]
     document["uncertain"] = uncertain(seen, progress.withdrawn({c.name for c in (*seen.causes, *seen.unsure)}))
-    document["is_complete"] = seen.found.is_complete if seen.found else True
     document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if out is not None:
         from commissioner.report.diagnose_page import page_of
