@@ -105,7 +105,7 @@ def wear(count: int, fraction: float) -> str:
 _MARKS = {
     "commissioned": "[green]✓ commissioned[/]",
     "accepted, not written": "[yellow]✓ accepted, not written[/]",
-    "restored since": "[yellow]✓ restored since[/]",
+    "commissioned, restored since": "[yellow]✓ commissioned, restored since[/]",
     "rejected": "[yellow]✗ rejected[/]",
     "aborted": "[yellow]■ aborted[/]",
     "faulted": "[red]✗ faulted[/]",
@@ -138,7 +138,7 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             table(
                 "",
                 ("", "value", "std error", "in the drive before", "change", "written"),
-                _rows(document, "restored since" if standing_now == "restored since" else "yes"),
+                _rows(document, "restored" if standing_now == "commissioned, restored since" else "yes"),
                 right=(1, 2, 3, 4),
             )
         )

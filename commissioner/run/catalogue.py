@@ -31,7 +31,7 @@ class RunSummary:
         if self.outcome != "commissioned" or self.written.startswith("old or new"):
             return self.outcome
         if self.written.startswith(RESTORED):
-            return "restored since"
+            return "commissioned, restored since"
         return "commissioned" if self.written.startswith("new") else "accepted, not written"
 
 
