@@ -44,7 +44,8 @@ class BatchFit:
     free_parameters: int
     residuals: tuple[Signal, ...]
     stator_flux_wb: tuple[Signal, ...]
-    offsets_a: tuple[float, ...]
+    own: Matrix
+    """(segments, 3): each segment's sensor offset in A and initial fluxes in Wb."""
     iterations: int
     has_converged: bool
     condition: float
@@ -54,6 +55,11 @@ class BatchFit:
     @property
     def noise_a(self) -> float:
         return math.sqrt(self.sum_of_squares / max(self.samples - self.free_parameters, 1))
+
+    @property
+    def offsets_a(self) -> tuple[float, ...]:
+        """The current sensors' offset along the axis, one per segment."""
+        return tuple(map(float, self.own[:, 0]))
 
     @property
     def delay(self) -> Quantity:

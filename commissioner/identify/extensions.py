@@ -54,7 +54,9 @@ def select_model(
             replace(m, leg=None if m.leg and not _loses_voltage(best) else law),
         )
         untried = [t for t in toggled if t not in tried]
-        trials = _those_simulated([partial(_coarse, segments, period_s, start, t, extended(best, t)) for t in untried])
+        trials = _those_simulated(
+            [partial(_coarse, segments, period_s, start, t, extended(best, t), best.own) for t in untried]
+        )
         tried.update(toggled)
         better = [t for t in trials if t.criterion() < best.criterion() - BETTER and np.all(t.theta[:4] > 0.0)]
         if not better:
@@ -76,7 +78,7 @@ def _with_iron(segments: Sequence[Segment], period_s: float, start: InverseGamma
         return best
     model = replace(best.model, extra_powers=1, flux_scale_wb=best.peak_flux_wb)
     return next(
-        iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model))])), best
+        iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model), best.own)])), best
     )
 
 
@@ -93,8 +95,7 @@ def _from_every_start(
     finalists = [best, *_those_simulated(attempts)]
     chosen = min(finalists, key=lambda f: f.criterion())
     gamma = chosen.gamma.as_inverse_gamma()
-    finished = _those_simulated([partial(fit_segments, segments, period_s, gamma, chosen.model, chosen.theta)])
-    return finished[0] if finished else chosen
+    return fit_segments(segments, period_s, gamma, chosen.model, chosen.theta, own_start=chosen.own)
 
 
 def _those_simulated(attempts: Sequence[Callable[[], BatchFit]]) -> list[BatchFit]:
@@ -114,9 +115,14 @@ def _begin(
 
 
 def _coarse(
-    segments: Sequence[Segment], period_s: float, start: InverseGamma, model: ModelChoice, theta: Matrix
+    segments: Sequence[Segment],
+    period_s: float,
+    start: InverseGamma,
+    model: ModelChoice,
+    theta: Matrix,
+    own: Matrix | None = None,
 ) -> BatchFit:
-    return fit_segments(segments, period_s, start, model, theta, MOST_COARSE_STEPS, COARSE)
+    return fit_segments(segments, period_s, start, model, theta, MOST_COARSE_STEPS, COARSE, own)
 
 
 def _loses_voltage(fit: BatchFit) -> bool:

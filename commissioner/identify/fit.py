@@ -30,8 +30,10 @@ def fit_segments(
     theta_start: Matrix | None = None,
     max_iterations: int = 40,
     tolerance: float = 1e-4,
+    own_start: Matrix | None = None,
 ) -> BatchFit:
-    """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`.
+    """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`; `own_start` (segments, 3) is what
+    each segment begins with where an earlier fit knows it, else zero.
 
     Stops when what steps shrinking as the last two did would still add is below `tolerance` standard errors of every
     shared parameter (or the step below 1e-10 of its value); `has_converged` says whether that was reached.
@@ -41,7 +43,7 @@ def fit_segments(
     theta = start_theta(start, choice) if theta_start is None else theta_start.copy()
     problem.bounds = (theta[:CIRCUIT] / WIDEST, theta[:CIRCUIT] * WIDEST)
     problem.plateau_v = max(float(np.max(np.abs(theta[choice.leg_slice]), initial=0.0)), 1e-3)
-    own = np.zeros((len(segments), OWN))
+    own = np.zeros((len(segments), OWN)) if own_start is None else own_start.copy()
     present = problem.evaluate(theta, own)
     if not np.all(np.isfinite(present.information)):
         raise DataRefused(
@@ -144,7 +146,7 @@ def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterat
         free_parameters=int(free.size),
         residuals=tuple(at.residuals),
         stator_flux_wb=tuple(at.flux),
-        offsets_a=tuple(map(float, own[:, 0])),
+        own=own,
         iterations=iterations,
         has_converged=converged,
         condition=float(np.linalg.cond(normal)),

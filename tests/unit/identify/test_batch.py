@@ -48,6 +48,17 @@ def test_segments_share_the_machine_and_keep_their_own_offset_and_state():
     assert fit.offsets_a == pytest.approx((0.1, -0.2), abs=1e-9)
 
 
+def test_a_fit_goes_on_where_an_earlier_one_ended():
+    voltage = multitone(TONES, 6.0, PERIOD_S)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(voltage.size)
+    current = linear_response(TRUTH, voltage, PERIOD_S)[0] + noise
+    parts = [Segment(voltage[1500:], current[1500:] + 0.1, 0.0, False)]
+    first = fit_segments(parts, PERIOD_S, START)
+    again = fit_segments(parts, PERIOD_S, START, theta_start=first.theta, own_start=first.own, max_iterations=1)
+    assert again.sum_of_squares == pytest.approx(first.sum_of_squares, rel=1e-9)
+    assert np.any(np.abs(first.own[0, 1:]) > 1e-3)
+
+
 def test_masked_samples_do_not_count():
     voltage = multitone(TONES, 4.0, PERIOD_S)
     current = linear_response(TRUTH, voltage, PERIOD_S)[0]
