@@ -22,6 +22,8 @@ BETTER = 4.0
 BLIND_LOSSES = (0.1, 0.4)
 COARSE, MOST_COARSE_STEPS = 0.03, 20
 """While models are compared: steps, in standard errors, that count as none, and how many are tried."""
+FINAL_STEPS = 200
+"""The chosen model is fitted until it stays: from another machine the way behind a steep loss is long."""
 
 
 def select_model(
@@ -95,7 +97,7 @@ def _from_every_start(
     finalists = [best, *_those_simulated(attempts)]
     chosen = min(finalists, key=lambda f: f.criterion())
     gamma = chosen.gamma.as_inverse_gamma()
-    return fit_segments(segments, period_s, gamma, chosen.model, chosen.theta, own_start=chosen.own)
+    return fit_segments(segments, period_s, gamma, chosen.model, chosen.theta, FINAL_STEPS, own_start=chosen.own)
 
 
 def _those_simulated(attempts: Sequence[Callable[[], BatchFit]]) -> list[BatchFit]:
