@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.cli import screen
-from commissioner.errors import CheckFailed
+from commissioner.procedure.checks import check_failed
 from commissioner.run.inspection import inspect_drive
 from commissioner.settings import load_motor, load_procedure
 
@@ -16,11 +16,11 @@ def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_js
     nameplate, plan = load_motor(motor), load_procedure(procedure)
     with screen.busy("asking the drive"):
         inspection = inspect_drive(drive, profile, nameplate, plan)
-    failed = [result for result in inspection.checks if not result.has_passed]
+    failure = check_failed(inspection.checks)
     document: dict[str, Any] = {
-        "outcome": "rejected" if failed else "passed",
-        "reason": f"check failed: {failed[0].name}"
-        if failed
+        "outcome": "rejected" if failure else "passed",
+        "reason": failure.what
+        if failure
         else "every check passed; nothing was energised or written",
         "drive": inspection.identity,
         "nameplate_in_drive": inspection.nameplate,
@@ -30,8 +30,8 @@ def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_js
     }
     if as_json:
         screen.emit(document)
-        if failed:
-            raise SystemExit(CheckFailed.exit_code)
+        if failure:
+            raise SystemExit(failure.exit_code)
         return
     identity = inspection.identity
     screen.out.print(f"[bold]{identity.drive_type}[/] #{identity.serial_number}, firmware {identity.firmware_version}")
@@ -46,7 +46,6 @@ def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_js
         for r in inspection.checks
     ]
     screen.out.print(screen.table("", ("", "check", "seen", "wanted", "remedy"), rows))
-    if failed:
-        first = failed[0]
-        raise CheckFailed(document["reason"], step="check", value=first.value, limit=first.limit, remedy=first.remedy)
+    if failure:
+        raise failure
     screen.out.print(f"[green]{document['reason']}[/]")

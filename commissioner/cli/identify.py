@@ -11,7 +11,6 @@ from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
     from commissioner.motor.nameplate import Nameplate
-    from commissioner.recordings.table import Table
     from commissioner.records import StandstillRecording
 
 ROWS = (
@@ -85,22 +84,7 @@ def _read(path: Path) -> StandstillRecording:
     from commissioner.recordings.importers import contract_table
     from commissioner.recordings.table import to_standstill
 
-    return to_standstill(_other_separators(path) or contract_table(path))
-
-
-def _other_separators(path: Path) -> Table | None:
-    """The contract's columns between semicolons or tabs, with decimal points or commas; None for any other file."""
-    from commissioner.recordings.foreign_csv import parse_csv, read_text
-    from commissioner.recordings.table import CONTRACT_COLUMNS, Table
-
-    if path.suffix.lower() not in (".csv", ".txt", ".tsv") or not path.is_file():
-        return None
-    text = read_text(path)
-    header = next((line for line in text.splitlines() if line and not line.startswith("#")), "")
-    if len(header.replace("\t", ";").split(";")) < 2:
-        return None
-    columns, metadata = parse_csv(text, str(path))
-    return Table({name: values for name, values in columns.items() if name in CONTRACT_COLUMNS}, metadata, str(path))
+    return to_standstill(contract_table(path))
 
 
 def _nameplate(motor: str | None) -> Nameplate | None:

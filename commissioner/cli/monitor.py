@@ -102,7 +102,8 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
     from commissioner.cli.screen import out, quantity, table
     from commissioner.monitor.findings import miswired
 
-    for finding in miswired(seen.findings):
+    wiring = miswired(seen.findings)
+    for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
     period = seen.period
     rpm = 30 / 3.141592653589793
@@ -171,7 +172,7 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
     )
     out.print(document["cannot_be_fixed"]["sentence"])
     for finding in seen.findings:
-        if (finding not in miswired(seen.findings) and finding.kind == "corrected") or (finding.kind == "note" and finding.code != "frequency_wander"):
+        if (finding not in wiring and finding.kind == "corrected") or (finding.kind == "note" and finding.code != "frequency_wander"):
             out.print(f"[yellow]{finding.kind}[/] {finding.what}")
     if verdict is not None:
         colour = "red" if verdict.names else "green"

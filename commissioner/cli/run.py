@@ -9,9 +9,9 @@ from rich.markup import escape
 from commissioner.cli import screen
 from commissioner.cli.angles import parse_axes
 from commissioner.cli.live import LiveView
-from commissioner.errors import CheckFailed
 from commissioner.link.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.checks import check_failed
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.run.commission import Commissioned, commission, require_capabilities
 from commissioner.run.inspection import inspect_drive
@@ -83,12 +83,9 @@ def _ask(url: str, profile: str, nameplate: Nameplate, plan: ProcedurePlan, *, w
         inspection = inspect_drive(url, profile, nameplate, plan)
     drive, job = inspection.identity, inspection.job
     assert job is not None, "a drive with excitation has a job"
-    if failed := [check for check in inspection.checks if not check.has_passed]:
-        first = failed[0]
-        raise CheckFailed(
-            f"{drive.drive_type} #{drive.serial_number}: check failed: {first.name}; nothing was energised",
-            step="check", value=first.value, limit=first.limit, remedy=first.remedy,
-        )  # fmt: skip
+    if failure := check_failed(inspection.checks):
+        failure.what = f"{drive.drive_type} #{drive.serial_number}: {failure.what}; nothing was energised"
+        raise failure
     stretched = f", stretched {job.stretch:.1f} times for a slow rotor" if job.stretch > 1.0 else ""
     screen.out.print(
         f"[bold]{escape(drive.drive_type)} #{drive.serial_number}[/], motor of {1e-3 * nameplate.rated_power_w:g} kW, "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from commissioner.cli import screen
 from commissioner.errors import DataRefused, UsageError
 from commissioner.run.archive import damaged, read_blocks, read_saved
-from commissioner.run.catalogue import RunSummary, find_run, read_runs
+from commissioner.run.catalogue import OLD_OR_NEW, RunSummary, find_run, read_runs
 
 if TYPE_CHECKING:
     from commissioner.identify.combine import Combined
@@ -24,7 +24,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
         screen.out.print(f"no runs in {folder}/")
         return
     rows = [
-        (run.run, screen.outcome_mark(run.standing), run.drive, "old or new" if run.written.startswith("old or new") else "")
+        (run.run, screen.outcome_mark(run.standing), run.drive, OLD_OR_NEW if run.is_unknown else "")
         for run in found
     ]
     screen.out.print(screen.table("", ("run", "outcome", "drive", "holds"), rows))

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from commissioner.errors import Aborted, CommissionerError, UsageError
-from commissioner.report.summary import finding_sentences, standing
+from commissioner.report.summary import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
 from commissioner.run.archive import plain
 
 out = Console(highlight=False)
@@ -104,8 +104,8 @@ def wear(count: int, fraction: float) -> str:
 
 _MARKS = {
     "commissioned": "[green]✓ commissioned[/]",
-    "accepted, not written": "[yellow]✓ accepted, not written[/]",
-    "commissioned, restored since": "[yellow]✓ commissioned, restored since[/]",
+    ACCEPTED: f"[yellow]✓ {ACCEPTED}[/]",
+    RESTORED_SINCE: f"[yellow]✓ {RESTORED_SINCE}[/]",
     "rejected": "[yellow]✗ rejected[/]",
     "aborted": "[yellow]■ aborted[/]",
     "faulted": "[red]✗ faulted[/]",
@@ -138,13 +138,13 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             table(
                 "",
                 ("", "value", "std error", "in the drive before", "change", "written"),
-                _rows(document, "restored" if standing_now == "commissioned, restored since" else "yes"),
+                _rows(document, "restored" if standing_now == RESTORED_SINCE else "yes"),
                 right=(1, 2, 3, 4),
             )
         )
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(remark)}")
-        if standing(document) == "accepted, not written":
+        if standing(document) == ACCEPTED:
             out.print("  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones")
     out.print(f"  energised {document['energised_s']:.1f} s in all")
 

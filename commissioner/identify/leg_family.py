@@ -30,6 +30,7 @@ from commissioner.identify.leg_pair import (
     TYPICAL_SHARE,
     PairLaw,
 )
+from commissioner.identify.mixture import chances_of, mixture
 from commissioner.records import Signal
 
 Matrix = NDArray[np.float64]
@@ -57,11 +58,8 @@ def one_inverter(fits: Sequence[BatchFit]) -> list[BatchFit]:
     pairs = pairs_of(fits)
     if not pairs or chi2.sf(pairs[0].misfit, pairs[0].values.size - 4) < WORST_CHANCE:
         return list(fits)
-    chances = np.array([math.exp(-0.5 * (p.misfit - pairs[0].misfit)) for p in pairs])
-    chances /= chances.sum()
-    values = np.sum([c * p.values for c, p in zip(chances, pairs, strict=True)], axis=0)
-    spread = [p.covariance + np.outer(p.values - values, p.values - values) for p in pairs]
-    covariance = np.sum([c * x for c, x in zip(chances, spread, strict=True)], axis=0)
+    chances = chances_of([p.misfit for p in pairs])
+    values, covariance = mixture(chances, [p.values for p in pairs], [p.covariance for p in pairs])
     return [_given(f, values, covariance) for f in fits]
 
 

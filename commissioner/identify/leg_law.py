@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from commissioner.identify.leg_pair import FORM
+from commissioner.identify.leg_pair import FORM, drawn, of_legs
 from commissioner.identify.resistance import InverterError
-from commissioner.motor.space_vector import phase_cosines
 from commissioner.records import Signal
 
 Matrix = NDArray[np.float64]
@@ -81,8 +80,8 @@ class LegLaw:
         return np.asarray(np.sign(current_a)[:, None] * (inside + beyond))
 
     def on_axis(self, current_a: Signal, axis_deg: float) -> Matrix:
-        """(n, size): axis voltage per unit of each value, all current along the axis: 2/3 sum of legs x cosines."""
-        return np.asarray(2.0 / 3.0 * sum(c * self.basis(c * current_a) for c in phase_cosines(axis_deg)))
+        """(n, size): axis voltage per unit of each value, all current along the axis."""
+        return of_legs(self.basis, current_a, axis_deg)
 
     @cached_property
     def expectations(self) -> Matrix:
@@ -118,6 +117,4 @@ class LegLaw:
         """The curve with its standard errors up to thirty times the largest current."""
         xi = np.linspace(0.0, 1.0 / (1.0 + CORNER / 30.0), TABLE_POINTS)
         current = self.corner_a * xi / (1.0 - xi)
-        basis = self.basis(current)
-        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, covariance, basis), 0.0))
-        return InverterError(tuple(current.tolist()), tuple((basis @ values).tolist()), tuple(std.tolist()))
+        return drawn(current, self.basis(current), values, covariance)

@@ -30,6 +30,17 @@ KNEE_STEP = 1e-3
 LARGEST_STEP = 0.7
 
 
+def of_legs(basis: Callable[[Signal], Matrix], current_a: Signal, axis_deg: float) -> Matrix:
+    """(n, size): axis voltage per unit of each value of a leg's law, all current along the axis: 2/3 sum of legs x cosines."""
+    return np.asarray(2.0 / 3.0 * sum(c * basis(c * current_a) for c in phase_cosines(axis_deg)))
+
+
+def drawn(current_a: Signal, basis: Matrix, values: Signal, covariance: Matrix) -> InverterError:
+    """The law as a curve through `current_a` with its standard errors."""
+    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, covariance, basis), 0.0))
+    return InverterError(tuple(current_a.tolist()), tuple((basis @ values).tolist()), tuple(std.tolist()))
+
+
 def _capacitive(z: Signal) -> Signal:
     reach = 1.0 / np.maximum(z, 1.0)
     return np.asarray(z * reach * (1.0 - 0.5 * reach))
@@ -81,8 +92,8 @@ class PairLaw:
         return np.asarray(np.sign(current_a)[:, None] * np.column_stack(values + slopes))
 
     def on_axis(self, current_a: Signal, axis_deg: float) -> Matrix:
-        """(n, 4): axis voltage per unit of each value, all current along the axis: 2/3 sum of legs x cosines."""
-        return np.asarray(2.0 / 3.0 * sum(c * self.basis(c * current_a) for c in phase_cosines(axis_deg)))
+        """(n, 4): axis voltage per unit of each value, all current along the axis."""
+        return of_legs(self.basis, current_a, axis_deg)
 
     def expected(self, values: Signal, plateau_v: float) -> tuple[Matrix, Signal]:
         """(rows, missed): how far knees and the threshold's share are from typical ones, in standard deviations."""
@@ -132,6 +143,4 @@ class PairLaw:
     def table(self, values: Signal, covariance: Matrix) -> InverterError:
         """The curve with its standard errors up to thirty times the largest current."""
         current = np.append(0.0, np.geomspace(1e-3, 30.0, 60)) * self.largest_a
-        basis = self.basis(current)
-        std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, covariance, basis), 0.0))
-        return InverterError(tuple(current.tolist()), tuple((basis @ values).tolist()), tuple(std.tolist()))
+        return drawn(current, self.basis(current), values, covariance)

@@ -21,6 +21,7 @@ from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_family import WORST_CHANCE, pairs_of
 from commissioner.identify.leg_law import LegLaw
 from commissioner.identify.leg_pair import PairLaw
+from commissioner.identify.mixture import chances_of, mixture
 from commissioner.identify.model import Matrix
 from commissioner.records import Signal
 
@@ -131,13 +132,10 @@ def _given(fit: BatchFit, values: Signal, covariance: Matrix) -> BatchFit:
 def _mean(refits: Sequence[_Refit], fits: Sequence[BatchFit]) -> list[BatchFit]:
     """Of all laws, by how well they describe the samples; every test's fit keeps the residuals of the best."""
     best = min(refits, key=lambda r: r.misfit)
-    chances = np.array([math.exp(-TEMPER * (r.misfit - best.misfit)) for r in refits])
-    chances /= chances.sum()
+    chances = chances_of([r.misfit for r in refits], TEMPER)
     means = []
     for k in range(len(fits)):
         of_test = [r.fits[k] for r in refits]
-        theta = np.sum([c * f.theta for c, f in zip(chances, of_test, strict=True)], axis=0)
-        spread = [f.covariance + np.outer(f.theta - theta, f.theta - theta) for f in of_test]
-        covariance = np.sum([c * s for c, s in zip(chances, spread, strict=True)], axis=0)
+        theta, covariance = mixture(chances, [f.theta for f in of_test], [f.covariance for f in of_test])
         means.append(replace(best.fits[k], theta=theta, covariance=covariance))
     return means

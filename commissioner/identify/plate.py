@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from commissioner.errors import DataRefused
-from commissioner.motor.nameplate import Nameplate, check
+from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check
 
-NAMEPLATE_KEYS = (
-    "rated_power_w",
-    "rated_voltage_v",
-    "rated_frequency_hz",
-    "rated_current_a",
-    "rated_speed_rpm",
-    "power_factor",
-    "pole_pairs",
-)
+NAMEPLATE_KEYS = (*RATED_VALUES, "pole_pairs")
 
 
 def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:

@@ -142,7 +142,6 @@ def _invert(
         comb_search.comb_of(frame, part, member, [m.frequency_hz for m in members[:k]])
         for k, member in enumerate(members)
     )
-    first = members[0]
     assert found.shaft is not None
     shaft_speed = 2 * np.pi * found.shaft.frequency_hz
     shaft_std = 2 * np.pi * found.shaft.frequency_std_hz
@@ -159,7 +158,7 @@ def _invert(
         waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
     )
     period = characteristic(
-        audited, frame, part, combs, first.frequency_hz, found.shaft.frequency_hz, problem, solved, inertia
+        audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia
     )
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]

@@ -40,7 +40,6 @@ def characteristic(
     frame: TurningFrame,
     part: slice,
     combs: tuple[Comb, ...],
-    base_hz: float,
     shaft_hz: float,
     problem: Problem,
     solved: Solved,

@@ -10,7 +10,7 @@ import numpy as np
 
 from commissioner.monitor import periods
 from commissioner.monitor.combs import Found, mean_supply
-from commissioner.monitor.findings import Audited, Finding
+from commissioner.monitor.findings import Audited, Finding, miswired
 from commissioner.monitor.fit import Start
 from commissioner.monitor.periods import ShaftSearch
 from commissioner.monitor.supply import TurningFrame
@@ -58,7 +58,7 @@ def better_order(
 
     Columns taken as they were named need no proof, but they may be contradicted.
     """
-    corrected = any(f.kind == "corrected" and f.code in ("crossed_channels", "polarity") for f in audited.findings)
+    corrected = bool(miswired(audited.findings))
     own = _evidence(found, search, frame)
     verdict: float | Finding | None = None
     for lag in audited.rivals_deg:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from commissioner.motor.circuit import InverseGamma
 
@@ -41,6 +41,10 @@ class Nameplate:
     def impedance_base_ohm(self) -> float:
         """U_N / (sqrt(3) I_N): per phase of the star equivalent, for star and delta windings alike."""
         return self.rated_voltage_v / (math.sqrt(3.0) * self.rated_current_a)
+
+
+RATED_VALUES = tuple(f.name for f in fields(Nameplate))[:6]
+"""The numbers that every plate states, by their names here and in a recording; pole pairs follow from them."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+from commissioner.errors import CheckFailed
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.status import DriveState
@@ -38,6 +39,16 @@ class DriveLimits:
 
 SMALLEST_DRIVE = 0.9
 """Peak rated current of the drive, of the test current: on a smaller drive tests aim lower (`Findings.test_current_a`)."""
+
+
+def check_failed(results: Sequence[CheckResult]) -> CheckFailed | None:
+    """The first check that failed, as the error that it is."""
+    first = next((result for result in results if not result.has_passed), None)
+    if first is None:
+        return None
+    return CheckFailed(
+        f"check failed: {first.name}", step="check", value=first.value, limit=first.limit, remedy=first.remedy
+    )
 
 
 def judge_drive(

@@ -10,7 +10,6 @@ from collections.abc import Generator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from commissioner.errors import CheckFailed
 from commissioner.identify.analysis import Identification, identify
 from commissioner.identify.excitation import DesignedExcitation
 from commissioner.identify.longer import LongerTest, longer_test
@@ -18,7 +17,7 @@ from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterEr
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble
-from commissioner.procedure.checks import CheckResult, DriveLimits, judge_drive
+from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed, judge_drive
 from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
@@ -184,11 +183,9 @@ def check(job: Job, findings: Findings) -> Step:
     winding_degc = statuses[-1].winding_degc
     findings.winding_degc = winding_degc if math.isfinite(winding_degc) else None
     yield Tell(ChecksJudged(results))
-    failed = next((result for result in results if not result.has_passed), None)
-    if failed is not None:
-        raise CheckFailed(
-            f"check failed: {failed.name}", step="check", value=failed.value, limit=failed.limit, remedy=failed.remedy
-        )
+    failure = check_failed(results)
+    if failure is not None:
+        raise failure
     findings.snapshot = yield TakeSnapshot()
     yield ArmWatchdog(job.plan.supervision.watchdog_s)
     yield SetDriveLimits(findings.trip_current_a(job), job.test_voltage_v, job.axis_time_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import zlib
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from commissioner.recordings.units import UNIT, scale_of, unit_in
 from commissioner.records import Signal
 
 MAX_PREFACE_LINES = 200
+HEAD_BYTES = 65536
 
 
 def read_text(path: Path) -> str:
@@ -27,6 +29,22 @@ def read_text(path: Path) -> str:
         except UnicodeDecodeError:
             continue
     raise _unreadable(path, "the text encoding is not known")
+
+
+def has_other_separators(path: Path) -> bool:
+    """Whether the names stand between semicolons or tabs, or in UTF-16. Of any other file False, whatever is wrong with it."""
+    opener = gzip.open if path.suffix == ".gz" else open
+    try:
+        with opener(path, "rb") as file:
+            head = file.read(HEAD_BYTES)
+    except (OSError, EOFError, zlib.error):
+        return False
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return True
+    if path.suffix == ".parquet" or b"\0" in head:
+        return False
+    names = next((line for line in head.splitlines() if line and not line.startswith(b"#")), b"")
+    return b";" in names or b"\t" in names
 
 
 def parse_csv(text: str, source: str) -> tuple[dict[str, Signal], dict[str, float | str]]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings import comtrade, matlab, mdf4, tdms
-from commissioner.recordings.foreign_csv import parse_csv, read_text
+from commissioner.recordings.foreign_csv import has_other_separators, parse_csv, read_text
 from commissioner.recordings.names import is_per_minute, key_of, meaning_of, uses_rst
 from commissioner.recordings.table import CONTRACT_COLUMNS, READ, Table, read_table, to_running
 from commissioner.recordings.units import scale_of, unit_in
@@ -39,6 +39,8 @@ def read_running(path: Path) -> RunningRecording:
 def contract_table(path: Path) -> Table:
     """The table of a file whose columns or channels bear the contract's names, in any format that is read."""
     reader = _BINARY.get(path.suffix.lower())
+    if reader is None and has_other_separators(path):
+        return Table(*parse_csv(read_text(path), str(path)), str(path))
     if reader is None or not path.is_file():
         return read_table(path)
     columns, metadata = reader(path)

@@ -11,17 +11,9 @@ import numpy as np
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.fit import PRIOR_FROM_COMMISSIONING, Start
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, check
+from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check
 from commissioner.motor.running import equal_leakages
 
-NEEDED = (
-    "rated_power_w",
-    "rated_voltage_v",
-    "rated_frequency_hz",
-    "rated_current_a",
-    "rated_speed_rpm",
-    "power_factor",
-)
 MAX_RESULT_BYTES = 10_000_000
 
 
@@ -31,7 +23,7 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
         from commissioner.settings import load_motor
 
         return load_motor(motor)
-    for key in NEEDED:
+    for key in RATED_VALUES:
         if not isinstance(metadata.get(key), float):
             raise ConfigurationError(
                 file=source,
@@ -39,7 +31,7 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
                 value=metadata.get(key),
                 expected="a number in the recording's metadata, or --motor NAME_OR_FILE",
             )
-    values = {key: float(metadata[key]) for key in NEEDED}
+    values = {key: float(metadata[key]) for key in RATED_VALUES}
     pairs = metadata.get("pole_pairs")
     estimate = round(60 * values["rated_frequency_hz"] / max(values["rated_speed_rpm"], 1.0) - 0.02)
     inertia = metadata.get("inertia_kg_m2")

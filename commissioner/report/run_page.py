@@ -14,10 +14,10 @@ from commissioner.procedure.verdict import evidence_of
 from commissioner.records import Signal
 from commissioner.report import figures
 from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
-from commissioner.report.summary import diagnosis_sentences, finding_sentences, standing
+from commissioner.report.summary import ACCEPTED, diagnosis_sentences, finding_sentences, standing
 
 _TONES: dict[str, Tone] = {"commissioned": "good", "rejected": "warn", "aborted": "warn", "faulted": "bad"}
-_STANDING = {"accepted, not written": "Measured and accepted, not written: the drive holds its old values"}
+_STANDING = {ACCEPTED: "Measured and accepted, not written: the drive holds its old values"}
 _NAMES = (
     ("stator_resistance_ohm", "Stator resistance R_s", 1.0, "Ω"),
     ("rotor_resistance_ohm", "Rotor resistance R_R", 1.0, "Ω"),

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import UsageError
+from commissioner.report.summary import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive import read_document, read_journal
 
-RESTORED = "as before (restored)"
+RESTORED, OLD_OR_NEW = "as before (restored)", "old or new"
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,16 @@ class RunSummary:
     @property
     def standing(self) -> str:
         """The outcome, and whether the drive holds what came of it."""
-        if self.outcome != "commissioned" or self.written.startswith("old or new"):
+        if self.outcome != "commissioned" or self.is_unknown:
             return self.outcome
         if self.written.startswith(RESTORED):
-            return "commissioned, restored since"
-        return "commissioned" if self.written.startswith("new") else "accepted, not written"
+            return RESTORED_SINCE
+        return "commissioned" if self.written.startswith("new") else ACCEPTED
+
+    @property
+    def is_unknown(self) -> bool:
+        """Only the drive can tell which parameter set it holds."""
+        return self.written.startswith(OLD_OR_NEW)
 
 
 def read_runs(root: Path) -> list[RunSummary]:
@@ -109,7 +115,7 @@ def _written(records: list[dict[str, Any]]) -> str:
         elif line["kind"] == "snapshot_restored":
             said = RESTORED + _wear(line["record"])
         elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
-            said = "old or new: read the drive, or `commissioner restore` this run"
+            said = f"{OLD_OR_NEW}: read the drive, or `commissioner restore` this run"
     return said
 
 

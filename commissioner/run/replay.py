@@ -238,15 +238,15 @@ def _snapshot(record: Mapping[str, Any]) -> ParameterSnapshot:
     return ParameterSnapshot(**(dict(record) | {"identity": DriveIdentity(**record["identity"])}))
 
 
-def read_snapshot(folder: Path) -> ParameterSnapshot:
-    """The snapshot a run archived before it wrote anything. DataRefused: damaged, or not as the journal has it.
+def read_snapshot(folder: Path, journal: list[dict[str, Any]]) -> ParameterSnapshot:
+    """The snapshot a run archived before it wrote anything. DataRefused: damaged, or not as its `journal` has it.
 
     A run that was killed between the two copies has only the first; it wrote nothing.
     """
     document = read_saved(folder, "snapshot.json", "identity", "in_use", "stored")
     taken = [
         line["record"]["reply"]
-        for line in read_journal(folder / "journal.jsonl")
+        for line in journal
         if line["kind"] == "reply" and isinstance(line["record"], dict) and line["record"].get("command") == "TakeSnapshot"
     ]
     if taken and document != taken[-1]:

@@ -57,8 +57,8 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
             f"the archive of {run.run} keeps no TLS files", step="restore", value=str(address),
             limit="an address with ca=, cert= and key=", remedy="give the drive's whole address with --drive",
         )  # fmt: skip
-    snapshot = _complete(read_snapshot(folder), profile, folder)
     lines = read_journal(folder / "journal.jsonl")
+    snapshot = _complete(read_snapshot(folder, lines), profile, folder)
     with closing(RunFolder(folder)) as journal, OperatorStop():  # a set is never left half written for a Ctrl-C
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
         with closing(port):

@@ -1,6 +1,7 @@
 """TDMS, MDF 4 and COMTRADE: files of other authors' writers, and the standard's own layout, come as what was recorded."""
 
 import contextlib
+import gzip
 import struct
 from pathlib import Path
 
@@ -161,3 +162,23 @@ def test_a_damaged_comtrade_gives_a_typed_error_or_a_recording(tmp_path, place, 
     target.write_bytes(data[:place] + change + data[place + len(change) + 1 :])
     with contextlib.suppress(CommissionerError):
         import_table(path)
+
+
+@pytest.mark.parametrize(("separator", "comma"), [(";", True), (";", False), ("\t", True)])
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz"])
+def test_standstill_tables_between_semicolons_or_tabs_are_the_same_table(tmp_path, separator, comma, ending):
+    """Both verbs on standstill recordings read through `contract_table`; points tables keep columns of their own."""
+    rows = [[k * 2e-4, 0.0, 60.0, 1.5 * k, 0.25 * k, -0.125 * k, 30.0 + k] for k in range(40)]
+    names = "time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a,winding_degc"
+    preface = "# rated_power_w: 2200\n# motor: a name\n"
+    plain = tmp_path / "plain.csv"
+    plain.write_text(preface + "\n".join([names, *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
+    other = tmp_path / f"other{ending}"
+    lines = [separator.join(f"{x:.6f}".replace(".", "," if comma else ".") for x in row) for row in rows]
+    text = preface + "\n".join([names.replace(",", separator), *lines]) + "\n"
+    other.write_bytes(gzip.compress(text.encode()) if ending.endswith(".gz") else text.encode())
+    seen, wanted = contract_table(other), contract_table(plain)
+    assert list(seen.columns) == list(wanted.columns)
+    for name, values in wanted.columns.items():
+        np.testing.assert_array_equal(seen.columns[name], values)
+    assert dict(seen.metadata) == dict(wanted.metadata)

@@ -79,7 +79,7 @@ def test_a_tie_of_unlike_causes_is_said_without_a_size():
 
 @pytest.mark.parametrize("verdict", ["unexplained", "nothing_significant", "explained"])
 def test_an_unfinished_search_says_so_and_never_that_no_cause_does_it(verdict):
-    seen = document(verdict, [LEGS] if verdict == "explained" else [], remarks=[OVER])
+    seen = document(verdict, [LEGS] if verdict == "explained" else [], remarks=[OVER], is_complete=False)
     words = headline(seen) + " ".join(meaning(seen))
     assert words.startswith("Not finished") and "commissioner diagnose" in words
     assert "no cause in the catalogue" not in words and tone(seen) == "warn" and remarks(seen) == []
@@ -153,7 +153,7 @@ def test_a_refusal_and_a_null_are_said_plainly():
 
 
 def test_a_class_in_a_list_reads_as_one_name():
-    words = headline(document("explained", [LEGS, cause("sensor_offset")], remarks=[OVER]))
+    words = headline(document("explained", [LEGS, cause("sensor_offset")], remarks=[OVER], is_complete=False))
     assert "dead time + device drop and sensor offset." in words
 
 
