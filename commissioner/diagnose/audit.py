@@ -20,10 +20,9 @@ from commissioner.records import Signal, StandstillRecording
 
 BRIDGED_SAMPLES = 5
 CLIPPED_RATIO = 3.5
-HARD_PILE, SOFT_PILE = 1e-6, 2e-3
-"""How close to the end samples pile up, relative to the peak, at a hard limit and at a soft one."""
-BENDS_FROM = 0.88
-"""Share of a soft limit up to which the channel is taken as straight."""
+PILE = 1e-6
+"""How close to the end samples pile up, relative to the peak: to the last digit. Before a soft limit a channel bends, which
+is a cause to be fitted."""
 SHORTEST_STRETCH = 200
 REST_SAMPLES = 1
 
@@ -156,17 +155,12 @@ def _clip_limits(recording: StandstillRecording, facts: Facts) -> list[tuple[flo
 
 
 def _limits_of(values: Signal, peak: float) -> tuple[float, float]:
-    """Lower and upper bound of the samples to trust, infinite where none pile up at an end.
-
-    A hard limit holds values to the last digit; before a soft one the channel bends, so trust ends below it.
-    """
+    """Lower and upper bound of the samples to trust, infinite where none pile up at an end."""
     bounds = []
     for sign in (1.0, -1.0):
         signed = sign * values
         top = float(signed.max())
-        is_hard, is_soft = (_piles_up(signed, top, share * peak) for share in (HARD_PILE, SOFT_PILE))
-        trusted = top if is_hard else BENDS_FROM * top
-        bounds.append(sign * trusted if (is_hard or is_soft) and top > 0.3 * peak else sign * np.inf)
+        bounds.append(sign * top if top > 0.3 * peak and _piles_up(signed, top, PILE * peak) else sign * np.inf)
     return float(bounds[1]), float(bounds[0])
 
 

@@ -29,7 +29,7 @@ from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.search import EXPLORED_SAMPLES, SAME_ORDER, Found, search
+from commissioner.diagnose.search import EXPLORED_SAMPLES, SAME_ORDER, Found, loss_without, search
 from commissioner.diagnose.split import Split, split_lines
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
@@ -41,6 +41,8 @@ TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
+SHOWN_BY_A_PART = 0.5
+"""Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 NO_RIVAL = 1e6
 """Loss in chi2 that stands for having no alternative."""
 LEAST_CONFIDENCE = 0.5
@@ -182,13 +184,21 @@ def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
 
 
 def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Alternatives of the causes `asked` about, tried on the first part of every segment."""
+    """Alternatives of the causes `asked` about, tried on the first part of every segment where that shows them as well."""
     if not asked:
         return {}
     record, layout = found.record, found.layout
     part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
-    setting = setting_for(found.setting, part)
-    return alternatives(part_fit, found.accepted, part, layout, setting, noise, record.samples, excluded, asked)
+    share = SHOWN_BY_A_PART * part.samples / record.samples
+    shown = [n for n in asked if loss_without(part_fit, n) > share * found.gains[n]]
+    late = [n for n in asked if n not in shown]
+    return {
+        name: rivals
+        for names, data, fitted in ((shown, part, part_fit), (late, record, found.fit))
+        for name, rivals in alternatives(
+            fitted, found.accepted, data, layout, setting_for(found.setting, data), noise, record.samples, excluded, names
+        ).items()
+    }
 
 
 def _cause(
@@ -249,7 +259,7 @@ def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[st
     is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
     if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
         out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
-    if audit.clipped:
+    if audit.clipped and "clipping" not in named:
         out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
                                        "samples": (audit.clipped["samples"], 0.0, "1")}))
     if audit.holes or found.losses:

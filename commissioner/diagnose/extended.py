@@ -73,7 +73,7 @@ def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
 
 
 def _layout(entry: Mapping[str, Any]) -> Layout:
-    arrays = {"legs_vectors", "iron_vectors", "leak_vectors", "stop_radius_wb", "branch_time_s"}
+    arrays = {"legs_vectors", "iron_vectors", "leak_vectors", "stop_radius_wb", "branch_time_s", "channel_ends_a"}
     values: dict[str, Any] = {k: (np.array(v, dtype=float) if k in arrays else v) for k, v in entry.items()}
     return Layout(**values)
 

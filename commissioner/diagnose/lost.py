@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -29,6 +30,7 @@ LEAST_JUMP = 0.7
 """Samples by which the delay must seem to jump: several jumps in a segment do not add up to a whole number anywhere."""
 SPIKE = 9.0
 MOST_IN_A_ROW = 3
+MOST_SKIPPED = 24
 START = 50
 """Samples in which a pulse is flux left from before, not a loss."""
 
@@ -43,11 +45,18 @@ class Loss:
     way: str
 
 
-def mend(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Record, tuple[Loss, ...]]:
-    """The record with unmarked losses masked and re-aligned, and the list of them."""
+def mend(
+    record: Record, model: Model, layout: Layout, noise: Noise, *, is_first: bool
+) -> tuple[Record, tuple[Loss, ...]]:
+    """The record with unmarked losses masked and re-aligned, and the list of them. `is_first`: the model was fitted to data
+
+    with all their losses, and is right in their middle rather than at the start.
+    """
     found: list[Loss] = []
     segments = list(record.segments)
     for k in range(len(segments)):
+        segments[k], skips = _skips_put_right(replace(record, segments=tuple(segments)), k, model, layout, noise, is_first)
+        found += skips
         for _ in range(MOST_EVENTS):
             current = replace(record, segments=tuple(segments))
             step = _one(current, k, model, layout, noise)
@@ -56,6 +65,81 @@ def mend(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Re
             segments[k], loss = step
             found.append(loss)
     return replace(record, segments=tuple(segments)), tuple(found)
+
+
+def _skips_put_right(
+    record: Record, k: int, model: Model, layout: Layout, noise: Noise, is_first: bool
+) -> tuple[Segment, list[Loss]]:
+    """Skips of the current channel alone move no state of the machine: the whole staircase of them is found at once.
+
+    Not taken where a delay that drifts evenly explains as much.
+    """
+    segment = record.segments[k]
+    prediction = predict(model, record, k, layout).currents_a / noise.sigma_a[:, None]
+    seen = np.where(segment.is_good, segment.currents_a / noise.sigma_a[:, None], np.nan)
+    shifts = _staircase(np.ascontiguousarray(seen), np.ascontiguousarray(prediction), LEAST_GAIN, is_first)
+    steps = np.flatnonzero(np.diff(shifts)) + 1
+    if not steps.size:
+        return segment, []
+    repaired, losses = segment, []
+    for at in steps:
+        n = int(shifts[at] - shifts[at - 1])
+        where = int(at + shifts[at - 1] - shifts[0])
+        if where + n >= segment.count - 2:
+            break
+        losses.append(Loss(segment.number, float(segment.time_s[at]), n, "current samples"))
+        repaired = _shifted(repaired, where, n)
+    before, after = (_chi2(record, k, s, model, layout, noise) for s in (segment, repaired))
+    gain = before - after - _masked(segment, repaired, record)
+    floor = float(segment.is_good.sum()) * record.facts.phases
+    if gain < max(LEAST_GAIN * len(losses), LEAST_SHARE * (before - floor)) or _drifts_evenly(seen, prediction, shifts):
+        return segment, []
+    return repaired, losses
+
+
+@njit(cache=True, nogil=True)
+def _staircase(seen, predicted, price, begins_anywhere):  # type: ignore[no-untyped-def]
+    """(n,) samples by which each one seen is early: the least sum of squares plus `price` per step up (Viterbi).
+
+    It begins at none, or, where it `begins_anywhere`, counts from where it begins.
+    """
+    phases, count = seen.shape
+    cost = np.zeros(2 * MOST_SKIPPED + 1)
+    if not begins_anywhere:
+        cost[:] = np.inf
+        cost[MOST_SKIPPED] = 0.0
+    came_from = np.zeros((count, 2 * MOST_SKIPPED + 1), dtype=np.int8)
+    for t in range(count):
+        for n in range(2 * MOST_SKIPPED, -1, -1):
+            best, origin = cost[n], n
+            for step in range(1, min(n, MOST_IN_A_ROW) + 1):
+                if cost[n - step] + price < best:
+                    best, origin = cost[n - step] + price, n - step
+            at = min(max(t + n - MOST_SKIPPED, 0), count - 1)
+            for p in range(phases):
+                if not np.isnan(seen[p, t]):
+                    best += (seen[p, t] - predicted[p, at]) ** 2
+            cost[n], came_from[t, n] = best, origin
+    shifts = np.zeros(count, dtype=np.int64)
+    n = int(np.argmin(cost))
+    for t in range(count - 1, -1, -1):
+        shifts[t] = n
+        n = came_from[t, n]
+    return shifts - MOST_SKIPPED
+
+
+def _drifts_evenly(seen: Array, predicted: Array, shifts: NDArray[np.int64]) -> bool:
+    """Whether a smooth delay (growing evenly, wandering once to and fro) lies nearer to the data than its staircase does."""
+    count = shifts.size
+    t = np.linspace(0.0, 1.0, count)
+    forms = np.stack([np.ones_like(t), t, np.sin(2.0 * np.pi * t), np.cos(2.0 * np.pi * t)], axis=1)
+    apart = forms @ np.linalg.lstsq(forms, shifts.astype(float), rcond=None)[0] - shifts
+    at = np.clip(np.arange(count) + shifts, 0, count - 1)
+    slope = np.gradient(predicted, axis=1)[:, at] * apart
+    is_seen = ~np.isnan(seen)
+    power = float((slope[is_seen] ** 2).sum())
+    met = float((slope * (seen - predicted[:, at]))[is_seen].sum())
+    return power > LEAST_GAIN and met > 0.5 * power
 
 
 def _one(record: Record, k: int, model: Model, layout: Layout, noise: Noise) -> tuple[Segment, Loss] | None:

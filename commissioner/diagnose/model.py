@@ -8,7 +8,7 @@ operators of fixed radius, rotor branches of fixed corner frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -57,6 +57,8 @@ class Layout:
     """Where R_s, R_R, L_sigma and L_M may be, from the impedance the recording shows: no effect moves them beyond."""
     leak_ratio: float = 0.0
     """L_sigma / L_M, fixed: how far the rotor current is from the stator current in (3a) of `trajectory`."""
+    channel_ends_a: Array = field(default_factory=lambda: np.ones(3))
+    """Largest current that each channel reported: where its end, if it has one, is near."""
 
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.channel_end import channel_ends
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.fit import Fit, fit
@@ -38,7 +39,7 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
         iron_vectors=even_vectors(10), leak_vectors=even_vectors(6),
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
-        nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
+        nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
         legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),
     )
     return layout, flux
@@ -72,6 +73,20 @@ def nominal_fit(record: Record, noise: Noise) -> Fit:
     bare = bare_layout(record)
     fits = [fit(Model(start), record, bare, noise, rounds=15, tolerance=1.0) for start in impedance_starts(record)]
     return min(fits, key=lambda f: f.chi2)
+
+
+def from_segment_to_segment(record: Record, start: Model, bare: Layout, noise: Noise) -> tuple[Record, Fit]:
+    """The four parameters on all of the record, with unknown starts and the flux that a segment inherits from the one before."""
+    nominal = fit(start, record, bare, noise, rounds=6, tolerance=1.0)
+    unknown_starts = starts_of(record)
+    if unknown_starts:
+        nominal = fit(nominal.model.with_terms(unknown_starts), record, bare, noise, rounds=8, tolerance=1.0)
+    if len(record.segments) > 1:
+        record = with_flux_before(record, nominal.model, bare)
+        nominal = fit(nominal.model.with_terms(CARRY), record, bare, noise, rounds=6, tolerance=1.0)
+        record = with_flux_before(record, nominal.model, bare)
+        nominal = fit(nominal.model, record, bare, noise, rounds=6, tolerance=1.0)
+    return record, nominal
 
 
 def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:

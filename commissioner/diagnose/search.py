@@ -21,13 +21,12 @@ from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import (
-    CARRY,
     bare_layout,
+    from_segment_to_segment,
     impedance_starts,
     largest_iron_flux,
     nominal_fit,
     set_up,
-    starts_of,
     with_flux_before,
     with_ranges,
 )
@@ -65,6 +64,8 @@ EXACT = frozenset({
 """Causes whose form is not a matter of opinion: they leave nothing behind."""
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leakage_saturation"})
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
+LEAST_SLOPE_LOST = 0.25
+"""A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
 EXPLORED_SAMPLES = 45_000
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
@@ -107,16 +108,7 @@ def search(
     `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
     """
     part, bare = explored(record), bare_layout(record)
-    quick = nominal_fit(part, noise)
-    nominal = fit(quick.model, record, bare, noise, rounds=6, tolerance=1.0)
-    unknown_starts = starts_of(record)
-    if unknown_starts:
-        nominal = fit(nominal.model.with_terms(unknown_starts), record, bare, noise, rounds=8, tolerance=1.0)
-    if len(record.segments) > 1:
-        record = with_flux_before(record, nominal.model, bare)
-        nominal = fit(nominal.model.with_terms(CARRY), record, bare, noise, rounds=6, tolerance=1.0)
-        record = with_flux_before(record, nominal.model, bare)
-        nominal = fit(nominal.model, record, bare, noise, rounds=6, tolerance=1.0)
+    record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     losses: tuple[Loss, ...] = ()
     if "lost_samples" not in excluded:
         record, nominal, losses = _mended(record, nominal, bare, noise, report)
@@ -145,9 +137,10 @@ def search(
     start = whole.with_new_flux_before(whole.relayout(completed))
     fitted, accepted, last = whole.run(start, accepted)
     first = first or whole.first or last
-    if accepted and not losses and "lost_samples" not in excluded:
-        mended, again, losses = _mended(whole.record, fitted, whole.layout, noise, report)
-        if losses:
+    if accepted and "lost_samples" not in excluded:
+        mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report)
+        if more:
+            losses += more
             whole = _Search(
                 mended, whole.layout, replace(whole.setting, record=mended), noise, names, report, mended, go_on
             )
@@ -168,11 +161,14 @@ def _mended(
     losses: tuple[Loss, ...] = ()
     mended, better = record, current
     for _ in range(MENDED):
-        mended, more = mend(mended, better.model, layout, noise)
-        if not more:
+        # from the data as they came: the better model places what the worse one misplaced
+        again, seen = mend(record, better.model, layout, noise, is_first=not losses)
+        if not seen:
             break
-        losses += more
-        better = fit(better.model, mended, layout, noise, rounds=6, tolerance=1.0)
+        trial = fit(better.model, again, layout, noise, rounds=6, tolerance=1.0)
+        if trial.chi2 >= better.chi2:
+            break
+        mended, better, losses = again, trial, seen
     excess, left = (f.chi2 - f.normal.count.sum() for f in (current, better))
     if not losses or left > (1.0 - MENDED_SHARE) * excess:
         return record, current, ()
@@ -416,6 +412,8 @@ def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
     """The sign physics demands; and a leg error that is at half its height before a fifth of the largest current."""
     sign = CATALOGUE[name].sign
     if sign and sizes and next(iter(sizes.values()))[0] * sign <= 0:
+        return False
+    if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.channel_end import COUNT, current_lost, reported, slope_lost
+from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.resample import resample, resample_hermite
@@ -52,19 +53,19 @@ def sense(
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
-    reported = current + model.sum_kind(OFFSET, 3)[:phases, None]
+    sensed = current + model.sum_kind(OFFSET, 3)[:phases, None]
     if gain.any() or even.any() or odd.any():
-        reported += current * (gain + s * (even + s * odd))
+        sensed += current * (gain + s * (even + s * odd))
         slope_of_sensor = 1.0 + gain + s * (2.0 * even + 3.0 * s * odd)
         for row in rows:
             jacobian[row] *= slope_of_sensor
     ages = _ages(record, segment)
     drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
     if drift.any():
-        reported += drift.T @ np.stack(ages)
+        sensed += drift.T @ np.stack(ages)
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == TONE and value and term.segment in (-1, segment.uid):
-            reported[term.index % 3] += value * channels[:, term.index // 3]
+            sensed[term.index % 3] += value * channels[:, term.index // 3]
     for k, term in enumerate(listed):
         row = jacobian[4 + k]
         if term.kind == DELAY:
@@ -89,7 +90,21 @@ def sense(
             row[:] = edges[term.index]
         if term.kind >= kinds.FIRST_OF_SENSING:
             row *= term.step
-    return reported
+    return _at_the_end(model, sensed, layout.channel_ends_a, jacobian, listed)
+
+
+def _at_the_end(model: Model, sensed: Array, ends_a: Array, jacobian: Array, listed: Sequence[Term]) -> Array:
+    """The last thing a channel does: it bends before it stops. Term index: share, counted through the phases."""
+    shares = model.sum_kind(END, 3 * COUNT).reshape(3, COUNT)[: sensed.shape[0]]
+    asked = [(k, t) for k, t in enumerate(listed) if t.kind == END]
+    lost = current_lost(sensed, ends_a) if asked else np.zeros(0)
+    if shares.any():
+        jacobian *= 1.0 - np.einsum("pk,kpn->pn", shares, slope_lost(sensed, ends_a))
+        sensed = reported(sensed, shares, ends_a)
+    for k, term in asked:
+        phase, share = divmod(term.index, COUNT)
+        jacobian[4 + k, phase] = -term.step * lost[share, phase]
+    return sensed
 
 
 def _ages(record: Record, segment: Segment) -> list[Array]:

@@ -184,7 +184,9 @@ TRANSLATED: dict[str, Translate] = {
     "stator_heating": _size("rise_per_minute_at_rated_current"), "rotor_heating": _size("rise_per_minute_at_rated_current"),
     "sensor_offset": _phases("offset"), "sensor_drift": _phases("drift"), "sensor_gain_mismatch": _phases("gain"),
     "sensor_nonlinearity": _sensor, "quantization": _size("step_a"),
-    "clipping": lambda sizes, values, setting, model: {"size": 0.1, "limit_a": sizes["limit_a"]},
+    "clipping": lambda sizes, values, setting, model: {
+        "size": 0.1, "limit_a": sizes["limit_a"], "shape": "soft" if "slope_lost" in sizes else "hard",
+    },
     "lost_samples": _size("samples"), "mains_pickup": _line("mains"), "clock_drift": _clock,
     "shaft_motion": _size("speed_rad_per_s"),
     "inductance_anisotropy": _tensor("leakage", "magnetizing", ("leakage", "main")),

@@ -13,7 +13,7 @@ from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.fit import fit
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import CARRY, bare_layout, nominal_fit, with_flux_before
+from commissioner.diagnose.nominal import bare_layout, from_segment_to_segment, nominal_fit
 from sim.recording import record
 from sim.scenario import Scenario
 from tests.hidden_effects.cases import class_of, other_excitation, recording_of, without_noise
@@ -36,10 +36,7 @@ BOUND_TO_THE_RECORDING = frozenset(
 def strength_sigma(scenario: Scenario, seed: int, names: list[str], noise: Noise) -> float:
     """Whitened rms error that the named effects alone leave after the four-parameter fit, without noise."""
     audited, _ = prepare([recording_of(without_noise(scenario, names), seed)])
-    first = nominal_fit(audited, noise)
-    if len(audited.segments) > 1:
-        audited = with_flux_before(audited, first.model, bare_layout(audited))
-        first = fit(first.model.with_terms(CARRY), audited, bare_layout(audited), noise, rounds=6, tolerance=1.0)
+    _, first = from_segment_to_segment(audited, nominal_fit(audited, noise).model, bare_layout(audited), noise)
     return float(np.sqrt(first.chi2 / first.normal.count.sum()))
 
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect
-from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, EVEN, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.channel_end import COUNT, reported
+from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed
+from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Term
 
 PHASES = ("u", "v", "w")
@@ -146,14 +147,35 @@ def quantization(setting: Setting) -> tuple[Term, ...]:
     return ()
 
 
+def _end_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    """Of the channel that bends most, just below the largest current it reports: slope lost, current not reported."""
+    ends_a = setting.layout.channel_ends_a
+    shares = np.stack([listed(values, f"end_{p}", COUNT) for p in PHASES[: ends_a.size]])
+    true_a = np.linspace(0.0, 3.0, 601) * ends_a[:, None]
+    seen_a = reported(true_a, shares, ends_a)
+    found = []
+    for true, seen, end_a in zip(true_a, seen_a, ends_a, strict=True):
+        top = int(np.argmax(seen >= min(NEAR_THE_END * end_a, float(seen.max()))))
+        found.append((1.0 - float(np.gradient(seen, true)[top]), float(end_a), float(true[top] - seen[top])))
+    slope, limit_a, missing_a = max(found)
+    return {"slope_lost": (slope, "1"), "limit_a": (limit_a, "A"), "missing_at_limit_a": (missing_a, "A")}
+
+
+NEAR_THE_END = 0.985
+
+
 @effect(
-    "clipping", "Current channel at its limit", sign=1, family="odd", sizes=_none,
-    signature="samples pile up at one value; they are masked",
-    confounders=(), source="saturated converter or amplifier", split_by="reduce the level",
+    "clipping", "Current channel at its limit", sign=1, family="odd", sizes=_end_sizes,
+    signature="samples pile up at one value, or bend towards it: what lies beyond is not reported",
+    confounders=("sensor_nonlinearity", "leakage_saturation"), source="saturated converter, amplifier or transformer core",
+    split_by="reduce the level",
 )
 def clipping(setting: Setting) -> tuple[Term, ...]:
-    """Found in the audit (limit [A]); the samples at the limit are left out of every fit."""
-    return ()
+    """Shares of the slope that each channel loses towards its end. Samples that pile up there are masked by the audit."""
+    return tuple(
+        Term("clipping", f"end_{PHASES[p]}_{k}", "1", END, p * COUNT + k, 1e-3, 0.0, 1.0)
+        for p in range(setting.facts.phases) for k in range(COUNT)
+    )
 
 
 def _mains_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:

@@ -29,18 +29,6 @@ def test_a_hard_limit_is_found_to_the_last_digit_and_its_samples_are_masked():
     assert bad == audit.clipped["samples"] == (np.abs(limited(measured(), 4.0).current_u_a) >= 4.0).sum()
 
 
-def test_a_soft_limit_is_found_and_masked_from_where_it_bends():
-    source = measured()
-    bent = np.where(
-        np.abs(source.current_u_a) > 3.6,
-        np.sign(source.current_u_a) * (3.6 + 0.4 * np.tanh((np.abs(source.current_u_a) - 3.6) / 0.4)),
-        source.current_u_a,
-    )
-    record, audit = prepare([replace(source, current_u_a=bent)])
-    assert audit.clipped["limit_a"] == pytest.approx(4.0, rel=0.01)
-    assert all(np.abs(s.currents_a[0][s.is_good]).max() < 3.6 for s in record.segments)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_an_unlimited_current_is_not_called_clipped(seed):
     assert prepare([measured(noise=0.02 / 2**seed, seed=seed)])[1].clipped == {}

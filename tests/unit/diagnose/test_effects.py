@@ -36,7 +36,7 @@ NAMES = [
     "resistance_anisotropy",
     "cable_capacitance",
 ]
-FITTED = [n for n in NAMES if n not in ("device_drop", "quantization", "clipping", "lost_samples")]
+FITTED = [n for n in NAMES if n not in ("device_drop", "quantization", "lost_samples")]
 
 
 def currents(model, setting, segment=1):

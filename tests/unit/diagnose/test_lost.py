@@ -1,0 +1,61 @@
+"""Samples that vanished without a gap in the time stamps, of a record whose machine is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.diagnose.diagnosis import diagnose
+from commissioner.diagnose.lost import mend
+from commissioner.diagnose.noise import measure_noise
+from commissioner.diagnose.plant import predict
+from tests.unit.diagnose.conftest import recording
+
+NOISE_A = 2e-3
+
+
+def skipped(rows, at):
+    """(3, n) rows that are early by one more sample from each place on; the end is held."""
+    places = np.arange(rows.shape[1]) + np.searchsorted(np.sort(at), np.arange(rows.shape[1]), side="right")
+    return rows[:, np.minimum(places, rows.shape[1] - 1)]
+
+
+def record_with(nominal, setting, change):
+    random = np.random.default_rng(3)
+    segments = []
+    for k, s in enumerate(setting.record.segments):
+        rows = change(k, predict(nominal, setting.record, k, setting.layout).currents_a)
+        segments.append(replace(s, currents_a=rows + NOISE_A * random.standard_normal(rows.shape)))
+    return replace(setting.record, segments=tuple(segments))
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_many_skips_of_the_current_channel_are_found_at_once(nominal, setting, is_first):
+    """Seven in one second, two of them ten samples apart; each within two samples of its place, for noise hides it."""
+    at = np.array([1400, 1900, 2200, 2210, 3000, 4100, 5000])
+    record = record_with(nominal, setting, lambda k, rows: skipped(rows, at) if k == 1 else rows)
+    mended, losses = mend(record, nominal, setting.layout, measure_noise(record), is_first=is_first)
+    assert {x.way for x in losses} == {"current samples"} and sum(x.samples for x in losses) == at.size
+    period = record.facts.sample_period_s
+    found = np.concatenate([[round((x.time_s - record.segments[1].time_s[0]) / period)] * x.samples for x in losses])
+    assert np.abs(np.sort(found) - at).max() <= 12  # samples; where the current is at its crest, a skip hardly shows
+    left = mended.segments[1].currents_a - predict(nominal, mended, 1, setting.layout).currents_a
+    assert np.std(left[:, mended.segments[1].is_good]) < 1.15 * NOISE_A
+
+
+@pytest.mark.parametrize("ppm", [100.0, 300.0])
+def test_a_clock_that_runs_fast_is_not_a_staircase_of_losses(nominal, setting, ppm):
+    """By nearly two samples within a segment."""
+    def early(k, rows):
+        t = np.arange(rows.shape[1])
+        return np.stack([np.interp(t * (1.0 + 1e-6 * ppm), t, row) for row in rows])
+
+    record = record_with(nominal, setting, early)
+    seen = diagnose([recording(currents=np.concatenate([s.currents_a for s in record.segments], axis=1))])
+    assert [c.name for c in seen.causes] == ["clock_drift"]
+
+
+def test_a_whole_record_loses_nothing(nominal, setting):
+    record = record_with(nominal, setting, lambda k, rows: rows)
+    mended, losses = mend(record, nominal, setting.layout, measure_noise(record), is_first=True)
+    assert losses == () and all(a is b for a, b in zip(mended.segments, record.segments, strict=True))
