@@ -31,7 +31,7 @@ STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     """Dictionaries scaled to the currents and fluxes the model reaches on this record; and the largest iron flux."""
     bare = bare_layout(record)
-    flux = largest_iron_flux(record, model, bare)
+    flux, _ = largest_fluxes(record, model, bare)
     peak = record.facts.current_peak_a
     knee = 0.004 * peak
     layout = replace(
@@ -45,9 +45,12 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     return layout, flux
 
 
-def largest_iron_flux(record: Record, model: Model, layout: Layout) -> float:
-    return max(
-        float(np.hypot(*predict(model, record, k, layout).iron_flux_wb).max()) for k in range(len(record.segments))
+def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float, float]:
+    """Of the iron and of the leakage path (Wb)."""
+    reached = [predict(model, record, k, layout) for k in range(len(record.segments))]
+    return (
+        max(float(np.hypot(*p.iron_flux_wb).max()) for p in reached),
+        max(float(np.hypot(*p.leakage_flux_wb).max()) for p in reached),
     )
 
 
@@ -154,4 +157,5 @@ def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:
     layout, flux = layout_for(record, nominal.model)
     record, lines = add_channels(record, nominal.model, layout)
-    return record, layout, Setting(record, layout, flux, lines)
+    leakage_h = nominal.model.nominal[2]
+    return record, layout, Setting(record, layout, flux, record.facts.current_peak_a * leakage_h, leakage_h, lines)

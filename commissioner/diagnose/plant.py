@@ -22,12 +22,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Prediction:
-    """Currents `(phases, n)`; `jacobian` (4 + terms, phases, n) in theta units; rotor current and iron flux (2, n)."""
+    """Currents `(phases, n)`; `jacobian` (4 + terms, phases, n) in theta units; rotor current and fluxes (2, n)."""
 
     currents_a: Array
     jacobian: Array
     rotor_current_a: Array
     iron_flux_wb: Array
+    leakage_flux_wb: Array
     slope_before: Array
     last_rotor_flux_wb: tuple[float, float]
 
@@ -56,8 +57,9 @@ def predict(
     measured = sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
     nu = path.machine[0][4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
+    leakage = (path.states[:-1, 0:2] - path.machine[0][12] * path.states[:-1, 2:4]).T
     last = path.states[-1, 2:4]
-    return Prediction(measured, jacobian, path.rotor_current, iron, path.before, (float(last[0]), float(last[1])))
+    return Prediction(measured, jacobian, path.rotor_current, iron, leakage, path.before, (float(last[0]), float(last[1])))
 
 
 def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -> None:

@@ -24,7 +24,7 @@ from commissioner.diagnose.nominal import (
     bare_layout,
     from_segment_to_segment,
     impedance_starts,
-    largest_iron_flux,
+    largest_fluxes,
     nominal_fit,
     set_up,
     with_flux_before,
@@ -145,8 +145,12 @@ def search(
                 mended, whole.layout, replace(whole.setting, record=mended), noise, names, report, mended, go_on
             )
             fitted, accepted, last = whole.run(again, accepted)
+    iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, whole.layout)
+    reached = replace(
+        whole.setting, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
+    )
     return Found(
-        nominal, fitted, accepted, whole.record, whole.layout, whole.setting, last, first,
+        nominal, fitted, accepted, whole.record, whole.layout, reached, last, first,
         tuple(whole.below), whole.gains(fitted, accepted), losses, go_on(),
     )
 
@@ -369,7 +373,7 @@ class _Search:
 
     def relayout(self, current: Fit) -> Fit:
         """New dictionary ranges where the improved model reaches other fluxes; curves start again from zero."""
-        flux = largest_iron_flux(self.record, current.model, self.layout)
+        flux, _ = largest_fluxes(self.record, current.model, self.layout)
         fresh = with_ranges(self.layout, flux, self.record.facts.current_peak_a * current.model.nominal[2])
         iron, leak = fresh.iron_top_wb / self.layout.iron_top_wb, fresh.leak_top_wb / self.layout.leak_top_wb
         if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:

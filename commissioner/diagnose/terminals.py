@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import COUNT, current_lost, reported, slope_lost
@@ -33,7 +33,8 @@ def sense(
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
     clocks = CLOCK in {t.kind for t in (*model.terms, *listed)}
     clock = 1e-6 * _clock(segment) if clocks else np.zeros((0, segment.count))
-    late = model.total(DELAY) + model.sum_kind(CLOCK, len(clock)) @ clock
+    turns = _delays(segment)
+    late = model.sum_kind(DELAY, 2) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
     is_late = bool(np.any(late))
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
@@ -43,13 +44,12 @@ def sense(
             jacobian[row] = resample(jacobian[row], late / period)
     else:
         slope = before
-    lag = model.total(LAG)
-    lag_slope = slope
-    if lag > 0.0:
-        current, lag_slope = _lagged(current, slope, lag, period)
-        slope = _lagged(slope, np.gradient(slope, period, axis=1), lag, period)[0]
+    lags = model.sum_kind(LAG, 2)
+    lag_slopes = [-slope, -slope]
+    if lags.any():
+        current, slope, lag_slopes = _behind(current, slope, lags, period)
         for row in rows:
-            jacobian[row] = _low_pass(jacobian[row], lag, period)
+            jacobian[row] = _low_pass(jacobian[row], lags, period)
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
@@ -69,9 +69,9 @@ def sense(
     for k, term in enumerate(listed):
         row = jacobian[4 + k]
         if term.kind == DELAY:
-            row[:] = -slope
+            row[:] = -slope * turns[term.index]
         elif term.kind == LAG:
-            row[:] = -lag_slope
+            row[:] = lag_slopes[term.index]
         elif term.kind == CLOCK:
             row[:] = -slope * clock[term.index]
         elif term.kind == OFFSET:
@@ -115,6 +115,11 @@ def _ages(record: Record, segment: Segment) -> list[Array]:
     return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
 
 
+def _delays(segment: Segment) -> Array:
+    """Delay (s) per unit at every sample: alike, and longer for every other one."""
+    return np.stack([np.ones(segment.count), np.where(np.arange(segment.count) % 2, -1.0, 1.0)])
+
+
 def _clock(segment: Segment) -> Array:
     """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
 
@@ -132,23 +137,33 @@ def _edges(voltage_per_period: Array) -> list[Array]:
     return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
 
 
-def _low_pass(signal: Array, lag_s: float, period_s: float) -> Array:
-    """First-order lag of a signal linear between samples (first-order hold, exact for it)."""
-    x = period_s / lag_s
-    decay = np.exp(-x)
-    late = 1.0 - (1.0 - decay) / x
-    filtered: Array = lfilter([late, 1.0 - decay - late], [1.0, -decay], signal, axis=-1)
+SHORT_LAG = 0.05
+"""Of a sample: below it a lag is expanded, i - tau i' (its second-order term is then below 1e-3 of the first)."""
+
+
+def _behind(current: Array, slope: Array, lags_s: Array, period_s: float) -> tuple[Array, Array, list[Array]]:
+    """Current and its slope behind the lags, and the current's derivative with respect to each."""
+    is_short = lags_s < SHORT_LAG * period_s
+    bent = current - lags_s[is_short].sum() * slope
+    long = np.where(is_short, 0.0, lags_s)
+    derivatives = []
+    for k, lag in enumerate(lags_s):
+        if is_short[k]:
+            derivatives.append(-_low_pass(slope, long, period_s))
+            continue
+        h = 1e-3 * lag * (np.arange(lags_s.size) == k)
+        derivatives.append((_low_pass(bent, long + h, period_s) - _low_pass(bent, long - h, period_s)) / (2e-3 * lag))
+    return _low_pass(bent, long, period_s), _low_pass(slope, lags_s, period_s), derivatives
+
+
+def _low_pass(signal: Array, lags_s: Array, period_s: float) -> Array:
+    """First-order lags in a row of a signal linear between samples (first-order hold, exact for it)."""
+    at_work = lags_s[lags_s > 1e-6 * period_s]
+    if not at_work.size:
+        return signal
+    denominator = np.ones(1)
+    for lag in at_work:
+        denominator = np.convolve(denominator, [lag / period_s, 1.0])
+    forward, back, _ = cont2discrete((np.ones(1), denominator), 1.0, method="foh")
+    filtered: Array = lfilter(forward.ravel(), back, signal, axis=-1)
     return filtered
-
-
-def _lagged(current: Array, slope: Array, lag_s: float, period_s: float) -> tuple[Array, Array]:
-    """First-order lag and minus its derivative with respect to the lag (central difference of the same filter).
-
-    Below a twentieth of a sample the lag is expanded: i - tau i' (its second-order term is then below 1e-3 of the
-    first at the excited frequencies).
-    """
-    if lag_s < 0.05 * period_s:
-        return current - lag_s * slope, slope
-    h = 1e-3 * lag_s
-    high, low = _low_pass(current, lag_s + h, period_s), _low_pass(current, lag_s - h, period_s)
-    return _low_pass(current, lag_s, period_s), -(high - low) / (2.0 * h)

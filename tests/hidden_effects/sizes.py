@@ -102,9 +102,13 @@ def _clock(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     return (abs(_first(sizes)), effect.size) if effect.shape in ("", "constant") else None
 
 
-def _either(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
-    """The larger of the two parts (leakage or main, stator or rotor): the one the effect acts on."""
-    return max(value for value, _, _ in sizes.values()), effect.size
+def _inductance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
+    """The simulator tilts an inductance of its Gamma circuit; of the inverse-Gamma one, with k = L_s / (L_s + L_l),
+    L_sigma = k L_l then tilts by k of it, and L_M = k L_s by 2 - k.
+    """
+    leakage, magnetizing = (sizes[f"{part}_anisotropy"][0] for part in ("leakage", "magnetizing"))
+    k = plant.machine.inductance_h / (plant.machine.inductance_h + plant.machine.leakage_inductance_h)
+    return (magnetizing, (2.0 - k) * effect.size) if effect.shape == "main" else (leakage, k * effect.size)
 
 
 def _resistance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
@@ -126,6 +130,6 @@ COMPARED: dict[str, Compare] = {
     "sampling_delay": _scaled(1e6), "sensor_lag": _scaled(1e6), "magnetizing_saturation": _saturation,
     "magnetic_hysteresis": _scaled(1.0), "leakage_saturation": _leakage, "iron_loss": _conductance,
     "stator_heating": _heating, "sensor_offset": _offset, "sensor_gain_mismatch": _gain, "sensor_nonlinearity": _sensor,
-    "mains_pickup": _mains, "clock_drift": _clock, "shaft_motion": _motion, "inductance_anisotropy": _either,
+    "mains_pickup": _mains, "clock_drift": _clock, "shaft_motion": _motion, "inductance_anisotropy": _inductance,
     "resistance_anisotropy": _resistance, "cable_capacitance": _scaled(1e9), "quantization": _scaled(1.0),
 }  # fmt: skip

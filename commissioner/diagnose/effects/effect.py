@@ -23,6 +23,9 @@ class Setting:
     record: Record
     layout: Layout
     iron_flux_wb: float
+    leakage_flux_wb: float
+    """Largest fluxes of iron and leakage path that the fitted machine reaches."""
+    leakage_h: float
     lines_hz: Mapping[str, float]
 
     @property

@@ -102,13 +102,15 @@ def remanence(setting: Setting) -> tuple[Term, ...]:
 
 
 def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    layout = setting.layout
+    """Drop of the inductance (flux over current) from no current to the largest that the leakage path carries.
+
+    The path's own inductance is L_sigma with the stator current's leakage, (1 + L_sigma/L_M) L_sigma with the rotor's.
+    """
+    layout, flux = setting.layout, setting.leakage_flux_wb
+    own_h = setting.leakage_h * (1.0 + (0.5 + values.get("split", 0.0)) * layout.leak_ratio)
     weights = listed(values, "curve", layout.leak_vectors.shape[0])
-    at = layout.leak_top_wb / 1.2
-    gain = spline_value(layout.leak_vectors, weights, layout.leak_top_wb, at)
-    linear = at / max(setting.facts.current_peak_a, 1e-9)
-    return {"inductance_drop": (1.0 - 1.0 / (1.0 + gain * linear) if gain * linear > -0.9 else gain * linear, "1"),
-            "at_current_a": (setting.facts.current_peak_a, "A")}
+    growth = own_h * spline_value(layout.leak_vectors, weights, layout.leak_top_wb, flux)
+    return {"inductance_drop": (growth / (1.0 + growth), "1"), "at_current_a": (flux / own_h * (1.0 + growth), "A")}
 
 
 @effect(

@@ -15,7 +15,7 @@ PHASES = ("u", "v", "w")
 
 
 def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"delay_us": (values.get("delay", 0.0) * 1e6, "us")}
+    return {"delay_us": (values.get("delay", 0.0) * 1e6, "us"), "alternating_us": (abs(values.get("alternating", 0.0)) * 1e6, "us")}
 
 
 @effect(
@@ -26,26 +26,27 @@ def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
 )
 def sampling_delay(setting: Setting) -> tuple[Term, ...]:
-    """Reported current is i(t - tau), tau >= 0 [s]."""
-    return (Term("sampling_delay", "delay", "s", DELAY, 0, 1e-6, 0.0, 0.02),)
+    """Reported current is i(t - tau), tau >= 0 [s], and a part that is added and taken off from sample to sample."""
+    return (
+        Term("sampling_delay", "delay", "s", DELAY, 0, 1e-6, 0.0, 0.02),
+        Term("sampling_delay", "alternating", "s", DELAY, 1, 1e-6, -0.02, 0.02),
+    )
 
 
 def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"time_constant_us": (values.get("lag", 0.0) * 1e6, "us")}
+    return {"time_constant_us": (sum(values.values()) * 1e6, "us")}
 
 
 @effect(
-    "sensor_lag", "First-order lag of the current sensors", sign=1, family="linear", sizes=_lag_sizes,
+    "sensor_lag", "Lag of the current sensors", sign=1, family="linear", sizes=_lag_sizes,
     signature="phase and a roll-off with the square of frequency at excited lines, no distortion",
     confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
-    source="anti-alias filter or sensor bandwidth: tau dy/dt = i - y",
+    source="anti-alias filter or sensor bandwidth: tau dy/dt = i - y, once or twice",
     split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
 )
 def sensor_lag(setting: Setting) -> tuple[Term, ...]:
-    """Time constant tau >= 0 [s]."""
-    return (Term("sensor_lag", "lag", "s", LAG, 0, 1e-6, 0.0, 0.02),)
-
-
+    """Time constants >= 0 [s] of two lags in a row; the size is their sum."""
+    return tuple(Term("sensor_lag", symbol, "s", LAG, k, 1e-6, 0.0, 0.02) for k, symbol in enumerate(("lag", "second_lag")))
 
 def _offset_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {f"offset_{p}_a": (values[p], "A") for p in PHASES if p in values}

@@ -18,7 +18,7 @@ WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given
 def late(setting, nominal):
     """The conftest machine, its currents 40 us late."""
     terms = CATALOGUE["sampling_delay"].terms(setting)
-    model = replace(nominal.with_terms(terms), values=(4e-5,))
+    model = replace(nominal.with_terms(terms), values=(4e-5, 0.0))
     record = setting.record
     segments = tuple(
         replace(s, currents_a=predict(model, record, k, setting.layout).currents_a) for k, s in enumerate(record.segments)
