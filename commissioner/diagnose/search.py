@@ -46,9 +46,13 @@ CLASS_GUARD = 1e-2
 HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
 SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
-PAIR_GUARDS = {SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05}
+PAIR_GUARDS = {
+    SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
+    frozenset({"shaft_motion", "remanence"}): 0.05,
+}
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
-a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side."""
+a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
+segment before, which a shaft that turns in the pause carries elsewhere."""
 LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
 """Causes that only turn and scale the excited lines: any two of them can look like a third."""
 REGROUPED, HOPEFUL = 4, 1.3
