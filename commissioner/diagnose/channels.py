@@ -172,21 +172,29 @@ def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model) -> l
 
 
 def _refine(record: Record, signals: Sequence[Array], base: float) -> tuple[float, float]:
-    """The frequency near `base` where the signals are strongest, and its power over the median nearby."""
+    """The frequency near `base` where the signals are strongest, and its power over the median beside the search."""
     period = record.facts.sample_period_s
     span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
     grid = base * np.linspace(1 - SEARCH, 1 + SEARCH, 2 * int(8 * SEARCH * base * span) + 3)
-    powers = np.zeros(grid.shape[0])
-    for signal in signals:
-        window = np.hanning(signal.shape[1])
-        powers += sum(np.abs(_zoom(row * window, grid, period)) ** 2 for row in signal)
+    powers = _powers(signals, grid, period)
+    # a line in a short segment is as wide as the search: what it stands out from lies beyond its skirts
+    skirt = SEARCH * base + np.arange(3, 11) / span
+    beside = _powers(signals, np.concatenate([base - skirt[::-1], base + skirt]), period)
     best = int(np.argmax(powers))
     at = float(grid[best])
     if 0 < best < grid.shape[0] - 1:
         left, middle, right = powers[best - 1 : best + 2]
         bend = left - 2.0 * middle + right
         at += 0.5 * float((left - right) / bend) * float(grid[1] - grid[0]) if bend < 0 else 0.0
-    return at, float(powers[best] / max(float(np.median(powers)), 1e-300))
+    return at, float(powers[best] / max(float(np.median(beside)), 1e-300))
+
+
+def _powers(signals: Sequence[Array], frequency: Array, period: float) -> Array:
+    powers = np.zeros(frequency.shape[0])
+    for signal in signals:
+        window = np.hanning(signal.shape[1])
+        powers += sum(np.abs(_zoom(row * window, frequency, period)) ** 2 for row in signal)
+    return powers
 
 
 def _zoom(signal: Array, frequency: Array, period: float) -> Array:

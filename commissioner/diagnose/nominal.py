@@ -37,7 +37,7 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     layout = replace(
         with_ranges(bare, flux, peak * model.nominal[2]),
         legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
-        iron_vectors=even_vectors(10), leak_vectors=even_vectors(6),
+        iron_vectors=even_vectors(10), leak_vectors=even_vectors(12),
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
         legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),

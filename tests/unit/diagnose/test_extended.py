@@ -22,7 +22,7 @@ VALUES = {
     "sensor_lag": {"lag": 50e-6},
     "magnetizing_saturation": {f"curve_{k}": 0.01 for k in range(1, 11)},
     "magnetic_hysteresis": {"loop_0": 0.004, "loop_1": 0.01, "loop_2": 0.01},
-    "leakage_saturation": {"curve_0": 0.4, "curve_1": 0.4, "curve_2": 0.4, "curve_3": 0.4},
+    "leakage_saturation": {f"curve_{k}": 0.2 for k in range(8)},
     "rotor_skin_effect": {"branch_1": 0.03, "branch_2": 0.03},
     "iron_loss": {"conductance": 1e-3},
     "stator_heating": {"own": 1.5},
