@@ -64,8 +64,11 @@ def leftover(
     excess = power / max(count - numbers, 1) - 1.0
     doubt = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
     by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
-    by_lines = float(np.sqrt(line_power / count))
-    by_tones = float(np.sqrt(2.0 * sum(_excess(rows, noise.uncertainty) for rows in around) / count))
+    at_tones = 2.0 * sum(_excess(rows, noise.uncertainty) for rows in around)
+    # the lines that coarse steps make are counted with the noise already
+    by_lines, by_tones = (
+        float(np.sqrt(max(power / count - noise.rounding_share, 0.0))) for power in (line_power, at_tones)
+    )
     return Leftover(max(by_power, by_lines, by_tones), by_power, by_lines, by_tones, strongest[1])
 
 

@@ -48,6 +48,8 @@ class Noise:
     uncertainty: float
     is_white: bool
     by_source: dict[str, list[float]] = field(default_factory=dict)
+    rounding_share: float = 0.0
+    """Part of the variance that coarse converter steps make, which repeat with the signal: lines, not noise."""
 
     @property
     def floor_a(self) -> float:
@@ -65,7 +67,8 @@ class Noise:
         if not is_coarse.any():
             return self
         total = np.where(is_coarse, np.hypot(self.sigma_a, rounding), self.sigma_a)
-        return replace(self, sigma_a=total, uncertainty=max(self.uncertainty, 0.1))
+        share = float(np.sum(np.where(is_coarse, rounding, 0.0) ** 2) / np.sum(total**2))
+        return replace(self, sigma_a=total, uncertainty=max(self.uncertainty, 0.1), rounding_share=share)
 
     def weights(self, samples: int, period_s: float) -> Array:
         """(phases, samples//2 + 1): what a Fourier coefficient is divided by, white level included."""

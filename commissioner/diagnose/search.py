@@ -62,6 +62,8 @@ TONE_TO_TONE = 0.05
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
+STEPS_GUARD = 5e-3
+"""As GUARD, of the power of coarse converter steps, which repeat with the signal and look a little like anything."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
@@ -216,9 +218,10 @@ class _Search:
 
     @property
     def material_chi2(self) -> float:
-        """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms."""
+        """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms, or of what coarse steps may imitate."""
         count = sum(s.count for s in self.record.segments) * self.record.facts.phases
-        return float(count * (MATERIAL_SHARE * self.rms_a) ** 2 * np.mean(self.noise.sigma_a**-2.0))
+        material = (MATERIAL_SHARE * self.rms_a) ** 2 * np.mean(self.noise.sigma_a**-2.0)
+        return float(count * max(material, STEPS_GUARD * self.noise.rounding_share))
 
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)

@@ -42,7 +42,7 @@ def strength_sigma(scenario: Scenario, seed: int, names: list[str], noise: Noise
 
 def twin_margin(seen: Diagnosis, true_name: str) -> float | None:
     """Chi-square by which the true cause fits better than its best class-mate; None where it has none."""
-    if seen.found is None or seen.noise is None:
+    if seen.found is None or seen.noise is None or len(class_of(true_name)) == 1:
         return None
     found = seen.found
     chi2 = {}
@@ -54,7 +54,7 @@ def twin_margin(seen: Diagnosis, true_name: str) -> float | None:
     rivals = [v for k, v in chi2.items() if k != true_name]
     if true_name not in chi2:
         return 0.0
-    return min(rivals) - chi2[true_name] if rivals else (0.0 if len(class_of(true_name)) > 1 else None)
+    return min(rivals) - chi2[true_name] if rivals else 0.0
 
 
 def gain_capture(seen: Diagnosis, scenario: Scenario, seed: int) -> float | None:
