@@ -197,7 +197,11 @@ def _if(is_used: bool, vectors: Array) -> Array:
 def _initial_state(model: Model, segment: Segment) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
-    along, across = model.total(kinds.CARRY), model.total(kinds.CARRY, 1)
+    carried = [0.0, 0.0]
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == kinds.CARRY and term.segment in (-1, segment.uid):
+            carried[term.index] += value
+    along, across = carried
     alpha, beta = segment.flux_before_wb
     left = (along * alpha - across * beta, along * beta + across * alpha)
     state[:] = [*left, *left]

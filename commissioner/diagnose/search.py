@@ -220,7 +220,7 @@ class _Search:
     def material_chi2(self) -> float:
         """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms, or of what coarse steps may imitate."""
         count = sum(s.count for s in self.record.segments) * self.record.facts.phases
-        material = (MATERIAL_SHARE * self.rms_a) ** 2 * np.mean(self.noise.sigma_a**-2.0)
+        material = (MATERIAL_SHARE * self.rms_a) ** 2 * float(np.mean(self.noise.sigma_a**-2.0))
         return float(count * max(material, STEPS_GUARD * self.noise.rounding_share))
 
     def threshold(self, numbers: int) -> float:
@@ -350,16 +350,18 @@ class _Search:
     def _backward(
         self, current: Fit, accepted: tuple[str, ...], doubted: Sequence[str]
     ) -> tuple[Fit, tuple[str, ...], list[str]]:
-        """Drops accepted effects that the later ones have made idle (or turned to the wrong sign)."""
+        """Drops accepted effects that the later ones have made idle, or a trifle beside them (or turned to the wrong sign)."""
         dropped: list[str] = []
         for name in doubted:
-            loss = loss_without(current, name)
+            losses = self.gains(current, accepted)
+            loss = losses.pop(name)
             numbers = sum(1 for t in current.model.terms if t.effect == name)
+            wanted = max(self._guard(losses, name), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
-            if holds_place or loss < 10.0 * self.threshold(numbers) or not self._is_plausible(current.model, name):
+            if holds_place or loss < 10.0 * wanted or not self._is_plausible(current.model, name):
                 trial = fit(current.model.without(name), self.record, self.layout, self.noise)
-                if trial.chi2 - current.chi2 < self.threshold(numbers) or not self._is_plausible(current.model, name):
+                if trial.chi2 - current.chi2 < wanted or not self._is_plausible(current.model, name):
                     self.report(f"  dropped {name}")
                     current, accepted = trial, tuple(n for n in accepted if n != name)
                     dropped.append(name)

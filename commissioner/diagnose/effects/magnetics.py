@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -222,7 +223,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
         shown = segment.voltage_axis_v**2
         for name, value in values.items():
             hat, _, uid = name.rpartition("_")
-            if uid == str(segment.uid):
+            if uid == str(segment.uid) and hat.startswith("hat_"):
                 mine = float(shown @ channels[:, setting.record.channel(hat)])
                 power, weight = power + mine * value**2, weight + mine
     return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
@@ -236,12 +237,21 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="block the shaft",
 )
 def shaft_motion(setting: Setting) -> tuple[Term, ...]:
-    """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment."""
-    return tuple(
+    """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment; and where in the pause before a
+
+    segment it carried the flux left from the segment before that.
+    """
+    speed = tuple(
         Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
         for s in setting.record.segments
         for n in setting.record.channel_names if n.startswith("hat_")
     )
+    carried = tuple(
+        Term("shaft_motion", f"{name}_{s.uid}", "1", kinds.CARRY, k, 0.01, -2.0, 2.0, segment=s.uid)
+        for before, s in itertools.pairwise(setting.record.segments) if before.file == s.file and s.starts_at_rest
+        for k, name in enumerate(("along", "across"))
+    )
+    return (*speed, *carried)
 
 
 def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
