@@ -41,7 +41,7 @@ TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
-SHOWN_BY_A_PART = 0.5
+SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 NO_RIVAL = 1e6
 """Loss in chi2 that stands for having no alternative."""
@@ -188,17 +188,17 @@ def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence
     if not asked:
         return {}
     record, layout = found.record, found.layout
-    part_fit, part = on_part(found.fit, record, layout, noise, EXPLORED_SAMPLES)
-    share = SHOWN_BY_A_PART * part.samples / record.samples
-    shown = [n for n in asked if loss_without(part_fit, n) > share * found.gains[n]]
-    late = [n for n in asked if n not in shown]
-    return {
-        name: rivals
-        for names, data, fitted in ((shown, part, part_fit), (late, record, found.fit))
-        for name, rivals in alternatives(
-            fitted, found.accepted, data, layout, setting_for(found.setting, data), noise, record.samples, excluded, names
-        ).items()
-    }
+    out: dict[str, dict[str, float]] = {}
+    for samples in (EXPLORED_SAMPLES, 4 * EXPLORED_SAMPLES, record.samples):
+        if len(out) == len(asked):
+            break
+        fitted, part = on_part(found.fit, record, layout, noise, samples)
+        share = SHOWN_BY_A_PART * part.samples / record.samples
+        shown = [n for n in asked if n not in out and (part is record or loss_without(fitted, n) > share * found.gains[n])]
+        if shown:
+            setting = setting_for(found.setting, part)
+            out |= alternatives(fitted, found.accepted, part, layout, setting, noise, record.samples, excluded, shown)
+    return out
 
 
 def _cause(

@@ -14,7 +14,7 @@ from commissioner.diagnose.leftover import Leftover
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, each_segment
 from commissioner.diagnose.screen import screen
 from commissioner.diagnose.search import is_plausible, loss_without
 
@@ -41,15 +41,16 @@ class HeldOut:
 def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noise) -> HeldOut:
     """Every segment predicted by the model fitted to all others (numbers bound to one segment keep their value)."""
     many = len(record.segments) > 1
-    powers = []
-    for k, segment in enumerate(record.segments):
-        row = []
+
+    def of_segment(k: int) -> tuple[float, float, int]:
+        segment, left = record.segments[k], []
         for one in (before, after):
             model = _without_segment(one, k, layout) if many else one.model
             residual = segment.currents_a - predict(model, record, k, layout).currents_a
-            row.append(float((residual[:, segment.is_good] ** 2).sum()))
-        powers.append((*row, int(segment.is_good.sum()) * record.facts.phases))
-    table = np.array(powers)
+            left.append(float((residual[:, segment.is_good] ** 2).sum()))
+        return left[0], left[1], int(segment.is_good.sum()) * record.facts.phases
+
+    table = np.array(each_segment(of_segment, record))
     floor = noise.floor_a**2 * table[:, 2]
     removed = table[:, 0] - table[:, 1]
     structured = np.maximum(table[:, 0] - floor, 1e-12 * floor)

@@ -13,7 +13,7 @@ from commissioner.diagnose.fit import whiten
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
 TONE_BINS, BESIDE_BINS = 3, 25
@@ -43,8 +43,9 @@ def leftover(
     """
     power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
     around: list[list[_Around]] = [[] for _ in tones_hz]
-    for k, segment in enumerate(record.segments):
-        residual = segment.currents_a - predict(model, record, k, layout).currents_a
+    predicted = each_segment(lambda k: predict(model, record, k, layout).currents_a, record)
+    for segment, expected in zip(record.segments, predicted, strict=True):
+        residual = segment.currents_a - expected
         white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
         power += float(white @ white)
         count += int(segment.is_good.sum()) * record.facts.phases

@@ -18,7 +18,7 @@ from commissioner.diagnose.fit import whiten
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import exact_step, predict
-from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
 
 Array = NDArray[np.float64]
 MOST_EVENTS = 16
@@ -52,49 +52,94 @@ def mend(
 
     with all their losses, and is right in their middle rather than at the start.
     """
-    found: list[Loss] = []
-    segments = list(record.segments)
-    for k in range(len(segments)):
-        segments[k], skips = _skips_put_right(replace(record, segments=tuple(segments)), k, model, layout, noise, is_first)
-        found += skips
+
+    def of_segment(k: int) -> tuple[Segment, list[Loss]]:
+        one = _Mending(record, k, model, layout, noise)
+        losses = one.put_skips_right(begins_anywhere=is_first)
         for _ in range(MOST_EVENTS):
-            current = replace(record, segments=tuple(segments))
-            step = _one(current, k, model, layout, noise)
-            if step is None:
+            loss = one.put_one_right()
+            if loss is None:
                 break
-            segments[k], loss = step
-            found.append(loss)
-    return replace(record, segments=tuple(segments)), tuple(found)
+            losses.append(loss)
+        return one.segment, losses
+
+    done = each_segment(of_segment, record)
+    return replace(record, segments=tuple(s for s, _ in done)), tuple(x for _, losses in done for x in losses)
 
 
-def _skips_put_right(
-    record: Record, k: int, model: Model, layout: Layout, noise: Noise, is_first: bool
-) -> tuple[Segment, list[Loss]]:
-    """Skips of the current channel alone move no state of the machine: the whole staircase of them is found at once.
+class _Mending:
+    """One segment as mended so far, what the model predicts for it, and its chi2."""
 
-    Not taken where a delay that drifts evenly explains as much.
-    """
-    segment = record.segments[k]
-    prediction = predict(model, record, k, layout).currents_a / noise.sigma_a[:, None]
-    seen = np.where(segment.is_good, segment.currents_a / noise.sigma_a[:, None], np.nan)
-    shifts = _staircase(np.ascontiguousarray(seen), np.ascontiguousarray(prediction), LEAST_GAIN, is_first)
-    steps = np.flatnonzero(np.diff(shifts)) + 1
-    if not steps.size:
-        return segment, []
-    repaired, losses = segment, []
-    for at in steps:
-        n = int(shifts[at] - shifts[at - 1])
-        where = int(at + shifts[at - 1] - shifts[0])
-        if where + n >= segment.count - 2:
-            break
-        losses.append(Loss(segment.number, float(segment.time_s[at]), n, "current samples"))
-        repaired = _shifted(repaired, where, n)
-    before, after = (_chi2(record, k, s, model, layout, noise) for s in (segment, repaired))
-    gain = before - after - _masked(segment, repaired, record)
-    floor = float(segment.is_good.sum()) * record.facts.phases
-    if gain < max(LEAST_GAIN * len(losses), LEAST_SHARE * (before - floor)) or _drifts_evenly(seen, prediction, shifts):
-        return segment, []
-    return repaired, losses
+    def __init__(self, record: Record, k: int, model: Model, layout: Layout, noise: Noise) -> None:
+        self.record, self.k, self.model, self.layout, self.noise = record, k, model, layout, noise
+        self.segment = record.segments[k]
+        self.predicted_a = self._predict(self.segment)
+        self.chi2 = self._chi2(self.segment, self.predicted_a)
+
+    def _predict(self, segment: Segment) -> Array:
+        segments = list(self.record.segments)
+        segments[self.k] = segment
+        return predict(self.model, replace(self.record, segments=tuple(segments)), self.k, self.layout).currents_a
+
+    def _chi2(self, segment: Segment, predicted_a: Array) -> float:
+        white = whiten(segment.currents_a - predicted_a, segment.is_good, self.noise, self.record.facts.sample_period_s)
+        return float(white @ white)
+
+    def _judge(self, repaired: Segment) -> tuple[Array, float]:
+        """Currents that the model predicts after the repair, and their chi2: rows put back change the command, too."""
+        is_same = repaired.voltage_axis_v is self.segment.voltage_axis_v
+        predicted = self.predicted_a if is_same else self._predict(repaired)
+        return predicted, self._chi2(repaired, predicted)
+
+    @property
+    def excess(self) -> float:
+        return self.chi2 - float(self.segment.is_good.sum()) * self.record.facts.phases
+
+    def _gain(self, repaired: Segment, chi2: float) -> float:
+        """What the repair gains beyond the samples that no longer count."""
+        masked = max(int(self.segment.is_good.sum()) - int(repaired.is_good.sum()), 0)
+        return self.chi2 - chi2 - 3.0 * masked * self.record.facts.phases
+
+    def put_skips_right(self, *, begins_anywhere: bool) -> list[Loss]:
+        """Skips of the current channel alone move no state of the machine: the whole staircase of them is found at once.
+
+        Not taken where a delay that drifts evenly explains as much.
+        """
+        segment, sigma = self.segment, self.noise.sigma_a[:, None]
+        predicted = np.ascontiguousarray(self.predicted_a / sigma)
+        seen = np.ascontiguousarray(np.where(segment.is_good, segment.currents_a / sigma, np.nan))
+        shifts = _staircase(seen, predicted, LEAST_GAIN, begins_anywhere)
+        repaired, losses = segment, []
+        for at in np.flatnonzero(np.diff(shifts)) + 1:
+            n, where = int(shifts[at] - shifts[at - 1]), int(at + shifts[at - 1] - shifts[0])
+            if where + n >= segment.count - 2:
+                break
+            losses.append(Loss(segment.number, float(segment.time_s[at]), n, "current samples"))
+            repaired = _shifted(repaired, where, n)
+        if not losses or _drifts_evenly(seen, predicted, shifts):
+            return []
+        there, chi2 = self._judge(repaired)
+        if self._gain(repaired, chi2) < max(LEAST_GAIN * len(losses), LEAST_SHARE * self.excess):
+            return []
+        self.segment, self.predicted_a, self.chi2 = repaired, there, chi2
+        return losses
+
+    def put_one_right(self) -> Loss | None:
+        """The one event whose repair gains most, if it gains enough."""
+        segment = self.segment
+        residual = np.where(segment.is_good, segment.currents_a - self.predicted_a, 0.0)
+        slope = np.gradient(self.predicted_a, axis=1)
+        best: tuple[float, Segment, Loss, Array, float] | None = None
+        for at in _suspects(residual, slope, segment, self.model, self.noise):
+            for repaired, loss in _repairs(segment, at):
+                there, chi2 = self._judge(repaired)
+                gain = self._gain(repaired, chi2)
+                if gain > max(LEAST_GAIN, LEAST_SHARE * self.excess) and (best is None or gain > best[0]):
+                    best = (gain, repaired, loss, there, chi2)
+        if best is None:
+            return None
+        _, self.segment, loss, self.predicted_a, self.chi2 = best
+        return loss
 
 
 @njit(cache=True, nogil=True)
@@ -140,37 +185,6 @@ def _drifts_evenly(seen: Array, predicted: Array, shifts: NDArray[np.int64]) -> 
     power = float((slope[is_seen] ** 2).sum())
     met = float((slope * (seen - predicted[:, at]))[is_seen].sum())
     return power > LEAST_GAIN and met > 0.5 * power
-
-
-def _one(record: Record, k: int, model: Model, layout: Layout, noise: Noise) -> tuple[Segment, Loss] | None:
-    segment = record.segments[k]
-    prediction = predict(model, record, k, layout)
-    residual = np.where(segment.is_good, segment.currents_a - prediction.currents_a, 0.0)
-    before = _chi2(record, k, segment, model, layout, noise)
-    floor = float(segment.is_good.sum()) * record.facts.phases
-    wanted = max(LEAST_GAIN, LEAST_SHARE * (before - floor))
-    slope = np.gradient(prediction.currents_a, axis=1)
-    best: tuple[float, Segment, Loss] | None = None
-    for at in _suspects(residual, slope, segment, model, noise):
-        for repaired, loss in _repairs(segment, at):
-            gain = before - _chi2(record, k, repaired, model, layout, noise) - _masked(segment, repaired, record)
-            if gain > wanted and (best is None or gain > best[0]):
-                best = (gain, repaired, loss)
-    return None if best is None else (best[1], best[2])
-
-
-def _masked(old: Segment, new: Segment, record: Record) -> float:
-    """Chi2 that falls just because fewer samples count."""
-    return float(max(int(old.is_good.sum()) - int(new.is_good.sum()), 0) * record.facts.phases) * 3.0
-
-
-def _chi2(record: Record, k: int, segment: Segment, model: Model, layout: Layout, noise: Noise) -> float:
-    segments = list(record.segments)
-    segments[k] = segment
-    changed = replace(record, segments=tuple(segments))
-    residual = segment.currents_a - predict(model, changed, k, layout).currents_a
-    white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
-    return float(white @ white)
 
 
 def _suspects(residual: Array, slope: Array, segment: Segment, model: Model, noise: Noise) -> Iterator[int]:

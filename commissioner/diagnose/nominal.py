@@ -16,7 +16,7 @@ from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, each_segment
 
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
@@ -47,11 +47,14 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
 
 def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float, float]:
     """Of the iron and of the leakage path (Wb)."""
-    reached = [predict(model, record, k, layout) for k in range(len(record.segments))]
-    return (
-        max(float(np.hypot(*p.iron_flux_wb).max()) for p in reached),
-        max(float(np.hypot(*p.leakage_flux_wb).max()) for p in reached),
-    )
+
+
+    def of_segment(k: int) -> tuple[float, float]:
+        seen = predict(model, record, k, layout)
+        return float(np.hypot(*seen.iron_flux_wb).max()), float(np.hypot(*seen.leakage_flux_wb).max())
+
+    iron, leakage = zip(*each_segment(of_segment, record), strict=True)
+    return max(iron), max(leakage)
 
 
 def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> Layout:

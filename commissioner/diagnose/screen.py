@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER = 40.0, 10.0
 FULL_PRICE = 10
 """Numbers beyond so many cost chi-square's own mean plus two standard deviations each, not ten."""
+SCREENED_SAMPLES = 320_000
 VISIBLE = 1e-7
 """Share of a direction's power that must be left after projection for it to count as visible."""
 
@@ -66,6 +67,8 @@ class Screening:
     slope: Array
     columns: Mapping[str, tuple[int, ...]]
     normal: Normal
+    times: float
+    """How much more data there are than were screened; the scores promise for all of them."""
 
     def ranked(self) -> list[Score]:
         return sorted(self.scores.values(), key=lambda s: -s.net)
@@ -74,12 +77,18 @@ class Screening:
 def screen(
     model: Model, record: Record, layout: Layout, noise: Noise, setting: Setting, absent: Sequence[str]
 ) -> Screening:
-    """Scores of the effects in `absent` at `model`, one pass over the data."""
+    """Scores of the effects in `absent` at `model`, one pass over the data; of a long recording over the first part of each
+
+    segment, and what it promises for the whole: all directions of all of it would fill the memory.
+    """
+    whole = record.samples
+    if whole > SCREENED_SAMPLES:
+        record = record.subset(tuple(range(len(record.segments))), SCREENED_SAMPLES // len(record.segments))
     candidates = {name: CATALOGUE[name].terms(setting) for name in absent}
     candidates = {name: terms for name, terms in candidates.items() if terms}
     wanted = [*model.terms, *(t for terms in candidates.values() for t in terms)]
     normal = normal_equations(model, record, layout, wanted, noise, _block(record))
-    return score(model, normal, candidates, setting)
+    return score(model, normal, candidates, setting, whole / record.samples)
 
 
 def _block(record: Record) -> int:
@@ -91,13 +100,18 @@ def _block(record: Record) -> int:
     return int(np.clip(0.25 / (record.facts.sample_period_s * max(highest, 1.0)), 1, 4))
 
 
-def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...]], setting: Setting) -> Screening:
-    """Scores from normal equations whose columns are the model's numbers, then the candidates' in order."""
+def score(
+    model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...]], setting: Setting, times: float = 1.0
+) -> Screening:
+    """Scores from normal equations whose columns are the model's numbers, then the candidates' in order; promised for so
+
+    many `times` the data.
+    """
     gram, slope = normal.total_gram, normal.total_slope
     active = 4 + len(model.terms)
     if not np.isfinite(gram[:active, :active]).all():
         # a fitted machine faster than the steps can follow: nothing can be said about what it lacks
-        return Screening({}, np.zeros((0, 0)), np.zeros(0), {}, normal)
+        return Screening({}, np.zeros((0, 0)), np.zeros(0), {}, normal, times)
     free = np.flatnonzero(model.is_free)
     root = _inverse_root(gram[np.ix_(free, free)])
     reduced = root @ gram[free, active:]
@@ -114,8 +128,8 @@ def score(model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...
             continue
         columns[name] = kept
         own = [terms[k - every.start] for k in kept]
-        scores[name] = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting)
-    return Screening(scores, projected, left, columns, normal)
+        scores[name] = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting, times)
+    return Screening(scores, projected, left, columns, normal, times)
 
 
 def joint_net(screening: Screening, names: Sequence[str]) -> float:
@@ -126,10 +140,16 @@ def joint_net(screening: Screening, names: Sequence[str]) -> float:
                     for bounds in ([t.lower for t in terms], [t.upper for t in terms]))
     gram, slope = screening.projected[np.ix_(kept, kept)], screening.slope[kept]
     step = bounded_step(gram, slope, lower, upper, 1e-9)
-    return float(2.0 * step @ slope - step @ gram @ step) - sum(price(screening.scores[n].numbers) for n in names)
+    gain = float(2.0 * step @ slope - step @ gram @ step)
+    return promised(gain, len(kept), screening.times) - sum(price(screening.scores[n].numbers) for n in names)
 
 
-def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting: Setting) -> Score:
+def promised(gain: float, numbers: int, times: float) -> float:
+    """What a gain in chi2 grows to with so many times the data: each number's share of the noise, which is 1, does not."""
+    return max(numbers + times * (gain - numbers), 0.0) if times > 1.0 else gain
+
+
+def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting: Setting, times: float) -> Score:
     lower = np.array([t.lower / t.step - t.start / t.step for t in terms])
     upper = np.array([t.upper / t.step - t.start / t.step for t in terms])
     step = bounded_step(gram, slope, lower, upper, 1e-9)
@@ -140,7 +160,7 @@ def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting:
         if leading * entry.sign <= 0:
             return Score(name, 0.0, len(terms), np.zeros(len(terms)), tuple(terms))
     gain = float(2.0 * step @ slope - step @ gram @ step)
-    return Score(name, max(gain, 0.0), len(terms), step, tuple(terms))
+    return Score(name, max(promised(gain, len(terms), times), 0.0), len(terms), step, tuple(terms))
 
 
 def _inverse_root(gram: Array) -> Array:
