@@ -80,8 +80,15 @@ def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
             continue
         theta = shapes[:, -1] * np.sqrt(score.threshold / (scale * powers[-1]))
         theta = theta if theta.sum() >= 0.0 else -theta
-        sizes = CATALOGUE[name].sizes(found.setting, {t.symbol: x * t.step for t, x in zip(score.terms, theta, strict=True)})
-        key, (value, unit) = max(_comparable(sizes), key=lambda item: abs(item[1][0]))
+        sizes, none = (
+            CATALOGUE[name].sizes(found.setting, {t.symbol: x * t.step for t, x in zip(score.terms, values, strict=True)})
+            for values in (theta, 0.0 * theta)
+        )
+        # what is there without the effect, too, says where it acts and not how much
+        measures = {key: size for key, size in sizes.items() if size != none.get(key)}
+        if not measures:
+            continue
+        key, (value, unit) = max(_comparable(measures), key=lambda item: abs(item[1][0]))
         if np.isfinite(value) and value != 0.0:
             out[name] = {key: {"value": abs(float(value)), "unit": unit}}
     return out

@@ -159,7 +159,7 @@ def _end_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
         top = int(np.argmax(seen >= min(NEAR_THE_END * end_a, float(seen.max()))))
         found.append((1.0 - float(np.gradient(seen, true)[top]), float(end_a), float(true[top] - seen[top])))
     slope, limit_a, missing_a = max(found)
-    return {"slope_lost": (slope, "1"), "limit_a": (limit_a, "A"), "missing_at_limit_a": (missing_a, "A")}
+    return {"limit_a": (limit_a, "A"), "slope_lost": (slope, "1"), "missing_at_limit_a": (missing_a, "A")}
 
 
 NEAR_THE_END = 0.985
