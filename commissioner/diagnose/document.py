@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Cause, Diagnosis
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.effects.effect import Sizes
+from commissioner.diagnose.effects.effect import PLACES, Sizes
 from commissioner.diagnose.points_diagnosis import PointsDiagnosis
 from commissioner.diagnose.search import Found
 from commissioner.motor.circuit import Quantity
@@ -74,30 +74,29 @@ def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
     out: dict[str, dict[str, dict[str, float | str]]] = {}
     scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)
     for name, score in screening.scores.items():
-        k = list(screening.columns[name])
-        powers, shapes = np.linalg.eigh(screening.projected[np.ix_(k, k)])
-        if powers[-1] <= 0.0:
+        sizes = CATALOGUE[name].sizes
+        none = dict.fromkeys((t.symbol for t in score.terms), 0.0)
+        steps = [{**none, t.symbol: t.step} for t in score.terms]
+        alone = [_comparable(sizes(found.setting, step)) for step in steps]
+        counts = [k for k, items in enumerate(alone) if any(value for _, (value, _) in items)]
+        columns = np.array(screening.columns[name])[counts]
+        powers, shapes = np.linalg.eigh(screening.projected[np.ix_(columns, columns)])
+        if not counts or powers[-1] <= 0.0:
             continue
         theta = shapes[:, -1] * np.sqrt(score.threshold / (scale * powers[-1]))
         theta = theta if theta.sum() >= 0.0 else -theta
-        sizes, none = (
-            CATALOGUE[name].sizes(found.setting, {t.symbol: x * t.step for t, x in zip(score.terms, values, strict=True)})
-            for values in (theta, 0.0 * theta)
-        )
-        # what is there without the effect, too, says where it acts and not how much
-        measures = {key: size for key, size in sizes.items() if size != none.get(key)}
-        if not measures:
-            continue
-        key, (value, unit) = max(_comparable(measures), key=lambda item: abs(item[1][0]))
+        terms = [score.terms[k] for k in counts]
+        found_sizes = sizes(found.setting, {t.symbol: x * t.step for t, x in zip(terms, theta, strict=True)})
+        key, (value, unit) = max(_comparable(found_sizes), key=lambda item: abs(item[1][0]))
         if np.isfinite(value) and value != 0.0:
             out[name] = {key: {"value": abs(float(value)), "unit": unit}}
     return out
 
 
 def _comparable(sizes: Sizes) -> list[tuple[str, tuple[float, str]]]:
-    """Sizes in one unit (offsets of three sensors) compare; of different units only the first measures the effect."""
-    items = list(sizes.items())
-    return items if len({unit for _, unit in sizes.values()}) == 1 else items[:1]
+    """The size that measures the effect: the first that does not say where it acts; of several sensors each one's."""
+    measures = [item for item in sizes.items() if item[0] not in PLACES]
+    return [item for item in measures if item[0].split("_")[0] == measures[0][0].split("_")[0]]
 
 
 def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:

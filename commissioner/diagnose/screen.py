@@ -67,7 +67,7 @@ class Screening:
     slope: Array
     columns: Mapping[str, tuple[int, ...]]
     normal: Normal
-    times: float
+    times: float = 1.0
     """How much more data there are than were screened; the scores promise for all of them."""
 
     def ranked(self) -> list[Score]:

@@ -14,6 +14,8 @@ from commissioner.diagnose.record import Facts, Record
 Array = NDArray[np.float64]
 Sizes = Mapping[str, tuple[float, str]]
 """Engineering values by name, each with its unit; the first one decides the sign."""
+PLACES = frozenset({"limit_a", "at_flux_wb", "at_current_a"})
+"""Values that say where an effect acts and not how much."""
 
 
 @dataclass(frozen=True)
