@@ -76,6 +76,8 @@ EXPLORED_SAMPLES = 45_000
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
 MENDED_SHARE = 0.7
+LEAST_BESIDE = 800.0
+"""Beside accepted causes lost samples must gain so much, and as much as any cause beside one that it is mistaken for."""
 
 Report = Callable[[str], None]
 
@@ -144,7 +146,8 @@ def search(
     fitted, accepted, last = whole.run(start, accepted)
     first = first or whole.first or last
     if accepted and "lost_samples" not in excluded:
-        mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report)
+        least = max(LEAST_BESIDE, CLASS_GUARD * max(whole.gains(fitted, accepted).values()))
+        mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report, least)
         if more:
             losses += more
             whole = _Search(
@@ -162,11 +165,11 @@ def search(
 
 
 def _mended(
-    record: Record, current: Fit, layout: Layout, noise: Noise, report: Report
+    record: Record, current: Fit, layout: Layout, noise: Noise, report: Report, least: float = 0.0
 ) -> tuple[Record, Fit, tuple[Loss, ...]]:
-    """Unmarked losses put right until a better fit shows no more of them; none where most of the misfit stays.
+    """Unmarked losses put right until a better fit shows no more of them; none where most of the misfit stays, or where they
 
-    A cause that is not in the model yet, like the kinks of a dead time, can look like many small losses.
+    gain less than `least`. A cause that is not in the model yet, like the kinks of a dead time, can look like many small losses.
     """
     losses: tuple[Loss, ...] = ()
     mended, better = record, current
@@ -180,7 +183,7 @@ def _mended(
             break
         mended, better, losses = again, trial, seen
     excess, left = (f.chi2 - f.normal.count.sum() for f in (current, better))
-    if not losses or left > (1.0 - MENDED_SHARE) * excess:
+    if not losses or left > (1.0 - MENDED_SHARE) * excess or excess - left < least:
         return record, current, ()
     report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
     return mended, better, losses
