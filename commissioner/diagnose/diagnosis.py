@@ -43,8 +43,6 @@ MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
 SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
-NO_RIVAL = 1e6
-"""Loss in chi2 that stands for having no alternative."""
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
 IRON_CORNER_HZ = 400.0
@@ -173,14 +171,11 @@ def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
 
 
 def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
-    """Whether any alternatives could leave the name likely enough: else they need not be sought."""
+    """Whether the name is likely enough: else its alternatives need not be sought."""
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
-    best = max(
-        confidence(claim_features(found.fit, found.accepted, name, rest, loss, total), calibration.WEIGHTS)
-        for loss in (1.0, NO_RIVAL)
-    )
-    return best >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+    sure = confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
+    return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
 
 
 def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -213,7 +208,7 @@ def _cause(
         fixed = ("iron_loss",)
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
     close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain, unsettled))
-    features = claim_features(found.fit, found.accepted, name, rest, min(rivals.values(), default=NO_RIVAL), total)
+    features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * doubt
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR

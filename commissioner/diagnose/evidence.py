@@ -131,9 +131,9 @@ def confidence(features: Sequence[float], weights: Sequence[float]) -> float:
     return float(1.0 / (1.0 + np.exp(-np.clip(z, -30.0, 30.0))))
 
 
-def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftover, rival_loss: float, total_gain: float) -> list[float]:
+def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftover, total_gain: float) -> list[float]:
     """Log strength in sigma, log of what is left, log ratio of the two, log gain over the strongest other cause's,
-    share of all gain, closeness of the best alternative."""
+    share of all gain. How near the best alternative comes was tried as well and told nothing more (such are ties)."""
     count = float(found.normal.count.sum())
     gain = max(loss_without(found, name), 1.0)
     others = max((loss_without(found, n) for n in accepted if n != name), default=0.0)
@@ -143,7 +143,6 @@ def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftove
         float(np.log10(strength)), float(np.log10(left)), float(np.log10(max(strength / left, 1e-3))),
         float(np.log10(min(gain / max(others, 1.0), 1e4)) if others else 4.0),
         float(min(gain / max(total_gain, 1.0), 1.0)),
-        float(np.log10(max(rival_loss, 1.0))),
     ]
 
 
