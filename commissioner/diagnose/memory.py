@@ -28,6 +28,12 @@ def remembered(za, zb, da, db, radius):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def widened(pa, pb, rate):
+    """Factor on a memory current at flux (pa, pb): 1, or `rate` |flux|^2 where loops widen with flux, as measured ones do."""
+    return 1.0 if rate == 0.0 else rate * (pa * pa + pb * pb)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
 def susceptibility(za, zb, da, db, qa, qb, radius):
     """Derivative of `remembered` by (da, db), symmetric aa, ab, bb, and by (za, zb) likewise; (qa, qb) is the direction of
 

@@ -48,6 +48,7 @@ class Layout:
     leak_top_wb: float
     leak_vectors: Array
     stop_radius_wb: Array
+    """(k, 2): radius (negative: scale of an exponential operator) and rate per Wb^2 at which its loop widens (0: not)."""
     branch_time_s: Array
     nonlinearity_scale_a: float
     substeps: int = 1
@@ -104,7 +105,7 @@ def even_vectors(intervals: int) -> Array:
 
 
 NO_DICTIONARY = Layout(
-    1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([1.0]), np.array([1.0]), 1.0
+    1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([[1.0, 0.0]]), np.array([1.0]), 1.0
 )
 """For a model without terms, which looks nothing up."""
 

@@ -25,7 +25,8 @@ SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.15
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
-"""Radii of stops and, negative, scales of exponential operators, over the largest iron flux."""
+WIDENING = (-0.03, -0.1, -0.3)
+"""Radii of stops and, negative, scales of exponential operators, over the largest iron flux; and those whose loops widen."""
 
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
@@ -61,7 +62,10 @@ def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> 
     """The dictionaries of iron and leakage spread over the largest fluxes reached, with a margin."""
     return replace(
         layout, iron_top_wb=1.08 * iron_flux_wb, leak_top_wb=1.2 * leakage_flux_wb,
-        stop_radius_wb=np.array(STOP_SHARES) * iron_flux_wb,
+        stop_radius_wb=np.array([
+            *((share * iron_flux_wb, 0.0) for share in STOP_SHARES),
+            *((share * iron_flux_wb, iron_flux_wb**-2.0) for share in WIDENING),
+        ]),
     )
 
 

@@ -175,7 +175,7 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
         *(rotor + coupled * (leakage - magnetizing)), *(leakage + 0.5 * coupled * magnetizing),
         *(magnetizing - 0.5 * coupled * leakage), kappa, layout.leak_ratio, coupled,
     ])
-    stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros(0)
+    stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros((0, 2))
     branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
     legs_size = layout.legs_vectors.shape[0]
     return (
@@ -185,7 +185,7 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
         model.sum_kind(kinds.IRON_CURVE, layout.iron_vectors.shape[0]) @ layout.iron_vectors,
         model.sum_kind(kinds.LEAKAGE_CURVE, layout.leak_vectors.shape[0]) @ layout.leak_vectors,
         layout.legs_top, layout.legs_knee_a, layout.iron_top_wb, layout.leak_top_wb,
-        model.sum_kind(kinds.STOP, stops.size) if stops.size else np.zeros(0), stops,
+        model.sum_kind(kinds.STOP, stops.shape[0]), stops,
         model.sum_kind(kinds.BRANCH, branches.size) if branches.size else np.zeros(0), branches,
     )
 

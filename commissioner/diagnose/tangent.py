@@ -40,7 +40,7 @@ from commissioner.diagnose.kinds import (
     STOP,
     VOLTAGE_MOD,
 )
-from commissioner.diagnose.memory import susceptibility
+from commissioner.diagnose.memory import susceptibility, widened
 from commissioner.diagnose.spline import curve, saturating, spline_weights
 from commissioner.diagnose.trajectory import leg_loss
 
@@ -147,7 +147,7 @@ def sensitivities(
         if wants_iron or has_iron:
             jm, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
         for s in range(stops):
-            f = stop_gain[s] / abs(stop_radius[s])
+            f = stop_gain[s] / abs(stop_radius[s, 0]) * widened(pa, pb, stop_radius[s, 1])
             ja += f * stop_states[t, s, 0]
             jb += f * stop_states[t, s, 1]
         # (3)
@@ -236,7 +236,7 @@ def sensitivities(
                 qa, qb = -over * fia - leak_ratio * ea, -over * fib - leak_ratio * eb
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
             elif kind == STOP:
-                f = 1.0 / abs(stop_radius[n])
+                f = widened(pa, pb, stop_radius[n, 1]) / abs(stop_radius[n, 0])
                 fja, fjb = f * stop_states[t, n, 0], f * stop_states[t, n, 1]
             elif kind == BRANCH:
                 qa, qb = states[t, 4 + 2 * n], states[t, 5 + 2 * n]
@@ -286,20 +286,28 @@ def sensitivities(
             for s in range(stops):
                 if stop_gain[s] == 0.0:
                     continue
-                f = stop_gain[s] / abs(stop_radius[s])
+                f = stop_gain[s] / abs(stop_radius[s, 0])
+                # a loop that widens with flux: its factor grows along the flux (symmetric part)
+                rate = f * stop_radius[s, 1]
+                gaa = 2.0 * rate * stop_states[t, s, 0] * pa
+                gab = rate * (stop_states[t, s, 0] * pb + stop_states[t, s, 1] * pa)
+                gbb = 2.0 * rate * stop_states[t, s, 1] * pb
+                f *= widened(pa, pb, stop_radius[s, 1])
                 naa, nab, nbb, haa, hab, hbb = susceptibility(
-                    stop_states[last, s, 0], stop_states[last, s, 1], pa - ra, pb - rb, 0.0, 0.0, stop_radius[s]
+                    stop_states[last, s, 0], stop_states[last, s, 1], pa - ra, pb - rb, 0.0, 0.0, stop_radius[s, 0]
                 )
                 still[s, 0], still[s, 1], still[s, 2] = naa, nab, nbb
-                jaa += f * naa
-                jab += f * nab
-                jbb += f * nbb
+                jaa += f * naa + gaa
+                jab += f * nab + gab
+                jbb += f * nbb + gbb
                 for p in range(count):
                     ya, yb = dz[s, 0, p], dz[s, 1, p]
                     qa, qb = -dflux[0, p], -dflux[1, p]
                     if kinds[p] == NU:
                         qa += sa
                         qb += sb
+                        fj[0, p] += gaa * sa + gab * sb
+                        fj[1, p] += gab * sa + gbb * sb
                     dz[s, 0, p] = haa * ya + hab * yb + naa * qa + nab * qb
                     dz[s, 1, p] = hab * ya + hbb * yb + nab * qa + nbb * qb
                     fj[0, p] += f * dz[s, 0, p]

@@ -4,7 +4,8 @@ States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged ro
 all as (alpha, beta) pairs. With fluxes as states every nonlinearity is explicit:
 
     psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
-    j      = G(|psi_0|) psi_0 + sum h_k z_k / r_k   extra magnetizing current, z_k memory operator of scale r_k (2)
+    j      = G(|psi_0|) psi_0 + sum h_k w_k z_k / r_k   extra magnetizing current, z_k memory operator of scale r_k,
+                                                    w_k = 1 or, where loops widen with flux, |psi_0|^2 / top^2 (2)
     i_s    = (1/L_sigma + A_sigma) psi_sigma + e + nu j,                  psi_sigma = psi_s - psi_R          (3)
     e      = S(|phi|) phi,   phi = psi_s - kappa psi_R          extra current of the saturating leakage path (3a)
     i      = (i_s + g v) / (1 + g R_s)              iron-loss conductance g across d psi_s/dt                (4)
@@ -27,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from commissioner.diagnose.memory import remembered, susceptibility
+from commissioner.diagnose.memory import remembered, susceptibility, widened
 from commissioner.diagnose.spline import curve, saturating, spline_weights
 
 SQRT3 = np.sqrt(3.0)
@@ -61,8 +62,8 @@ def _slope(
     if iron.shape[0] > 0:
         _, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
     for s in range(stops):
-        ya, yb = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s])
-        f = stop_gain[s] / abs(stop_radius[s])
+        ya, yb = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s, 0])
+        f = stop_gain[s] / abs(stop_radius[s, 0]) * widened(pa, pb, stop_radius[s, 1])
         ja += f * ya
         jb += f * yb
     # (3)
@@ -114,11 +115,13 @@ def _slope(
     djb = jab * qa + jbb * qb
     for s in range(stops):
         naa, nab, nbb, _, _, _ = susceptibility(
-            z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], qa, qb, stop_radius[s]
+            z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], qa, qb, stop_radius[s, 0]
         )
-        f = stop_gain[s] / abs(stop_radius[s])
-        dja += f * (naa * qa + nab * qb)
-        djb += f * (nab * qa + nbb * qb)
+        f = stop_gain[s] / abs(stop_radius[s, 0])
+        wide = widened(pa, pb, stop_radius[s, 1])
+        growth = 2.0 * stop_radius[s, 1] * (pa * qa + pb * qb)
+        dja += f * (wide * (naa * qa + nab * qb) + growth * z[s, 0])
+        djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
     ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
     fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
     out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja) * shrink
@@ -215,7 +218,7 @@ def propagate(
             pa = (1.0 - nu) * x[2] + nu * x[0]
             pb = (1.0 - nu) * x[3] + nu * x[1]
             for s in range(stops):
-                z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s])
+                z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s, 0])
             z_ref[0] = pa
             z_ref[1] = pb
         last_a = now_a

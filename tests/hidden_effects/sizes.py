@@ -65,6 +65,13 @@ def _leakage(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     return sizes["inductance_drop"][0], 1.0 - 1.0 / (1.0 + gain)
 
 
+def _hysteresis(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
+    """The simulator's loop that widens has its nominal height at rated flux, and 0.6 + 0.4 (flux / rated)^2 of it elsewhere."""
+    reached = sizes["at_flux_wb"][0] / plant.nameplate.rated_flux_wb
+    wide = 0.6 + 0.4 * reached**2 if effect.shape == "widening" else 1.0
+    return sizes["coercive_current_a"][0], wide * effect.size
+
+
 def _offset(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
     return sizes["offset_u_a"][0], effect.size
 
@@ -128,7 +135,7 @@ def _heating(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
 COMPARED: dict[str, Compare] = {
     "dead_time": _leg, "device_drop": _leg, "dc_link_sag": _scaled(1.0), "dc_link_ripple": _ripple,
     "sampling_delay": _scaled(1e6), "sensor_lag": _scaled(1e6), "magnetizing_saturation": _saturation,
-    "magnetic_hysteresis": _scaled(1.0), "leakage_saturation": _leakage, "iron_loss": _conductance,
+    "magnetic_hysteresis": _hysteresis, "leakage_saturation": _leakage, "iron_loss": _conductance,
     "stator_heating": _heating, "sensor_offset": _offset, "sensor_gain_mismatch": _gain, "sensor_nonlinearity": _sensor,
     "mains_pickup": _mains, "clock_drift": _clock, "shaft_motion": _motion, "inductance_anisotropy": _inductance,
     "resistance_anisotropy": _resistance, "cable_capacitance": _scaled(1e9), "quantization": _scaled(1.0),

@@ -53,7 +53,13 @@ def _split(effect_name: str) -> Term:
 
 
 def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"coercive_current_a": (float(sum(v for k, v in values.items() if k != "split")), "A")}
+    """Largest current of the memory at the largest flux reached."""
+    rates = setting.layout.stop_radius_wb[:, 1]
+    factors = np.where(rates == 0.0, 1.0, rates * setting.iron_flux_wb**2)
+    return {
+        "coercive_current_a": (float(listed(values, "loop", rates.size) @ factors), "A"),
+        "at_flux_wb": (setting.iron_flux_wb, "Wb"),
+    }
 
 
 @effect(
@@ -64,15 +70,15 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="repeat the lowest tone at several amplitudes",
 )
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
-    """Extra current sum h_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
+    """Extra current sum h_k w_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
 
-    ones) with fixed scales r_k.
+    ones) with fixed scales r_k, some of them with a factor w_k that grows with the square of the flux.
 
     `split` as with saturation.
     """
     loops = tuple(
         Term("magnetic_hysteresis", f"loop_{k}", "A", kinds.STOP, k, 0.01, 0.0, np.inf)
-        for k in range(setting.layout.stop_radius_wb.size)
+        for k in range(setting.layout.stop_radius_wb.shape[0])
     )
     return (*loops, _split("magnetic_hysteresis"))
 

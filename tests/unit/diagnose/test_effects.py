@@ -168,3 +168,22 @@ def test_effects_the_data_cannot_show_have_no_numbers(nominal):
     assert CATALOGUE["inductance_anisotropy"].terms(single) == ()
     assert CATALOGUE["resistance_anisotropy"].terms(single) == ()
     assert CATALOGUE["device_drop"].terms(single) == ()
+
+
+@pytest.mark.parametrize("symbol", ["loop_0", "loop_6", "loop_9", "loop_11", "split", "R_s", "L_M"])
+def test_sensitivities_beside_loops_that_widen_with_flux_are_exact(nominal, setting, symbol):
+    """Derivatives pass through the memory of every operator and through the factor that grows with flux."""
+    terms = CATALOGUE["magnetic_hysteresis"].terms(setting)
+    values = tuple(0.1 if t.symbol == "split" else 0.02 for t in terms)
+    model = Model(nominal.nominal, terms, values)
+    row = {"R_s": 0, "L_M": 3}.get(symbol) or (0 if symbol == "R_s" else 4 + [t.symbol for t in terms].index(symbol))
+    jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian[row]
+    h = 1e-4
+
+    def moved(by):
+        theta = model.theta.copy()
+        theta[row] += by
+        return currents(model.moved(theta), setting)
+
+    slope = (moved(h) - moved(-h)) / (2.0 * h)
+    assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.02 * np.sqrt(np.mean(slope**2))
