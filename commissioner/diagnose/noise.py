@@ -7,12 +7,13 @@ and sensitivities alike (P. Whittle, 1953).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
+from scipy.special import erfc
 
 from commissioner.diagnose.record import Record, Segment
 
@@ -27,7 +28,6 @@ SLOW_MARGIN = 1.6
 """Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
 RESOLVED = 1e-6
 """Share of the current's peak below which nothing counts: no sensor is so good, nor is the model stepped more finely."""
-COARSE_ROUNDING = 0.7
 WHITE_WITHIN = 0.12
 """A spectrum flat within this fraction everywhere is taken as white (whitening then costs nothing)."""
 
@@ -57,18 +57,25 @@ class Noise:
         return float(np.sqrt(np.mean(self.sigma_a**2)))
 
     def with_converter_step(self, step_a: Array) -> Noise:
-        """Repeats of one test hit the same coarse steps and hide them: then step / sqrt(12) is added to what they show.
+        """What coarse steps hide from the noise's measurement is added: the rounding error of a signal that moves is step^2/12
 
-        Where the noise itself moves the signal over the steps, the measured noise has them already (B. Widrow,
-        I. Kollar, Quantization Noise, 2008, ch. 4).
+        in all, of which repeats of one test show only what differs between them, and a current that rests shows less.
         """
-        rounding = step_a / np.sqrt(12.0)
-        is_coarse = rounding > COARSE_ROUNDING * self.sigma_a
-        if not is_coarse.any():
+        if self.source not in ("repeated segments", "repeated periods", "zero voltage"):
             return self
-        total = np.where(is_coarse, np.hypot(self.sigma_a, rounding), self.sigma_a)
-        share = float(np.sum(np.where(is_coarse, rounding, 0.0) ** 2) / np.sum(total**2))
-        return replace(self, sigma_a=total, uncertainty=max(self.uncertainty, 0.1), rounding_share=share)
+        seen = _rounded_at_rest if self.source == "zero voltage" else _rounded_twice
+        variance, repeating = self.sigma_a**2, np.zeros_like(self.sigma_a)
+        for k, step in enumerate(step_a):
+            if 0.0 < self.sigma_a[k] < step:
+                ratio = _solved(seen, float(variance[k]) / step**2)
+                variance[k] = max(variance[k], step**2 * (ratio**2 + 1.0 / 12.0))
+                repeating[k] = step**2 * _repeating(ratio)
+        hidden = float(np.sum(variance) / np.sum(self.sigma_a**2)) - 1.0
+        if hidden < RESOLVED:
+            return self
+        uncertainty = max(self.uncertainty, min(hidden, 0.1))
+        share = float(np.sum(repeating) / np.sum(variance))
+        return replace(self, sigma_a=np.sqrt(variance), uncertainty=uncertainty, rounding_share=share)
 
     def weights(self, samples: int, period_s: float) -> Array:
         """(phases, samples//2 + 1): what a Fourier coefficient is divided by, white level included."""
@@ -77,6 +84,32 @@ class Noise:
         shape = np.stack([np.exp(np.interp(log_f, np.log(self.frequency_hz), np.log(row))) for row in self.density])
         weights: Array = self.sigma_a[:, None] * np.sqrt(shape)
         return weights
+
+
+def _repeating(ratio: float) -> float:
+    """Mean square, in steps, of the rounding error that repeats with the signal; `ratio`: noise rms over the step (B. Widrow,
+
+    I. Kollar, Quantization Noise, 2008, ch. 4: a sawtooth of the signal, smoothed by the noise).
+    """
+    k = np.arange(1.0, 40.0)
+    return float(np.sum(np.exp(-((2.0 * np.pi * k * ratio) ** 2)) / (2.0 * np.pi**2 * k**2)))
+
+
+def _solved(seen: Callable[[float], float], variance: float) -> float:
+    """The ratio of noise to step at which so much variance, in steps and below 1, is `seen`."""
+    least, most = 1e-3, 1.5
+    return float(brentq(lambda x: seen(x) - variance, least, most)) if seen(least) < variance else least
+
+
+def _rounded_twice(ratio: float) -> float:
+    """Variance, in steps, that differs between two roundings of one moving signal with fresh noise."""
+    return ratio**2 + 1.0 / 12.0 - _repeating(ratio)
+
+
+def _rounded_at_rest(ratio: float) -> float:
+    """Variance, in steps, of rounded noise about the middle of a step."""
+    k = np.arange(1.0, 12.0)
+    return float(np.sum((2.0 * k - 1.0) * erfc((k - 0.5) / (np.sqrt(2.0) * ratio))))
 
 
 def repeats(record: Record) -> list[tuple[int, int]]:

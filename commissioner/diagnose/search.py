@@ -30,7 +30,7 @@ from commissioner.diagnose.nominal import (
     with_flux_before,
     with_ranges,
 )
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import STATISTICAL_FLOOR, Screening, joint_net, price, required_chi2, screen
 
 MOST_CAUSES = 6
@@ -62,7 +62,7 @@ TONE_TO_TONE = 0.05
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
 RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
-STEPS_GUARD = 5e-3
+STEPS_GUARD = 2e-2
 """As GUARD, of the power of coarse converter steps, which repeat with the signal and look a little like anything."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
@@ -118,6 +118,7 @@ def search(
     part, bare = explored(record), bare_layout(record)
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     losses: tuple[Loss, ...] = ()
+    raw = record.segments
     if "lost_samples" not in excluded:
         record, nominal, losses = _mended(record, nominal, bare, noise, report)
     if check is not None:
@@ -145,8 +146,15 @@ def search(
     start = whole.with_new_flux_before(whole.relayout(completed))
     fitted, accepted, last = whole.run(start, accepted)
     first = first or whole.first or last
+    if accepted and losses:
+        unmended = _with_the_losses(whole.record, raw, fitted, whole.layout, noise)
+        if unmended is not None:
+            report("what looked like lost samples were the causes named since")
+            losses, (record, start) = (), unmended
+            whole = _Search(record, whole.layout, replace(whole.setting, record=record), noise, names, report, record, go_on)
+            fitted, accepted, last = whole.run(start, accepted)
     if accepted and "lost_samples" not in excluded:
-        least = max(LEAST_BESIDE, CLASS_GUARD * max(whole.gains(fitted, accepted).values()))
+        least = max(LEAST_BESIDE, CLASS_GUARD * loss_of_strongest(fitted))
         mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report, least)
         if more:
             losses += more
@@ -187,6 +195,25 @@ def _mended(
         return record, current, ()
     report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
     return mended, better, losses
+
+
+def _with_the_losses(
+    mended: Record, raw: Sequence[Segment], fitted: Fit, layout: Layout, noise: Noise
+) -> tuple[Record, Fit] | None:
+    """The data as they came and the fit of all accepted causes to them, where that is hardly worse: then nothing was lost."""
+    segments = tuple(
+        replace(r, flux_before_wb=m.flux_before_wb) for r, m in zip(raw, mended.segments, strict=True)
+    )
+    record = replace(mended, segments=segments)
+    trial = fit(fitted.model, record, layout, noise)
+    masked = float(trial.normal.count.sum() - fitted.normal.count.sum())
+    gain = trial.chi2 - fitted.chi2 - 3.0 * max(masked, 0.0)
+    return (record, trial) if gain < max(LEAST_BESIDE, CLASS_GUARD * loss_of_strongest(fitted)) else None
+
+
+def loss_of_strongest(fitted: Fit) -> float:
+    """Delta chi2 of the strongest accepted effect."""
+    return max((loss_without(fitted, n) for n in {t.effect for t in fitted.model.terms if t.effect}), default=0.0)
 
 
 def _without_curves(model: Model) -> Model:

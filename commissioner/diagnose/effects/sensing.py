@@ -149,7 +149,7 @@ def quantization(setting: Setting) -> tuple[Term, ...]:
 
 
 def _end_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    """Of the channel that bends most, just below the largest current it reports: slope lost, current not reported."""
+    """Of the channel that bends most, where it comes to the largest current it reports: slope lost, current not reported."""
     ends_a = setting.layout.channel_ends_a
     shares = np.stack([listed(values, f"end_{p}", COUNT) for p in PHASES[: ends_a.size]])
     true_a = np.linspace(0.0, 3.0, 601) * ends_a[:, None]
@@ -157,12 +157,15 @@ def _end_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     found = []
     for true, seen, end_a in zip(true_a, seen_a, ends_a, strict=True):
         top = int(np.argmax(seen >= min(NEAR_THE_END * end_a, float(seen.max()))))
-        found.append((1.0 - float(np.gradient(seen, true)[top]), float(end_a), float(true[top] - seen[top])))
+        beyond = min(top + round(AT_THE_END * end_a / float(true[1])), true.size - 1)
+        slope = float((seen[beyond] - seen[top]) / max(float(true[beyond] - true[top]), 1e-12))
+        found.append((1.0 - slope, float(end_a), float(true[beyond] - seen[beyond])))
     slope, limit_a, missing_a = max(found)
     return {"limit_a": (limit_a, "A"), "slope_lost": (slope, "1"), "missing_at_limit_a": (missing_a, "A")}
 
 
-NEAR_THE_END = 0.985
+NEAR_THE_END, AT_THE_END = 0.985, 0.04
+"""Of the largest current reported: from where, and over how much current more, a slope counts as the channel's last."""
 
 
 @effect(
