@@ -108,11 +108,16 @@ def _at_the_end(model: Model, sensed: Array, ends_a: Array, jacobian: Array, lis
 
 
 def _ages(record: Record, segment: Segment) -> list[Array]:
-    """Minutes since the first sample, and the same settling within a quarter and a sixteenth of the recording."""
+    """Minutes since the first sample, the same settling within a quarter and a sixteenth of the recording, and swinging once to
+
+    and fro within it (cosine and sine, zero and of slope one or zero at the start).
+    """
     first, last = record.segments[0].time_s[0], record.segments[-1].time_s[-1]
     age = (segment.time_s - first) / 60.0
-    settling = [max(float(last - first), 1e-3) / 60.0 / share for share in (4.0, 16.0)]
-    return [age, *(tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in settling)]
+    whole = max(float(last - first), 1e-3) / 60.0
+    settling = [tau * (1.0 - np.exp(-np.maximum(age, 0.0) / tau)) for tau in (whole / 4.0, whole / 16.0)]
+    turn = 2.0 * np.pi / whole
+    return [age, *settling, np.sin(turn * age) / turn, (1.0 - np.cos(turn * age)) / turn]
 
 
 def _delays(segment: Segment) -> Array:

@@ -64,13 +64,15 @@ def sensor_offset(setting: Setting) -> tuple[Term, ...]:
     return tuple(Term("sensor_offset", PHASES[k], "A", OFFSET, k, 1e-3) for k in range(setting.facts.phases))
 
 
-SETTLING = {"": 1.0, "_quarter": (1.0 - np.exp(-4.0)) / 4.0, "_sixteenth": (1.0 - np.exp(-16.0)) / 16.0}
-"""Part of a settling drift's first slope that is left as its mean slope over the whole recording."""
+DRIFTS = {
+    "": 1.0, "_quarter": (1.0 - np.exp(-4.0)) / 4.0, "_sixteenth": (1.0 - np.exp(-16.0)) / 16.0, "_swing": 0.0, "_turn": 0.0,
+}
+"""Part of a drift's first slope that is left as its mean slope over the whole recording: evenly, settling, swinging."""
 
 
 def _drift_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {
-        f"drift_{p}_a_per_min": (float(sum(share * values.get(p + k, 0.0) for k, share in SETTLING.items())), "A/min")
+        f"drift_{p}_a_per_min": (float(sum(share * values.get(p + k, 0.0) for k, share in DRIFTS.items())), "A/min")
         for p in PHASES if p in values
     }
 
@@ -83,10 +85,13 @@ def _drift_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="record one second before and after the test with the inverter off",
 )
 def sensor_drift(setting: Setting) -> tuple[Term, ...]:
-    """Ramp [A/min] per phase, zero at the first sample, and two more that settle within the recording (a warming sensor)."""
+    """Ramp [A/min] per phase, zero at the first sample, two more that settle within the recording (a warming sensor), and a
+
+    swing once to and fro (a door that opens).
+    """
     return tuple(
         Term("sensor_drift", PHASES[k] + shape, "A/min", DRIFT, k + 3 * m, 1e-3)
-        for m, shape in enumerate(SETTLING) for k in range(setting.facts.phases)
+        for m, shape in enumerate(DRIFTS) for k in range(setting.facts.phases)
     )
 
 
