@@ -38,6 +38,11 @@ def current_lost(current_a: Array, end_a: Array) -> Array:
     return np.asarray(end_a[:, None] * np.sign(current_a) * np.stack(rows))
 
 
+def in_all(shares: Array, of_each: Array) -> Array:
+    """(phases, n): what the `shares` (phases, COUNT) make together of rows per unit of each (COUNT, phases, n)."""
+    return np.asarray(np.einsum("pk,kpn->pn", shares, of_each))
+
+
 def reported(current_a: Array, shares: Array, end_a: Array) -> Array:
     """Currents (phases, n) behind channel ends of the given `shares` (phases, COUNT)."""
-    return np.asarray(current_a - np.einsum("pk,kpn->pn", shares, current_lost(current_a, end_a)))
+    return current_a - in_all(shares, current_lost(current_a, end_a))

@@ -79,9 +79,11 @@ def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
         steps = [{**none, t.symbol: t.step} for t in score.terms]
         alone = [_comparable(sizes(found.setting, step)) for step in steps]
         counts = [k for k, items in enumerate(alone) if any(value for _, (value, _) in items)]
+        if not counts:
+            continue
         columns = np.array(screening.columns[name])[counts]
         powers, shapes = np.linalg.eigh(screening.projected[np.ix_(columns, columns)])
-        if not counts or powers[-1] <= 0.0:
+        if powers[-1] <= 0.0:
             continue
         theta = shapes[:, -1] * np.sqrt(score.threshold / (scale * powers[-1]))
         theta = theta if theta.sum() >= 0.0 else -theta

@@ -202,8 +202,6 @@ def _suspects(residual: Array, slope: Array, segment: Segment, model: Model, noi
     step = _delay_step(residual / noise.sigma_a[:, None], slope / noise.sigma_a[:, None])
     if step is not None:
         yield step
-
-
     pulse = _pulse(residual, segment, model, noise)
     if pulse is not None:
         yield pulse

@@ -49,7 +49,6 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
 def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float, float]:
     """Of the iron and of the leakage path (Wb)."""
 
-
     def of_segment(k: int) -> tuple[float, float]:
         seen = predict(model, record, k, layout)
         return float(np.hypot(*seen.iron_flux_wb).max()), float(np.hypot(*seen.leakage_flux_wb).max())

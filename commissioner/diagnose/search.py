@@ -151,16 +151,14 @@ def search(
         if unmended is not None:
             report("what looked like lost samples were the causes named since")
             losses, (record, start) = (), unmended
-            whole = _Search(record, whole.layout, replace(whole.setting, record=record), noise, names, report, record, go_on)
+            whole = whole.on(record)
             fitted, accepted, last = whole.run(start, accepted)
     if accepted and "lost_samples" not in excluded:
         least = max(LEAST_BESIDE, CLASS_GUARD * loss_of_strongest(fitted))
         mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report, least)
         if more:
             losses += more
-            whole = _Search(
-                mended, whole.layout, replace(whole.setting, record=mended), noise, names, report, mended, go_on
-            )
+            whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, whole.layout)
     reached = replace(
@@ -168,7 +166,7 @@ def search(
     )
     return Found(
         nominal, fitted, accepted, whole.record, whole.layout, reached, last, first,
-        tuple(whole.below), whole.gains(fitted, accepted), losses, go_on(),
+        tuple(whole.below), losses_of(fitted, accepted), losses, go_on(),
     )
 
 
@@ -213,7 +211,12 @@ def _with_the_losses(
 
 def loss_of_strongest(fitted: Fit) -> float:
     """Delta chi2 of the strongest accepted effect."""
-    return max((loss_without(fitted, n) for n in {t.effect for t in fitted.model.terms if t.effect}), default=0.0)
+    return max(losses_of(fitted, _effects(fitted.model)).values(), default=0.0)
+
+
+def _effects(model: Model) -> tuple[str, ...]:
+    """The effects that the model has numbers of."""
+    return tuple(dict.fromkeys(t.effect for t in model.terms if t.effect))
 
 
 def _without_curves(model: Model) -> Model:
@@ -245,6 +248,11 @@ class _Search:
         self.ripple_meets_tones = _meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in record.segments]) ** 2)))
+
+    def on(self, record: Record) -> _Search:
+        """A new search of the whole of another record, with what is known of the machine so far."""
+        setting = replace(self.setting, record=record)
+        return _Search(record, self.layout, setting, self.noise, self.names, self.report, record, self.go_on)
 
     @property
     def material_chi2(self) -> float:
@@ -282,7 +290,7 @@ class _Search:
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
         ranked = [s for s in screening.ranked() if s.name not in refused]
-        losses = {n: loss_without(current, n) for n in {t.effect for t in current.model.terms if t.effect}}
+        losses = losses_of(current, _effects(current.model))
         promising = [
             s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name))
         ]
@@ -382,9 +390,9 @@ class _Search:
     ) -> tuple[Fit, tuple[str, ...], list[str]]:
         """Drops accepted effects that the later ones have made idle, or a trifle beside them (or turned to the wrong sign)."""
         dropped: list[str] = []
+        every = losses_of(current, accepted)
         for name in doubted:
-            losses = self.gains(current, accepted)
-            loss = losses.pop(name)
+            loss, losses = every[name], {n: x for n, x in every.items() if n != name}
             numbers = sum(1 for t in current.model.terms if t.effect == name)
             wanted = max(self._guard(losses, name), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
@@ -394,6 +402,7 @@ class _Search:
                 if trial.chi2 - current.chi2 < wanted or not self._is_plausible(current.model, name):
                     self.report(f"  dropped {name}")
                     current, accepted = trial, tuple(n for n in accepted if n != name)
+                    every = losses_of(current, accepted)
                     dropped.append(name)
         return current, accepted, dropped
 
@@ -422,10 +431,6 @@ class _Search:
             return current
         self.layout, self.setting = fresh, replace(self.setting, layout=fresh, iron_flux_wb=flux)
         return again
-
-    def gains(self, fitted: Fit, accepted: Sequence[str]) -> dict[str, float]:
-        """Delta chi2 of each accepted effect, the others free (linear, at the fit)."""
-        return {name: loss_without(fitted, name) for name in accepted}
 
 
 def _meets_tones(record: Record, setting: Setting) -> bool:
@@ -459,6 +464,11 @@ def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
+
+
+def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:
+    """Delta chi2 of each effect, the others free (linear, at the fit)."""
+    return {name: loss_without(fitted, name) for name in names}
 
 
 def loss_without(current: Fit, name: str) -> float:

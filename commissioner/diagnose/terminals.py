@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channel_end import COUNT, current_lost, reported, slope_lost
+from commissioner.diagnose.channel_end import COUNT, current_lost, in_all, slope_lost
 from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
@@ -31,10 +31,10 @@ def sense(
     if capacitance.any() or any(t.kind == CABLE for t in listed):
         edges = _edges(to_phases @ segment.voltage_ab_v / period)
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
-    clocks = CLOCK in {t.kind for t in (*model.terms, *listed)}
-    clock = 1e-6 * _clock(segment) if clocks else np.zeros((0, segment.count))
-    turns = _delays(segment)
-    late = model.sum_kind(DELAY, 2) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
+    at_work = {t.kind for t in (*model.terms, *listed)}
+    clock = 1e-6 * _clock(segment) if CLOCK in at_work else np.zeros((0, segment.count))
+    turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
+    late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
     is_late = bool(np.any(late))
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
@@ -48,8 +48,9 @@ def sense(
     lag_slopes = [-slope, -slope]
     if lags.any():
         current, slope, lag_slopes = _behind(current, slope, lags, period)
+        held = _filter(lags, period)
         for row in rows:
-            jacobian[row] = _low_pass(jacobian[row], lags, period)
+            jacobian[row] = _low_pass(jacobian[row], held)
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
@@ -97,10 +98,13 @@ def _at_the_end(model: Model, sensed: Array, ends_a: Array, jacobian: Array, lis
     """The last thing a channel does: it bends before it stops. Term index: share, counted through the phases."""
     shares = model.sum_kind(END, 3 * COUNT).reshape(3, COUNT)[: sensed.shape[0]]
     asked = [(k, t) for k, t in enumerate(listed) if t.kind == END]
-    lost = current_lost(sensed, ends_a) if asked else np.zeros(0)
+    if not asked and not shares.any():
+        return sensed
+    lost = current_lost(sensed, ends_a)
     if shares.any():
-        jacobian *= 1.0 - np.einsum("pk,kpn->pn", shares, slope_lost(sensed, ends_a))
-        sensed = reported(sensed, shares, ends_a)
+        if jacobian.shape[0]:
+            jacobian *= 1.0 - in_all(shares, slope_lost(sensed, ends_a))
+        sensed = sensed - in_all(shares, lost)
     for k, term in asked:
         phase, share = divmod(term.index, COUNT)
         jacobian[4 + k, phase] = -term.step * lost[share, phase]
@@ -151,24 +155,29 @@ def _behind(current: Array, slope: Array, lags_s: Array, period_s: float) -> tup
     is_short = lags_s < SHORT_LAG * period_s
     bent = current - lags_s[is_short].sum() * slope
     long = np.where(is_short, 0.0, lags_s)
+    held = _filter(long, period_s)
     derivatives = []
     for k, lag in enumerate(lags_s):
         if is_short[k]:
-            derivatives.append(-_low_pass(slope, long, period_s))
+            derivatives.append(-_low_pass(slope, held))
             continue
         h = 1e-3 * lag * (np.arange(lags_s.size) == k)
-        derivatives.append((_low_pass(bent, long + h, period_s) - _low_pass(bent, long - h, period_s)) / (2e-3 * lag))
-    return _low_pass(bent, long, period_s), _low_pass(slope, lags_s, period_s), derivatives
+        more, less = (_low_pass(bent, _filter(lags, period_s)) for lags in (long + h, long - h))
+        derivatives.append((more - less) / (2e-3 * lag))
+    return _low_pass(bent, held), _low_pass(slope, _filter(lags_s, period_s)), derivatives
 
 
-def _low_pass(signal: Array, lags_s: Array, period_s: float) -> Array:
-    """First-order lags in a row of a signal linear between samples (first-order hold, exact for it)."""
+def _filter(lags_s: Array, period_s: float) -> tuple[Array, Array] | None:
+    """First-order lags in a row as one filter of a signal linear between samples (first-order hold, exact for it); None: none."""
     at_work = lags_s[lags_s > 1e-6 * period_s]
     if not at_work.size:
-        return signal
+        return None
     denominator = np.ones(1)
     for lag in at_work:
         denominator = np.convolve(denominator, [lag / period_s, 1.0])
     forward, back, _ = cont2discrete((np.ones(1), denominator), 1.0, method="foh")
-    filtered: Array = lfilter(forward.ravel(), back, signal, axis=-1)
-    return filtered
+    return forward.ravel(), back
+
+
+def _low_pass(signal: Array, held: tuple[Array, Array] | None) -> Array:
+    return signal if held is None else np.asarray(lfilter(*held, signal, axis=-1))

@@ -48,6 +48,7 @@ def sensor_lag(setting: Setting) -> tuple[Term, ...]:
     """Time constants >= 0 [s] of two lags in a row; the size is their sum."""
     return tuple(Term("sensor_lag", symbol, "s", LAG, k, 1e-6, 0.0, 0.02) for k, symbol in enumerate(("lag", "second_lag")))
 
+
 def _offset_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {f"offset_{p}_a": (values[p], "A") for p in PHASES if p in values}
 
