@@ -24,7 +24,7 @@ from commissioner.diagnose.evidence import (
 )
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
-from commissioner.diagnose.fit import Fit, whiten
+from commissioner.diagnose.fit import Fit, inverse, whiten
 from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
@@ -307,7 +307,7 @@ def _verdict(
 
 
 def _parameters(one: Fit) -> dict[str, Quantity]:
-    covariance = np.linalg.pinv(one.normal.total_gram, rcond=1e-12, hermitian=True)
+    covariance = inverse(one.normal.total_gram)
     out = {
         n: Quantity(float(v), float(v * np.sqrt(max(covariance[k, k], 0.0))))
         for k, (n, v) in enumerate(zip(PARAMETERS, one.model.nominal, strict=True))

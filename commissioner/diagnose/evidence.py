@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Fit, bounded_step, fit, limits
+from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
 from commissioner.diagnose.leftover import Leftover
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
@@ -105,7 +105,7 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
     """Engineering sizes with standard deviation (linear propagation of the fit's covariance) and unit."""
     terms = found.model.terms
     mine = [k for k, t in enumerate(terms) if t.effect == name]
-    covariance = np.linalg.pinv(found.normal.total_gram, rcond=1e-12, hermitian=True)
+    covariance = inverse(found.normal.total_gram)
     sizes = CATALOGUE[name].sizes(setting, found.model.of(name))
     out = {}
     slopes: dict[str, list[float]] = {key: [] for key in sizes}
@@ -122,7 +122,26 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
         slope = np.array(slopes[key])
         variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope) if rows.size else 0.0
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
+    if CATALOGUE[name].course:
+        first = next(iter(sizes))
+        out[first] = (*_steady(found, name), sizes[first][1])
     return out
+
+
+def _steady(found: Fit, name: str) -> tuple[float, float]:
+    """The steady value that would change the current as much as the effect's course over time does, and its standard deviation.
+
+    What the noise alone adds to a sum of squares, one for every number, is taken off.
+    """
+    terms, gram = found.model.terms, found.normal.total_gram
+    is_mine = np.array([False] * 4 + [t.effect == name and t.symbol.startswith(CATALOGUE[name].course) for t in terms])
+    mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine & found.model.is_free)
+    cross = gram[np.ix_(others, mine)]
+    power = gram[np.ix_(mine, mine)] - cross.T @ inverse(gram[np.ix_(others, others)]) @ cross
+    values, steady = found.model.theta[mine], np.array([1.0 / terms[k - 4].step for k in mine])
+    shown = max(float(values @ power @ values) - mine.size, 0.0)
+    weight = float(steady @ power @ steady)
+    return float(np.sqrt(shown / weight)), float(np.sqrt((shown + 0.5 * mine.size) / max(shown, 1.0) / weight))
 
 
 def confidence(features: Sequence[float], weights: Sequence[float]) -> float:

@@ -68,8 +68,15 @@ class Fit:
         is_mine = np.array([False] * 4 + [t.effect == effect for t in self.model.terms])
         mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine & self.model.is_free)
         gram = self.normal.total_gram
-        inner = np.linalg.pinv(gram[np.ix_(others, others)], rcond=1e-12, hermitian=True)
-        return gram, mine, others, np.asarray(inner, dtype=np.float64)
+        return gram, mine, others, inverse(gram[np.ix_(others, others)])
+
+
+def inverse(information: Array) -> Array:
+    """Covariance of numbers in units of their own: each scaled to unit information first, what nothing tells left out."""
+    scale = np.sqrt(np.diag(information))
+    scale = np.maximum(scale, 1e-9 * max(float(scale.max(initial=0.0)), 1e-150))
+    unit = np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(information / unit, rcond=1e-12, hermitian=True) / unit, dtype=np.float64)
 
 
 def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.fit import Fit, inverse
 
 PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 LEAST_SHARE, LEAST_SIGMAS = 0.01, 3.0
@@ -32,7 +32,7 @@ class Moved:
 def moved_parameters(nominal: Fit, extended: Fit) -> tuple[Moved, ...]:
     """Parameters that the accepted causes moved, largest first."""
     before, after = np.array(nominal.model.nominal), np.array(extended.model.nominal)
-    covariance = np.linalg.pinv(extended.normal.total_gram, rcond=1e-12, hermitian=True)
+    covariance = inverse(extended.normal.total_gram)
     error = np.sqrt(np.maximum(np.diag(covariance)[:4], 0.0))
     apart = np.abs(np.log(before / after))
     causes = list(dict.fromkeys(t.effect for t in extended.model.terms if t.effect))

@@ -32,11 +32,14 @@ from commissioner.diagnose.nominal import (
 )
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import STATISTICAL_FLOOR, Screening, joint_net, price, required_chi2, screen
+from commissioner.diagnose.settle import placed, without_idle_loops
 
 MOST_CAUSES = 6
 MATERIAL_SHARE = 1e-4
 """A cause must move the current by this share of its rms (-80 dB), else it is listed as below materiality."""
 REFITTED = 4
+IMPLAUSIBLE = 2
+"""A candidate whose refit came out implausible so often is not refitted again."""
 RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
 GUARD = 2e-5
@@ -68,6 +71,8 @@ EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
 """Causes whose form is not a matter of opinion: they leave nothing behind."""
+LARGE_REST, CRUMB = 0.3, 0.08
+"""A rest above this multiple of the noise of which the best candidate takes less than this share is left as it is."""
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leakage_saturation"})
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
 LEAST_SLOPE_LOST = 0.25
@@ -160,6 +165,8 @@ def search(
             losses += more
             whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
+    if fitted.model.has_kind(kinds.STOP):
+        fitted = without_idle_loops(fitted, whole.record, whole.layout, noise)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, whole.layout)
     reached = replace(
         whole.setting, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
@@ -244,6 +251,7 @@ class _Search:
         self.record, self.layout, self.setting, self.noise = record, layout, setting, noise
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
         self.below: list[str] = []
+        self.implausible: list[str] = []
         self.regrouped: set[frozenset[str]] = set()
         self.ripple_meets_tones = _meets_tones(full, setting)
         self.first: Screening | None = None
@@ -283,13 +291,17 @@ class _Search:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
+            if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
+                current = placed(current, self.record, self.layout, self.noise)
             current = self.relayout(self.with_new_flux_before(current))
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = set(dropped)
 
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
-        ranked = [s for s in screening.ranked() if s.name not in refused]
+        ranked = [
+            s for s in screening.ranked() if s.name not in refused and self.implausible.count(s.name) < IMPLAUSIBLE
+        ]
         losses = losses_of(current, _effects(current.model))
         promising = [
             s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name))
@@ -307,14 +319,23 @@ class _Search:
             )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            if gain < wanted or not self._is_plausible(trial.model, score.name):
+            is_plausible = self._is_plausible(trial.model, score.name)
+            if not is_plausible:
+                self.implausible.append(score.name)
+            if gain < wanted or not is_plausible:
                 if required_chi2(score.numbers) < gain:
                     self.below.append(score.name)
                 continue
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
-        return None if best is None else (best[1], best[2])
+        return None if best is None or self._is_crumb(current, best[2]) else (best[1], best[2])
+
+    def _is_crumb(self, current: Fit, trial: Fit) -> bool:
+        """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
+        rest = current.chi2 - float(current.normal.count.sum())
+        is_large = rest > LARGE_REST**2 * float(current.normal.count.sum())
+        return is_large and current.chi2 - trial.chi2 < CRUMB * rest
 
     def _regrouped(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...]] | None:
         """The accepted linear causes exchanged for another one or two of them, where that fits clearly better: one by one

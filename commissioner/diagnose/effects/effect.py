@@ -59,16 +59,18 @@ class Effect:
     source: str
     family: str
     split_by: str
+    course: str = ""
+    """What the names of numbers begin with that together are one free function of time: all one, it is one."""
 
 
 def effect(
     name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
-    split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes],
+    split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes], course: str = "",
 ) -> Callable[[Callable[[Setting], tuple[Term, ...]]], Effect]:
     """Turns the function that lists an effect's terms into its catalogue entry."""
 
     def enter(terms: Callable[[Setting], tuple[Term, ...]]) -> Effect:
-        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by)
+        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course)
         object.__setattr__(entry, "__doc__", terms.__doc__)
         return entry
 

@@ -236,7 +236,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes,
+    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes, course="hat_",
     signature="current in the axis that gets no voltage, proportional to the rotor flux",
     confounders=("sensor_offset", "sensor_drift", "inductance_anisotropy"),
     source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
