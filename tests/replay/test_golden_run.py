@@ -3,11 +3,14 @@
 import dataclasses
 import json
 import math
+import pickle
 
 import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
+from commissioner.identify.analysis import identify
+from commissioner.procedure import excite, steps
 from commissioner.procedure.steps import Findings
 from commissioner.run import replay as replaying
 from commissioner.run.archive import RunFolder, read_blocks, read_journal
@@ -28,6 +31,26 @@ def golden(tmp_path):
 def fresh(tmp_path_factory):
     with SimProcess("--tcp", "0", "--seed", SEED) as sim:
         return short_run(sim.url, tmp_path_factory.mktemp("runs"))
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """What `identify` gave, by all it was given."""
+    return {}
+
+
+@pytest.fixture(autouse=True)
+def each_samples_are_fitted_once(monkeypatch, fits):
+    """`identify` is a pure function that takes five seconds; the run itself, made before, is fitted without this."""
+
+    def fitted(*given, **options):
+        key = pickle.dumps((given, options))
+        if key not in fits:
+            fits[key] = identify(*given, **options)
+        return fits[key]
+
+    for caller in (excite, steps):
+        monkeypatch.setattr(caller, "identify", fitted)
 
 
 def test_a_run_made_on_this_machine_is_decided_again_bit_for_bit(fresh):
