@@ -25,11 +25,12 @@ from commissioner.diagnose.evidence import (
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
 from commissioner.diagnose.fit import Fit, inverse, whiten
+from commissioner.diagnose.guards import SAME_ORDER, loss_without
 from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.search import EXPLORED_SAMPLES, SAME_ORDER, Found, loss_without, search
+from commissioner.diagnose.search import EXPLORED_SAMPLES, Found, search
 from commissioner.diagnose.split import Split, split_lines
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
+from commissioner.diagnose.guards import is_plausible, loss_without
 from commissioner.diagnose.leftover import Leftover
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
 from commissioner.diagnose.screen import screen
-from commissioner.diagnose.search import is_plausible, loss_without
 
 Array = NDArray[np.float64]
 TIE_CHI2 = 10.0

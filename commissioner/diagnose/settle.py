@@ -14,21 +14,29 @@ from commissioner.diagnose.record import Record
 
 SIDES = (0.0, 0.5, 1.0)
 """Places of the iron between the rotor's (0) and the stator's (1) side of the leakage from which a fit begins."""
-FAR = 0.25
+NEAR = 0.1
 
 
 def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The best fit of those that begin with the iron on the rotor's side of the leakage, between, and on the stator's.
 
-    Small tones ride on the flux of one side and hardly on the other's, so that memory loops lie behind a hill.
+    Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
+    hill between them, or is long on its way. Curves begin from zero there.
     """
-    best = current
+    best = current if current.has_converged else fit(current.model, record, layout, noise)
     for side in SIDES:
-        if abs(_side(best.model) - side) > FAR:
-            trial = fit(_on(best.model, side), record, layout, noise, wanted_chi2=best.chi2)
+        if abs(_side(best.model) - side) > NEAR:
+            trial = fit(_on(without_curves(best.model), side), record, layout, noise, wanted_chi2=best.chi2)
             if trial.chi2 < best.chi2:
                 best = trial
     return best
+
+
+def without_curves(model: Model) -> Model:
+    """Curves and loops set back to zero: spline coefficients beyond the flux reached so far mean nothing on other data."""
+    curves = (kinds.IRON_CURVE, kinds.LEAKAGE_CURVE, kinds.STOP)
+    values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
+    return replace(model, values=values)
 
 
 def _side(model: Model) -> float:
@@ -44,35 +52,46 @@ def _on(model: Model, side: float) -> Model:
     return replace(model, values=tuple(values))
 
 
-def without_idle_loops(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
-    """The fit with those memory operators only that each gain ln(samples) (G. Schwarz, Ann. Statist. 6(2), 1978).
+def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
+    """The fit with those spare numbers only that each gain ln(samples) (G. Schwarz, Ann. Statist. 6(2), 1978).
 
-    They cannot be negative, so that noise in the idle ones would add up to a coercive current that is not there.
+    Memory operators cannot be negative, so that noise in the idle ones would add up to a coercive current that is not
+    there; a wander that is none takes from the drift, an alternation from the delay.
     """
+    spare = _spare(current.model)
+    if not spare:
+        return current
     low, high = limits(current.model, layout)
     gram, slope, theta = current.normal.total_gram, current.normal.total_slope, current.model.theta
-    loops = [4 + k for k, t in enumerate(current.model.terms) if t.kind == kinds.STOP]
     price = float(np.log(current.normal.count.sum()))
 
-    def loss_without(idle: list[int]) -> float:
-        """Chi2 above the present one with the loops `idle` at zero and everything else free, linear about the fit."""
-        kept = np.array([k not in idle for k in range(theta.size)])
+    def loss_without(idle: list[list[int]]) -> float:
+        """Chi2 above the present one with the `idle` numbers at zero and everything else free, linear about the fit."""
+        gone = {k for group in idle for k in group}
+        kept = np.array([k not in gone for k in range(theta.size)])
         step = np.where(kept, 0.0, -theta)
         step[kept] = bounded_step(
             gram[np.ix_(kept, kept)], (slope - gram @ step)[kept], (low - theta)[kept], (high - theta)[kept], 0.0
         )
         return float(step @ gram @ step - 2.0 * step @ slope)
 
-    idle = [k for k in loops if theta[k] <= 0.0]
+    idle = [group for group in spare if not theta[group].any()]
     loss = loss_without(idle)
-    while len(idle) < len(loops) - 1:
-        least, weakest = min((loss_without([*idle, k]), k) for k in loops if k not in idle)
-        if least - loss > price:
+    while len(idle) < len(spare):
+        least, weakest = min((loss_without([*idle, group]), group) for group in spare if group not in idle)
+        if least - loss > price * len(weakest):
             break
         idle, loss = [*idle, weakest], least
     if not idle:
         return current
-    kept = [k for k in range(len(current.model.terms)) if 4 + k not in idle]
-    model = current.model
-    sparse = Model(model.nominal, tuple(model.terms[k] for k in kept), tuple(model.values[k] for k in kept))
-    return fit(sparse, record, layout, noise)
+    gone = {k for group in idle for k in group}
+    pairs = zip(current.model.terms, current.model.values, strict=True)
+    terms, values = zip(*(pair for k, pair in enumerate(pairs, 4) if k not in gone), strict=True)
+    return fit(Model(current.model.nominal, terms, values), record, layout, noise)
+
+
+def _spare(model: Model) -> list[list[int]]:
+    """Rows of theta that may as well be zero: of each memory operator, and of what only refines a clock or a delay."""
+    rows = list(enumerate(model.terms, 4))
+    refining = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY)]
+    return [[k] for k, t in rows if t.kind == kinds.STOP] + [group for group in refining if group]

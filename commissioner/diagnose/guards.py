@@ -1,0 +1,105 @@
+"""What an accepted cause may leave behind, so that a later one must gain more than that to be named beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from commissioner.diagnose.audit import excited_lines
+from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.effect import Sizes
+from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.model import Model
+from commissioner.diagnose.record import Record
+
+GUARD = 2e-5
+"""A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
+CLASS_GUARD = 1e-2
+"""Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
+SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
+PAIR_GUARDS = {
+    SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
+    frozenset({"shaft_motion", "remanence"}): 0.05, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+}
+"""Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
+a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
+segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly.)"""
+LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
+"""Causes that only turn and scale the excited lines: any two of them can look like a third."""
+TONE_TO_TONE = 0.05
+"""As CLASS_GUARD, for a ripple whose side lines fall from one tone to another, beside linear causes."""
+RIGID_GUARD = 1e-3
+"""As GUARD, beside an accepted cause whose form has few numbers."""
+EXACT = frozenset({
+    "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
+})
+"""Causes whose form is not a matter of opinion: they leave nothing behind."""
+SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leakage_saturation"})
+"""Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
+LEAST_BESIDE = 800.0
+"""Lost samples must gain at least so much beside accepted causes."""
+LEAST_SLOPE_LOST = 0.25
+"""A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
+
+
+def guard(losses: Mapping[str, float], name: str, *, ripple_meets_tones: bool = False) -> float:
+    """What the forms of the accepted causes (with what chi2 loses without them) may leave behind for a later one to take.
+
+    A ripple whose side lines fall from tone to tone changes impedances as linear causes do.
+    """
+    share = TONE_TO_TONE if name == "dc_link_ripple" and ripple_meets_tones else 0.0
+    left = [_share_left(accepted, name) * loss for accepted, loss in losses.items()]
+    return max([*left, *(share * losses[n] for n in LINEAR if n in losses)], default=0.0)
+
+
+def guard_of_lost_samples(fitted: Fit) -> float:
+    """What lost samples must gain beside accepted causes, as any cause beside one that it is mistaken for."""
+    return max(LEAST_BESIDE, CLASS_GUARD * max(losses_of(fitted, effects_of(fitted.model)).values(), default=0.0))
+
+
+def _share_left(accepted: str, name: str) -> float:
+    if accepted in SHAPED:
+        return GUARD
+    share = 0.0 if accepted in EXACT else RIGID_GUARD
+    if accepted in CATALOGUE[name].confounders or name in CATALOGUE[accepted].confounders:
+        share = max(share, PAIR_GUARDS.get(frozenset({accepted, name}), CLASS_GUARD))
+    return share
+
+
+def meets_tones(record: Record, setting: Setting) -> bool:
+    """Whether two excited tones lie the ripple's frequency (or twice it) apart, within two lines of the longest segment."""
+    tones = np.array(excited_lines(record))
+    apart = np.abs(np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()]))
+    width = 2.0 / max(s.count * record.facts.sample_period_s for s in record.segments)
+    ripples = [m * f for name, f in setting.lines_hz.items() if name.startswith("ripple") for m in (1.0, 2.0)]
+    return any(bool((np.abs(apart - f) < width).any()) for f in ripples)
+
+
+def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
+    """The sign physics demands; and a leg error that is at half its height before a fifth of the largest current."""
+    sign = CATALOGUE[name].sign
+    if sign and sizes and next(iter(sizes.values()))[0] * sign <= 0:
+        return False
+    if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
+        return False
+    return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
+
+
+def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:
+    """Delta chi2 of each effect, the others free (linear, at the fit)."""
+    return {name: loss_without(fitted, name) for name in names}
+
+
+def loss_without(current: Fit, name: str) -> float:
+    """How much chi2 rises to first order when the effect's numbers go to zero and the others re-adjust."""
+    gram, mine, others, inner = current.set_apart(name)
+    cross = gram[np.ix_(others, mine)]
+    schur = gram[np.ix_(mine, mine)] - cross.T @ inner @ cross
+    value = current.model.theta[mine]
+    return float(value @ schur @ value)
+
+
+def effects_of(model: Model) -> tuple[str, ...]:
+    """The effects that the model has numbers of."""
+    return tuple(dict.fromkeys(t.effect for t in model.terms if t.effect))
