@@ -18,13 +18,12 @@ from commissioner.diagnose.evidence import (
     claim_features,
     confidence,
     hold_out,
-    on_part,
     setting_for,
     sizes_with_spread,
 )
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
-from commissioner.diagnose.fit import Fit, inverse, whiten
+from commissioner.diagnose.fit import Fit, inverse, on_part, whiten
 from commissioner.diagnose.guards import SAME_ORDER, loss_without
 from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS

@@ -102,10 +102,12 @@ def alternatives(
 
 
 def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tuple[float, float, str]]:
-    """Engineering sizes with standard deviation (linear propagation of the fit's covariance) and unit."""
+    """Engineering sizes with standard deviation (linear propagation of the covariance of the numbers that can move) and unit."""
     terms = found.model.terms
-    mine = [k for k, t in enumerate(terms) if t.effect == name]
-    covariance = inverse(found.normal.total_gram)
+    free = np.flatnonzero(found.model.is_free)
+    covariance = np.zeros((4 + len(terms), 4 + len(terms)))
+    covariance[np.ix_(free, free)] = inverse(found.normal.total_gram[np.ix_(free, free)])
+    mine = [k for k, t in enumerate(terms) if t.effect == name and 4 + k in free]
     sizes = CATALOGUE[name].sizes(setting, found.model.of(name))
     out = {}
     slopes: dict[str, list[float]] = {key: [] for key in sizes}
@@ -163,15 +165,6 @@ def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftove
         float(np.log10(min(gain / max(others, 1.0), 1e4)) if others else 4.0),
         float(min(gain / max(total_gain, 1.0), 1.0)),
     ]
-
-
-def on_part(fitted: Fit, record: Record, layout: Layout, noise: Noise, samples: int) -> tuple[Fit, Record]:
-    """The fit repeated on the first samples of every segment."""
-    share = max(samples // max(len(record.segments), 1), 1500)
-    if record.samples <= 1.4 * share * len(record.segments):
-        return fitted, record
-    part = record.subset(tuple(range(len(record.segments))), share)
-    return fit(fitted.model, part, layout, noise, rounds=5), part
 
 
 def setting_for(setting: Setting, record: Record) -> Setting:

@@ -240,3 +240,12 @@ def fit(
         if gained < enough:
             return Fit(model, normal, True, done)
     return Fit(model, normal, False, rounds)
+
+
+def on_part(fitted: Fit, record: Record, layout: Layout, noise: Noise, samples: int) -> tuple[Fit, Record]:
+    """The fit repeated on the first samples of every segment."""
+    share = max(samples // max(len(record.segments), 1), 1500)
+    if record.samples <= 1.4 * share * len(record.segments):
+        return fitted, record
+    part = record.subset(tuple(range(len(record.segments))), share)
+    return fit(fitted.model, part, layout, noise, rounds=5), part

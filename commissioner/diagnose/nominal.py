@@ -23,7 +23,8 @@ SILENT = (1.0, 1.0, 0.01, 0.2)
 CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
-MOST_LEAK_RATIO = 0.15
+MOST_LEAK_RATIO = 0.35
+"""Of L_sigma over L_M: no more is believed where L_M is hardly seen."""
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
 WIDENING = (-0.03, -0.1, -0.3)
 """Radii of stops and, negative, scales of exponential operators, over the largest iron flux; and those whose loops widen."""
@@ -41,9 +42,14 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         iron_vectors=even_vectors(10), leak_vectors=even_vectors(12),
         branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
-        legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO),
+        legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=leak_ratio(model),
     )
     return layout, flux
+
+
+def leak_ratio(model: Model) -> float:
+    """Of the leakage over the magnetizing inductance."""
+    return min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO)
 
 
 def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float, float]:

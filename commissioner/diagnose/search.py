@@ -22,7 +22,7 @@ from commissioner.diagnose.nominal import (
 )
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
-from commissioner.diagnose.settle import without_curves, without_idle_numbers
+from commissioner.diagnose.settle import settled, without_curves
 from commissioner.diagnose.steps import Report, Steps
 
 EXPLORED_SAMPLES = 45_000
@@ -109,13 +109,13 @@ def search(
             losses += more
             whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
-    fitted = without_idle_numbers(fitted, whole.record, whole.layout, noise)
-    iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, whole.layout)
+    fitted, layout = settled(fitted, whole.record, whole.layout, noise)
+    iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
-        whole.setting, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
+        whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
     )
     return Found(
-        nominal, fitted, accepted, whole.record, whole.layout, reached, last, first,
+        nominal, fitted, accepted, whole.record, layout, reached, last, first,
         tuple(whole.below), losses_of(fitted, accepted), losses, go_on(),
     )
 

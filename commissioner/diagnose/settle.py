@@ -5,16 +5,63 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.fit import Fit, bounded_step, fit, limits
+from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, on_part
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
 
+Array = NDArray[np.float64]
 SIDES = (0.0, 0.5, 1.0)
 """Places of the iron between the rotor's (0) and the stator's (1) side of the leakage from which a fit begins."""
 NEAR = 0.1
+
+
+SETTLED_SAMPLES = 160_000
+CLOSER = (1.45, 1.2)
+"""Ratios of neighbouring radii when loops are looked for between those that act."""
+
+
+def settled(current: Fit, record: Record, layout: Layout, noise: Noise) -> tuple[Fit, Layout]:
+    """The last fit and its dictionaries: iron on its side, loops of the radii they have, no idle numbers.
+
+    All that is found on the first part of every segment, and fitted to the whole once.
+    """
+    started, part = on_part(current, record, layout, noise, SETTLED_SAMPLES)
+    if current.model.has_kind(kinds.NU):
+        started = placed(started, part, layout, noise)
+    best, fine = without_idle_numbers(started, part, layout, noise), layout
+    for ratio in CLOSER:
+        if best.model.has_kind(kinds.STOP):
+            model, closer = with_closer_loops(best.model, fine, ratio)
+            trial = without_idle_numbers(fit(model, part, closer, noise), part, closer, noise)
+            if _with_price(trial) < _with_price(best):
+                best, fine = trial, closer
+    if part is not record:
+        best = fit(best.model, record, fine, noise)
+    return (best, fine) if _with_price(best) < _with_price(current) else (current, layout)
+
+
+def _with_price(one: Fit) -> float:
+    """Chi2 and ln(samples) for every number: what Schwarz' criterion compares."""
+    return one.chi2 + float(np.log(one.normal.count.sum())) * len(one.model.terms)
+
+
+def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model, Layout]:
+    """Memory operators of `ratio` times smaller and larger radii beside each that acts; those that do not act are gone."""
+    loops = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if t.kind == kinds.STOP]
+    radii = [layout.stop_radius_wb[t.index] for t, _ in loops]
+    for radius, rate in radii.copy():
+        for wanted in (radius / ratio, radius * ratio):
+            if all(r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii):
+                radii.append(np.array([wanted, rate]))
+    values = [v for _, v in loops] + [0.0] * (len(radii) - len(loops))
+    fresh = [replace(loops[0][0], symbol=f"loop_{k}", index=k) for k in range(len(radii))]
+    others = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if t.kind != kinds.STOP]
+    terms, kept = zip(*others, *zip(fresh, values, strict=True), strict=True)
+    return Model(model.nominal, terms, kept), replace(layout, stop_radius_wb=np.array(radii))
 
 
 def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
@@ -52,10 +99,21 @@ def _on(model: Model, side: float) -> Model:
     return replace(model, values=tuple(values))
 
 
+def closer_branches(model: Model, branch_time_s: Array) -> Array:
+    """The second paths' time constants, (n,), with more of them a third of an octave from those that act."""
+    weights = model.sum_kind(kinds.BRANCH, branch_time_s.size)
+    acting = branch_time_s[weights > 1e-3 * weights.max(initial=0.0)]
+    out = list(branch_time_s)
+    for time in np.outer(acting, 2.0 ** (np.array([-1.0, 1.0]) / 3.0)).ravel():
+        if np.abs(np.log2(np.array(out) / time)).min() > 1.0 / 6.0:
+            out.append(float(time))
+    return np.array(out)
+
+
 def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The fit with those spare numbers only that each gain ln(samples) (G. Schwarz, Ann. Statist. 6(2), 1978).
 
-    Memory operators cannot be negative, so that noise in the idle ones would add up to a coercive current that is not
+    Memory operators and second paths cannot be negative, so that noise in the idle ones would add up to a size that is not
     there; a wander that is none takes from the drift, an alternation from the delay.
     """
     spare = _spare(current.model)
@@ -91,7 +149,7 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 
 def _spare(model: Model) -> list[list[int]]:
-    """Rows of theta that may as well be zero: of each memory operator, and of what only refines a clock or a delay."""
+    """Rows of theta that may as well be zero: of each memory operator and second path, and of what only refines a clock or a delay."""
     rows = list(enumerate(model.terms, 4))
     refining = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY)]
-    return [[k] for k, t in rows if t.kind == kinds.STOP] + [group for group in refining if group]
+    return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in refining if group]

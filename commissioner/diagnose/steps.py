@@ -27,10 +27,17 @@ from commissioner.diagnose.guards import (
 )
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import impedance_starts, largest_fluxes, with_flux_before, with_ranges
+from commissioner.diagnose.nominal import (
+    CORNERS_HZ,
+    impedance_starts,
+    largest_fluxes,
+    leak_ratio,
+    with_flux_before,
+    with_ranges,
+)
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import STATISTICAL_FLOOR, Screening, joint_net, price, required_chi2, screen
-from commissioner.diagnose.settle import placed, without_curves
+from commissioner.diagnose.settle import closer_branches, placed, without_curves
 
 MOST_CAUSES = 6
 MATERIAL_SHARE = 1e-4
@@ -45,6 +52,8 @@ HOPELESS = 0.4
 REGROUPED, HOPEFUL = 4, 1.3
 """Groups refitted at most; and the factor by which a refit may gain more than promised."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
+SAME_RATIO = 0.05
+"""L_sigma over L_M is taken anew where it has moved by more than this part of itself."""
 STEPS_GUARD = 2e-2
 """As GUARD, of the power of coarse converter steps, which repeat with the signal and look a little like anything."""
 LARGE_REST, CRUMB = 0.3, 0.08
@@ -251,14 +260,31 @@ class Steps:
         return fit(current.model, record, self.layout, self.noise)
 
     def relayout(self, current: Fit) -> Fit:
-        """New dictionary ranges where the improved model reaches other fluxes; curves start again from zero."""
+        """New dictionary ranges where the improved model reaches other fluxes (curves start again from zero), closer time
+
+        constants where a second path acts, and the ratio of the inductances as it is now.
+        """
         flux, _ = largest_fluxes(self.record, current.model, self.layout)
         fresh = with_ranges(self.layout, flux, self.record.facts.current_peak_a * current.model.nominal[2])
         iron, leak = fresh.iron_top_wb / self.layout.iron_top_wb, fresh.leak_top_wb / self.layout.leak_top_wb
-        if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
+        fits_range, model = 0.85 < iron < 1.06 and 0.8 < leak < 1.15, current.model
+        if fits_range:
+            fresh, flux = self.layout, self.setting.iron_flux_wb
+        else:
+            model = without_curves(model)
+        ratio = leak_ratio(model)
+        if abs(ratio - self.layout.leak_ratio) > SAME_RATIO * ratio:
+            fresh = replace(fresh, leak_ratio=ratio)
+        if self.layout.branch_time_s.size == len(CORNERS_HZ) and model.has_kind(kinds.BRANCH):
+            fresh = replace(fresh, branch_time_s=closer_branches(model, self.layout.branch_time_s))
+        if fresh is self.layout:
             return current
-        again = fit(without_curves(current.model), self.record, fresh, self.noise)
+        setting = replace(self.setting, layout=fresh, iron_flux_wb=flux)
+        if model.has_kind(kinds.BRANCH):
+            terms = CATALOGUE["rotor_skin_effect"].terms(setting)
+            model = model.with_terms([t for t in terms if t.symbol not in model.of("rotor_skin_effect")])
+        again = fit(model, self.record, fresh, self.noise)
         if not np.isfinite(again.chi2):
             return current
-        self.layout, self.setting = fresh, replace(self.setting, layout=fresh, iron_flux_wb=flux)
+        self.layout, self.setting = fresh, setting
         return again

@@ -223,7 +223,8 @@ def _read_parquet(path: Path) -> Table:
 
 
 def _read_csv(path: Path) -> Table:
-    text = io.BytesIO(bounded_text(path))
+    data = bounded_text(path)
+    text = io.BytesIO(data)
     metadata: dict[str, str] = {}
     start = 0
     for _ in range(MAX_METADATA_LINES):
@@ -238,8 +239,8 @@ def _read_csv(path: Path) -> Table:
     columns = text.readline().count(b",") + 1
     if columns > MAX_COLUMNS:
         raise too_large(path, f"{columns} columns", MAX_COLUMNS)
-    text.seek(start)
-    table = pa_csv.read_csv(text, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
+    rest = pa.BufferReader(memoryview(data)[start:])  # a thread that reads a Python file is cut off at exit, which then hangs or aborts
+    table = pa_csv.read_csv(rest, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
     return _as_table(path, table, _typed(path, metadata))
 
 
