@@ -149,9 +149,22 @@ def _grid(values: Signal, peak: float) -> float:
 
 
 def _clip_limits(recording: StandstillRecording, facts: Facts) -> list[tuple[float, float]]:
-    """Where the command stands still a current may rest at one value by right: such samples do not count as piled up."""
+    """Where the command stands still a current may rest at one value by right: such samples do not count as piled up.
+
+    A channel that seldom comes to its end has it where another's, or its other one, has been seen.
+    """
     moves = np.r_[True, np.diff(recording.voltage_axis_v) != 0.0]
-    return [_limits_of(row[moves], facts.current_peak_a) for row in _currents(recording, facts.phases)]
+    rows = _currents(recording, facts.phases)
+    limits = [_limits_of(row[moves], facts.current_peak_a) for row in rows]
+    seen = np.abs([end for pair in limits for end in pair if np.isfinite(end)])
+
+    def is_there(end: float) -> bool:
+        return bool((np.abs(np.abs(end) - seen) <= PILE * facts.current_peak_a).any())
+
+    return [
+        (float(row.min()) if is_there(row.min()) else low, float(row.max()) if is_there(row.max()) else high)
+        for row, (low, high) in zip(rows, limits, strict=True)
+    ]
 
 
 def _limits_of(values: Signal, peak: float) -> tuple[float, float]:

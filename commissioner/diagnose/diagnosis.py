@@ -35,8 +35,8 @@ from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
 MOSTLY_EXPLAINED_SIGMA, UNEXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.3, 0.95
-COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.5
-"""Named as a cause: steps beyond a share of the rated peak current that make a quarter of the noise power."""
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.1
+"""Named as a cause: steps beyond a share of the rated peak current that make a hundredth of the noise power."""
 TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 MOST_UNANSWERED, FAINT = 0.5, 0.1
