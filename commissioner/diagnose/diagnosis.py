@@ -45,8 +45,7 @@ SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
-IRON_CORNER_HZ = 400.0
-SAME_ORDER_TIE = 0.1
+SAME_ORDER_TIE = 2e-3
 NEARLY_ALL, LEFT_TIE = 0.001, 0.1
 """A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
 the unknown rest may favour either."""
@@ -204,8 +203,6 @@ def _cause(
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
-    if name == "rotor_skin_effect" and _is_iron_like(found):
-        fixed = ("iron_loss",)
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
     close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain, unsettled))
     features = claim_features(found.fit, found.accepted, name, rest, total)
@@ -221,14 +218,6 @@ def _cause(
 def _share_open(name: str, rival: str) -> float:
     """Share of a gain within which two networks of the same order are the same to the terminals, whatever fits better."""
     return SAME_ORDER_TIE if {name, rival} == SAME_ORDER else 0.0
-
-
-def _is_iron_like(found: Found) -> bool:
-    """Second rotor path whose corner lies above those of rotor bars: eddy currents of the iron look the same."""
-    values = found.fit.model.of("rotor_skin_effect")
-    corners = 1.0 / (2.0 * np.pi * found.layout.branch_time_s)
-    weights = np.array([values.get(f"branch_{k}", 0.0) for k in range(corners.size)])
-    return bool(weights[corners >= IRON_CORNER_HZ].sum() > 0.5 * weights.sum())
 
 
 def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:

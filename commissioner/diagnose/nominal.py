@@ -20,7 +20,9 @@ from commissioner.diagnose.record import Record, each_segment
 
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
-CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+CORNERS_HZ, EDDY_CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0), (150.0, 400.0, 1000.0)
+"""Of rotor branches, and of eddy-current paths of the iron."""
+BRANCH_TIME_S = np.r_[1.0, -1.0].repeat((len(CORNERS_HZ), len(EDDY_CORNERS_HZ))) / (2.0 * np.pi * np.r_[CORNERS_HZ, EDDY_CORNERS_HZ])
 SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.35
@@ -40,7 +42,7 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         with_ranges(bare, flux, peak * model.nominal[2]),
         legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
         iron_vectors=even_vectors(10), leak_vectors=even_vectors(12),
-        branch_time_s=1.0 / (2.0 * np.pi * np.array(CORNERS_HZ)),
+        branch_time_s=BRANCH_TIME_S,
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
         legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=leak_ratio(model),
     )

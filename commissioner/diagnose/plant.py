@@ -219,7 +219,7 @@ def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:
     """Rate of the fastest mode, 1/s (an upper bound)."""
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
-    return max(rate, *((1.0 + r_r * branch_gain) / branch_time)) if branch_time.size else rate
+    return max(rate, *((1.0 + max(r_r, r_s) * branch_gain) / np.abs(branch_time))) if branch_time.size else rate
 
 
 def _taylor_order(rate_times_step: float) -> int:
@@ -236,7 +236,7 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
     if model.has_kind(kinds.BRANCH):
-        rate = max(rate, 0.5 / float(layout.branch_time_s.min()))
+        rate = max(rate, 0.5 / float(np.abs(layout.branch_time_s).min()))
     if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
     return int(layout.substeps * np.clip(np.ceil(rate * segment.period_s / 0.25), 1, 40))

@@ -105,7 +105,7 @@ def closer_branches(model: Model, branch_time_s: Array) -> Array:
     acting = branch_time_s[weights > 1e-3 * weights.max(initial=0.0)]
     out = list(branch_time_s)
     for time in np.outer(acting, 2.0 ** (np.array([-1.0, 1.0]) / 3.0)).ravel():
-        if np.abs(np.log2(np.array(out) / time)).min() > 1.0 / 6.0:
+        if all(x / time < 0.0 or abs(np.log2(x / time)) > 1.0 / 6.0 for x in out):
             out.append(float(time))
     return np.array(out)
 

@@ -28,7 +28,7 @@ from commissioner.diagnose.guards import (
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import (
-    CORNERS_HZ,
+    BRANCH_TIME_S,
     impedance_starts,
     largest_fluxes,
     leak_ratio,
@@ -275,14 +275,14 @@ class Steps:
         ratio = leak_ratio(model)
         if abs(ratio - self.layout.leak_ratio) > SAME_RATIO * ratio:
             fresh = replace(fresh, leak_ratio=ratio)
-        if self.layout.branch_time_s.size == len(CORNERS_HZ) and model.has_kind(kinds.BRANCH):
+        if self.layout.branch_time_s is BRANCH_TIME_S and model.has_kind(kinds.BRANCH):
             fresh = replace(fresh, branch_time_s=closer_branches(model, self.layout.branch_time_s))
         if fresh is self.layout:
             return current
         setting = replace(self.setting, layout=fresh, iron_flux_wb=flux)
-        if model.has_kind(kinds.BRANCH):
-            terms = CATALOGUE["rotor_skin_effect"].terms(setting)
-            model = model.with_terms([t for t in terms if t.symbol not in model.of("rotor_skin_effect")])
+        for name in sorted({t.effect for t in model.terms if t.kind == kinds.BRANCH}):
+            terms = CATALOGUE[name].terms(setting)
+            model = model.with_terms([t for t in terms if t.symbol not in model.of(name)])
         again = fit(model, self.record, fresh, self.noise)
         if not np.isfinite(again.chi2):
             return current

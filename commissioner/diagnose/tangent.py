@@ -112,8 +112,9 @@ def sensitivities(
     secant, resistance = np.zeros(3), np.zeros(3)
     whole_beta = 0.0
     for n in range(branches):
-        h = half / branch_time[n]
-        whole_beta += branch_gain[n] * h / (1.0 + h)
+        if branch_time[n] > 0.0:
+            h = half / branch_time[n]
+            whole_beta += branch_gain[n] * h / (1.0 + h)
     for p in range(count):
         n = indices[p]
         if kinds[p] == CARRY:
@@ -163,6 +164,10 @@ def sensitivities(
             ib += eb
         # (4)
         ta, tb = (ia + g * va) * shrink, (ib + g * vb) * shrink
+        for n in range(branches):
+            if branch_time[n] < 0.0:
+                ta += shrink * branch_gain[n] * states[t, 4 + 2 * n]
+                tb += shrink * branch_gain[n] * states[t, 5 + 2 * n]
         _phases(ta, tb, now)
         if t == 0:
             before[:] = now
@@ -193,8 +198,9 @@ def sensitivities(
         ca = gm * ((1.0 + mas) * x2 + mbs * x3) + ja - ia - over * ea
         cb = gm * (mbs * x2 + (1.0 - mas) * x3) + jb - ib - over * eb
         for n in range(branches):
-            ca -= branch_gain[n] * states[t, 4 + 2 * n]
-            cb -= branch_gain[n] * states[t, 5 + 2 * n]
+            if branch_time[n] > 0.0:
+                ca -= branch_gain[n] * states[t, 4 + 2 * n]
+                cb -= branch_gain[n] * states[t, 5 + 2 * n]
         waa, wab, wbb = rr * (1.0 + ras), rr * rbs, rr * (1.0 - ras)
         wa, wb = waa * ca + wab * cb, wab * ca + wbb * cb
 
@@ -240,7 +246,10 @@ def sensitivities(
                 fja, fjb = f * stop_states[t, n, 0], f * stop_states[t, n, 1]
             elif kind == BRANCH:
                 qa, qb = states[t, 4 + 2 * n], states[t, 5 + 2 * n]
-                fwa, fwb = -(waa * qa + wab * qb), -(wab * qa + wbb * qb)
+                if branch_time[n] > 0.0:
+                    fwa, fwb = -(waa * qa + wab * qb), -(wab * qa + wbb * qb)
+                else:
+                    fta, ftb = shrink * qa, shrink * qb
             elif kind == IRON_LOSS:
                 fta, ftb = (va - rs * ta) * shrink, (vb - rs * tb) * shrink
             elif kind == VOLTAGE_MOD:
@@ -347,6 +356,8 @@ def sensitivities(
                 push_w[0, p], push_w[1, p] = baa * fwa + bab * fwb, bab * fwa + bbb * fwb
                 ca, cb = beta * dw[0, p], beta * dw[1, p]
                 for n in range(branches):
+                    if branch_time[n] < 0.0:
+                        continue
                     h = half / branch_time[n]
                     ca += branch_gain[n] * (1.0 - h) / (1.0 + h) * dq[n, 0, p]
                     cb += branch_gain[n] * (1.0 - h) / (1.0 + h) * dq[n, 1, p]
@@ -400,6 +411,8 @@ def sensitivities(
                 out[1, p, t] = dt[1, p]
         if has_branches and t > 0:
             for n in range(branches):
+                if branch_time[n] < 0.0:
+                    continue
                 h = half / branch_time[n]
                 for p in range(count):
                     for c in range(2):

@@ -1,17 +1,17 @@
 """The extended two-axis standstill model, compiled: its trajectory under a recorded voltage command.
 
-States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged rotor voltage q_k per extra rotor branch,
-all as (alpha, beta) pairs. With fluxes as states every nonlinearity is explicit:
+States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged voltage q_k per extra branch, all as
+(alpha, beta) pairs: rotor branches (T_k > 0) and eddy-current paths of the iron (T_k < 0), fed by the stator flux. With fluxes as states every nonlinearity is explicit:
 
     psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
     j      = G(|psi_0|) psi_0 + sum h_k w_k z_k / r_k   extra magnetizing current, z_k memory operator of scale r_k,
                                                     w_k = 1 or, where loops widen with flux, |psi_0|^2 / top^2 (2)
     i_s    = (1/L_sigma + A_sigma) psi_sigma + e + nu j,                  psi_sigma = psi_s - psi_R          (3)
     e      = S(|phi|) phi,   phi = psi_s - kappa psi_R          extra current of the saturating leakage path (3a)
-    i      = (i_s + g v) / (1 + g R_s)              iron-loss conductance g across d psi_s/dt                (4)
+    i      = (i_s + g v + sum g_k q_k) / (1 + g R_s)    iron-loss conductance g across d psi_s/dt, and eddy paths  (4)
     d psi_s/dt = v + v_legs(i) - R_uvw i                                                                     (5)
     w      = R_R (psi_R / L_M + j - i_s - (kappa - 1) e - sum g_k q_k)                                       (6)
-    d psi_R/dt = -w + omega J psi_R,     T_k d q_k/dt = w - q_k                                              (7)
+    d psi_R/dt = -w + omega J psi_R,     T_k d q_k/dt = w - q_k    (eddy paths: |T_k| d q_k/dt = d psi_s/dt - q_k)  (7)
 
 (1)-(3) and (6) follow from the T circuit with a saturating branch, rotor side scaled by L_m/L_r: an extra current j
 drawn at the magnetizing node gives psi_s = L_sigma i_s + psi_R - mu j, psi_m = psi_R + mu (i_s - j),
@@ -78,8 +78,13 @@ def _slope(
     ib = iab * sa + ibb * sb + eb + nu * jb
     # (4)
     shrink = 1.0 / (1.0 + g * rs)
-    ta = (ia + g * va) * shrink
-    tb = (ib + g * vb) * shrink
+    ta, tb = ia + g * va, ib + g * vb
+    for n in range(branches):
+        if branch_time[n] < 0.0:
+            ta += branch_gain[n] * x[4 + 2 * n]
+            tb += branch_gain[n] * x[5 + 2 * n]
+    ta *= shrink
+    tb *= shrink
     out[0] = ta
     out[1] = tb
     # (5)
@@ -97,15 +102,17 @@ def _slope(
     ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia - (kappa - 1.0) * ea
     cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib - (kappa - 1.0) * eb
     for n in range(branches):
-        ca -= branch_gain[n] * x[4 + 2 * n]
-        cb -= branch_gain[n] * x[5 + 2 * n]
+        if branch_time[n] > 0.0:
+            ca -= branch_gain[n] * x[4 + 2 * n]
+            cb -= branch_gain[n] * x[5 + 2 * n]
     wa = rr * ((1.0 + ras) * ca + rbs * cb)
     wb = rr * (rbs * ca + (1.0 - ras) * cb)
     k[stage, 2] = -wa - omega * x[3]
     k[stage, 3] = -wb + omega * x[2]
     for n in range(branches):
-        k[stage, 4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
-        k[stage, 5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
+        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[stage, 0], k[stage, 1])
+        k[stage, 4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
+        k[stage, 5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
     if stage > 0:
         return
     # slope of the terminal current while the voltage is held
@@ -124,8 +131,12 @@ def _slope(
         djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
     ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
     fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
-    out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja) * shrink
-    out[3] = (iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb) * shrink
+    ua, ub = iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja, iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb
+    for n in range(branches):
+        if branch_time[n] < 0.0:
+            ua += branch_gain[n] * k[0, 4 + 2 * n]
+            ub += branch_gain[n] * k[0, 5 + 2 * n]
+    out[2], out[3] = ua * shrink, ub * shrink
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -268,22 +279,38 @@ def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
     ia = gs * ((1.0 + base[8]) * sa + base[9] * sb)
     ib = gs * (base[9] * sa + (1.0 - base[8]) * sb)
     shrink = 1.0 / (1.0 + g * base[0])
-    ta, tb = (ia + g * va) * shrink, (ib + g * vb) * shrink
+    ta, tb = ia + g * va, ib + g * vb
+    for n in range(branch_gain.shape[0]):
+        if branch_time[n] < 0.0:
+            ta += branch_gain[n] * x[4 + 2 * n]
+            tb += branch_gain[n] * x[5 + 2 * n]
+    ta *= shrink
+    tb *= shrink
     current[0], current[1] = ta, tb
     k[0] = va - a[0] * ta - a[1] * tb
     k[1] = vb - a[1] * ta - a[2] * tb
     ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) - ia
     cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) - ib
     for n in range(branch_gain.shape[0]):
-        ca -= branch_gain[n] * x[4 + 2 * n]
-        cb -= branch_gain[n] * x[5 + 2 * n]
+        if branch_time[n] > 0.0:
+            ca -= branch_gain[n] * x[4 + 2 * n]
+            cb -= branch_gain[n] * x[5 + 2 * n]
     wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
     wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
     k[2] = -wa - omega * x[3]
     k[3] = -wb + omega * x[2]
     for n in range(branch_gain.shape[0]):
-        k[4 + 2 * n] = (wa - x[4 + 2 * n]) / branch_time[n]
-        k[5 + 2 * n] = (wb - x[5 + 2 * n]) / branch_time[n]
+        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[0], k[1])
+        k[4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
+        k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
+    for n in range(branch_gain.shape[0]):
+        if branch_time[n] < 0.0:
+            slope[0, t] += shrink * branch_gain[n] * k[4 + 2 * n]
+            slope[1, t] += shrink * branch_gain[n] * k[5 + 2 * n]
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -316,11 +343,13 @@ def propagate_varying(
             rotor_current[c, t] = -k[2 + c] / rr
         ua, ub = k[0] - k[2], k[1] - k[3]
         slope_before[0, t], slope_before[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
+        _add_eddy_slope(k, branch_gain, branch_time, shrink, slope_before, t)
         for step in range(steps):
             _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, unused)
             if step == 0:
                 ua, ub = k[0] - k[2], k[1] - k[3]
                 slope_after[0, t], slope_after[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
+                _add_eddy_slope(k, branch_gain, branch_time, shrink, slope_after, t)
             factor = h
             for j in range(order):
                 for c in range(size):

@@ -125,7 +125,7 @@ def _resistance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pa
 
 
 def _conductance(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
-    return (_first(sizes), 1e3 * effect.size) if effect.shape in ("", "resistor") else None
+    return _first(sizes), 1e3 * effect.size
 
 
 def _heating(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:

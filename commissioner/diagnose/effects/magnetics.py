@@ -160,13 +160,13 @@ def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
     largest = 600.0 / setting.layout.nominal_box[1][1] if np.isfinite(setting.layout.nominal_box[1][1]) else np.inf
     return tuple(
         Term("rotor_skin_effect", f"branch_{k}", "S", kinds.BRANCH, k, 0.01, 0.0, largest)
-        for k in range(setting.layout.branch_time_s.size)
+        for k, time in enumerate(setting.layout.branch_time_s) if time > 0.0
     )
 
 
 def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    g = values.get("conductance", 0.0)
-    return {"conductance_ms": (g * 1e3, "mS")}
+    """At low frequency, where eddy currents fill the sheet."""
+    return {"conductance_ms": (sum(values.values()) * 1e3, "mS")}
 
 
 @effect(
@@ -177,8 +177,15 @@ def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="tones above 1 kHz, or a running no-load test",
 )
 def iron_loss(setting: Setting) -> tuple[Term, ...]:
-    """Conductance g >= 0 [S] fed by the stator's induced voltage."""
-    return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2),)
+    """Conductance g >= 0 [S] fed by the stator's induced voltage, and eddy paths g_k / (1 + s T_k) that lag behind it, with
+
+    corners from 150 Hz to 1 kHz.
+    """
+    paths = tuple(
+        Term("iron_loss", f"eddy_{k}", "S", kinds.BRANCH, k, 1e-4, 0.0, 0.2)
+        for k, time in enumerate(setting.layout.branch_time_s) if time < 0.0
+    )
+    return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
 
 
 def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
