@@ -167,9 +167,9 @@ class Steps:
         they are taken in the order of their gain, and the first may have stood for two others.
         """
         mine = tuple(n for n in accepted if n in LINEAR)
-        if not 1 <= len(mine) <= 2 or frozenset(accepted) in self.regrouped:
+        if not 1 <= len(mine) <= 2 or frozenset(mine) in self.regrouped:
             return None
-        self.regrouped.add(frozenset(accepted))
+        self.regrouped.add(frozenset(mine))
         bare = current.model
         for name in mine:
             bare = bare.without(name)
