@@ -29,7 +29,7 @@ from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.search import EXPLORED_SAMPLES, Found, search
+from commissioner.diagnose.search import EXPLORED, Found, search
 from commissioner.diagnose.split import Split, split_lines
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
@@ -183,7 +183,7 @@ def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence
         return {}
     record, layout = found.record, found.layout
     out: dict[str, dict[str, float]] = {}
-    for samples in (EXPLORED_SAMPLES, 4 * EXPLORED_SAMPLES, record.samples):
+    for samples in (*EXPLORED, record.samples):
         if len(out) == len(asked):
             break
         fitted, part = on_part(found.fit, record, layout, noise, samples)

@@ -26,6 +26,8 @@ from commissioner.diagnose.settle import settled, without_curves
 from commissioner.diagnose.steps import Report, Steps
 
 EXPLORED_SAMPLES = 45_000
+EXPLORED = (EXPLORED_SAMPLES, 4 * EXPLORED_SAMPLES)
+"""Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
 MENDED_SHARE = 0.7
@@ -50,9 +52,9 @@ class Found:
     """False: the time allowed was over before nothing more passed the rules."""
 
 
-def explored(record: Record) -> Record:
+def explored(record: Record, samples: int = EXPLORED_SAMPLES) -> Record:
     """The first part of every segment, so that the search stays short on long recordings."""
-    share = max(EXPLORED_SAMPLES // max(len(record.segments), 1), 1500)
+    share = max(samples // max(len(record.segments), 1), 1500)
     return record.subset(tuple(range(len(record.segments))), share)
 
 
@@ -79,22 +81,21 @@ def search(
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
     regrouped: set[frozenset[str]] = set()
-    if part.samples < 0.7 * record.samples:
-        small = explored(record)
-        start = fit(nominal.model, small, layout, noise, rounds=6)
-        search_small = Steps(small, layout, replace(setting, record=small), noise, names, report, record, go_on)
-        fitted, accepted, _ = search_small.run(start, ())
-        first, record, regrouped = search_small.first, search_small.full, search_small.regrouped
+    for samples in (*EXPLORED, record.samples):
+        if 0.7 * record.samples <= samples < record.samples:
+            continue
+        part = record if samples >= record.samples else explored(record, samples)
+        whole = Steps(part, layout, replace(setting, record=part), noise, names, report, record, go_on)
+        whole.regrouped = regrouped
+        start = fit(model, part, layout, noise)
+        if not np.isfinite(start.chi2):
+            # what fitted the smaller part runs away beyond it
+            start, accepted = fit(nominal.model, part, layout, noise), ()
+        if accepted or part is record:
+            start = whole.with_new_flux_before(whole.relayout(start))
+        fitted, accepted, last = whole.run(start, accepted)
+        first, record, regrouped = first or whole.first, whole.full, whole.regrouped
         model = without_curves(_completed(fitted.model, accepted, setting))
-    whole = Steps(record, layout, replace(setting, record=record), noise, names, report, record, go_on)
-    whole.regrouped = regrouped
-    completed = fit(model, record, layout, noise)
-    if not np.isfinite(completed.chi2):
-        # what fitted the part runs away beyond it
-        completed, accepted = fit(nominal.model, record, layout, noise), ()
-    start = whole.with_new_flux_before(whole.relayout(completed))
-    fitted, accepted, last = whole.run(start, accepted)
-    first = first or whole.first or last
     if accepted and losses:
         unmended = _with_the_losses(whole.record, raw, fitted, whole.layout, noise)
         if unmended is not None:
@@ -115,7 +116,7 @@ def search(
         whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
     )
     return Found(
-        nominal, fitted, accepted, whole.record, layout, reached, last, first,
+        nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
         tuple(whole.below), losses_of(fitted, accepted), losses, go_on(),
     )
 

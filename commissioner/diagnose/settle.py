@@ -68,15 +68,20 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The best fit of those that begin with the iron on the rotor's side of the leakage, between, and on the stator's.
 
     Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
-    hill between them, or is long on its way. Curves begin from zero there.
+    hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment.
     """
-    best = current if current.has_converged else fit(current.model, record, layout, noise)
+    started, part = on_part(current, record, layout, noise, SETTLED_SAMPLES)
+    best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
-            trial = fit(_on(without_curves(best.model), side), record, layout, noise, wanted_chi2=best.chi2)
+            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=best.chi2)
             if trial.chi2 < best.chi2:
                 best = trial
-    return best
+    if part is record:
+        return best
+    if abs(_side(best.model) - _side(current.model)) <= NEAR:
+        return current
+    return min(current, fit(best.model, record, layout, noise), key=lambda f: f.chi2)
 
 
 def without_curves(model: Model) -> Model:
