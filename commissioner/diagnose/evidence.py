@@ -135,14 +135,10 @@ def _steady(found: Fit, name: str) -> tuple[float, float]:
 
     What the noise alone adds to a sum of squares, one for every number, is taken off.
     """
-    terms, gram = found.model.terms, found.normal.total_gram
-    is_mine = np.array([False] * 4 + [t.effect == name and t.symbol.startswith(CATALOGUE[name].course) for t in terms])
-    mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine & found.model.is_free)
-    cross = gram[np.ix_(others, mine)]
-    power = gram[np.ix_(mine, mine)] - cross.T @ inverse(gram[np.ix_(others, others)]) @ cross
-    values, steady = found.model.theta[mine], np.array([1.0 / terms[k - 4].step for k in mine])
-    shown = max(float(values @ power @ values) - mine.size, 0.0)
-    weight = float(steady @ power @ steady)
+    mine, information = found.information_of(name, CATALOGUE[name].course)
+    values, steady = found.model.theta[mine], np.array([1.0 / found.model.terms[k - 4].step for k in mine])
+    shown = max(float(values @ information @ values) - mine.size, 0.0)
+    weight = float(steady @ information @ steady)
     return float(np.sqrt(shown / weight)), float(np.sqrt((shown + 0.5 * mine.size) / max(shown, 1.0) / weight))
 
 

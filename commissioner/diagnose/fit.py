@@ -63,12 +63,21 @@ class Fit:
     def chi2(self) -> float:
         return self.normal.total_chi2
 
-    def set_apart(self, effect: str) -> tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]:
-        """Information of all numbers, the rows of one effect's, the rows of the others that can move, and their inverse."""
-        is_mine = np.array([False] * 4 + [t.effect == effect for t in self.model.terms])
+    def set_apart(self, effect: str, prefix: str = "") -> tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]:
+        """Information of all numbers, the rows of one effect's (whose names begin so), the rows of the others that can move,
+
+        and their inverse.
+        """
+        is_mine = np.array([False] * 4 + [t.effect == effect and t.symbol.startswith(prefix) for t in self.model.terms])
         mine, others = np.flatnonzero(is_mine), np.flatnonzero(~is_mine & self.model.is_free)
         gram = self.normal.total_gram
         return gram, mine, others, inverse(gram[np.ix_(others, others)])
+
+    def information_of(self, effect: str, prefix: str = "") -> tuple[NDArray[np.intp], Array]:
+        """Rows of the effect's numbers (whose names begin so), and what the data tell of them while the others re-adjust."""
+        gram, mine, others, inner = self.set_apart(effect, prefix)
+        cross = gram[np.ix_(others, mine)]
+        return mine, gram[np.ix_(mine, mine)] - cross.T @ inner @ cross
 
 
 def inverse(information: Array) -> Array:
@@ -244,8 +253,7 @@ def fit(
 
 def on_part(fitted: Fit, record: Record, layout: Layout, noise: Noise, samples: int) -> tuple[Fit, Record]:
     """The fit repeated on the first samples of every segment."""
-    share = max(samples // max(len(record.segments), 1), 1500)
-    if record.samples <= 1.4 * share * len(record.segments):
+    if record.samples <= 1.4 * record.share_of(samples) * len(record.segments):
         return fitted, record
-    part = record.subset(tuple(range(len(record.segments))), share)
+    part = record.beginning(samples)
     return fit(fitted.model, part, layout, noise, rounds=5), part

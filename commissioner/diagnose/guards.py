@@ -93,11 +93,9 @@ def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:
 
 def loss_without(current: Fit, name: str) -> float:
     """How much chi2 rises to first order when the effect's numbers go to zero and the others re-adjust."""
-    gram, mine, others, inner = current.set_apart(name)
-    cross = gram[np.ix_(others, mine)]
-    schur = gram[np.ix_(mine, mine)] - cross.T @ inner @ cross
+    mine, information = current.information_of(name)
     value = current.model.theta[mine]
-    return float(value @ schur @ value)
+    return float(value @ information @ value)
 
 
 def effects_of(model: Model) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
+LEAST_SHARE = 1500
 THREADS = min(int(get_num_threads()), 4)
 """One segment each: more threads than cores would only hold more sensitivities in memory at once."""
 
@@ -114,6 +115,14 @@ class Record:
             return Record(tuple(cut), self.facts)
         channels = tuple(np.ascontiguousarray(self.channels[k][: s.count]) for k, s in zip(keep, cut, strict=True))
         return Record(tuple(cut), self.facts, self.channel_names, channels)
+
+    def share_of(self, samples: int) -> int:
+        """Samples of each segment when all of them get so many together; some tenths of a second at least."""
+        return max(samples // max(len(self.segments), 1), LEAST_SHARE)
+
+    def beginning(self, samples: int) -> Record:
+        """The first part of every segment, about so many samples together."""
+        return self.subset(tuple(range(len(self.segments))), self.share_of(samples))
 
 
 def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Result]:

@@ -25,8 +25,7 @@ from commissioner.diagnose.screen import Screening
 from commissioner.diagnose.settle import settled, without_curves
 from commissioner.diagnose.steps import Report, Steps
 
-EXPLORED_SAMPLES = 45_000
-EXPLORED = (EXPLORED_SAMPLES, 4 * EXPLORED_SAMPLES)
+EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
@@ -52,12 +51,6 @@ class Found:
     """False: the time allowed was over before nothing more passed the rules."""
 
 
-def explored(record: Record, samples: int = EXPLORED_SAMPLES) -> Record:
-    """The first part of every segment, so that the search stays short on long recordings."""
-    share = max(samples // max(len(record.segments), 1), 1500)
-    return record.subset(tuple(range(len(record.segments))), share)
-
-
 def search(
     record: Record, noise: Noise, *, excluded: Sequence[str] = (), report: Report = lambda _: None,
     check: Callable[[Fit, Record], None] | None = None, go_on: Callable[[], bool] = lambda: True,
@@ -66,7 +59,7 @@ def search(
 
     `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
     """
-    part, bare = explored(record), bare_layout(record)
+    part, bare = record.beginning(EXPLORED[0]), bare_layout(record)
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     losses: tuple[Loss, ...] = ()
     raw = record.segments
@@ -84,7 +77,7 @@ def search(
     for samples in (*EXPLORED, record.samples):
         if 0.7 * record.samples <= samples < record.samples:
             continue
-        part = record if samples >= record.samples else explored(record, samples)
+        part = record if samples >= record.samples else record.beginning(samples)
         whole = Steps(part, layout, replace(setting, record=part), noise, names, report, record, go_on)
         whole.regrouped = regrouped
         start = fit(model, part, layout, noise)

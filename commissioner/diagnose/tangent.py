@@ -42,9 +42,7 @@ from commissioner.diagnose.kinds import (
 )
 from commissioner.diagnose.memory import susceptibility, widened
 from commissioner.diagnose.spline import curve, saturating, spline_weights
-from commissioner.diagnose.trajectory import leg_loss
-
-SQRT3 = np.sqrt(3.0)
+from commissioner.diagnose.trajectory import EDDY, ROTOR, SQRT3, branch_current, leg_loss
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -164,10 +162,9 @@ def sensitivities(
             ib += eb
         # (4)
         ta, tb = (ia + g * va) * shrink, (ib + g * vb) * shrink
-        for n in range(branches):
-            if branch_time[n] < 0.0:
-                ta += shrink * branch_gain[n] * states[t, 4 + 2 * n]
-                tb += shrink * branch_gain[n] * states[t, 5 + 2 * n]
+        qa, qb = branch_current(states[t], branch_gain, branch_time, EDDY)
+        ta += shrink * qa
+        tb += shrink * qb
         _phases(ta, tb, now)
         if t == 0:
             before[:] = now
@@ -197,10 +194,9 @@ def sensitivities(
         over = kappa - 1.0
         ca = gm * ((1.0 + mas) * x2 + mbs * x3) + ja - ia - over * ea
         cb = gm * (mbs * x2 + (1.0 - mas) * x3) + jb - ib - over * eb
-        for n in range(branches):
-            if branch_time[n] > 0.0:
-                ca -= branch_gain[n] * states[t, 4 + 2 * n]
-                cb -= branch_gain[n] * states[t, 5 + 2 * n]
+        qa, qb = branch_current(states[t], branch_gain, branch_time, ROTOR)
+        ca -= qa
+        cb -= qb
         waa, wab, wbb = rr * (1.0 + ras), rr * rbs, rr * (1.0 - ras)
         wa, wb = waa * ca + wab * cb, wab * ca + wbb * cb
 

@@ -1,7 +1,8 @@
 """The extended two-axis standstill model, compiled: its trajectory under a recorded voltage command.
 
 States: stator flux psi_s, rotor flux psi_R (inverse-Gamma scale), one lagged voltage q_k per extra branch, all as
-(alpha, beta) pairs: rotor branches (T_k > 0) and eddy-current paths of the iron (T_k < 0), fed by the stator flux. With fluxes as states every nonlinearity is explicit:
+(alpha, beta) pairs: rotor branches (T_k > 0) and eddy-current paths of the iron (T_k < 0), fed by the stator flux. With
+fluxes as states every nonlinearity is explicit:
 
     psi_0  = (1 - nu) psi_R + nu psi_s              flux of the iron: nu = 0 inverse-Gamma, nu = 1 Gamma     (1)
     j      = G(|psi_0|) psi_0 + sum h_k w_k z_k / r_k   extra magnetizing current, z_k memory operator of scale r_k,
@@ -32,6 +33,19 @@ from commissioner.diagnose.memory import remembered, susceptibility, widened
 from commissioner.diagnose.spline import curve, saturating, spline_weights
 
 SQRT3 = np.sqrt(3.0)
+ROTOR, EDDY = 1.0, -1.0
+"""Sign of the time constants of rotor branches, and of eddy-current paths fed by the stator flux."""
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def branch_current(x, branch_gain, branch_time, side):
+    """Current (or its slope) of all branches on that `side`, from a state `x` (or its derivative)."""
+    qa = qb = 0.0
+    for n in range(branch_gain.shape[0]):
+        if branch_time[n] * side > 0.0:
+            qa += branch_gain[n] * x[4 + 2 * n]
+            qb += branch_gain[n] * x[5 + 2 * n]
+    return qa, qb
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -78,13 +92,8 @@ def _slope(
     ib = iab * sa + ibb * sb + eb + nu * jb
     # (4)
     shrink = 1.0 / (1.0 + g * rs)
-    ta, tb = ia + g * va, ib + g * vb
-    for n in range(branches):
-        if branch_time[n] < 0.0:
-            ta += branch_gain[n] * x[4 + 2 * n]
-            tb += branch_gain[n] * x[5 + 2 * n]
-    ta *= shrink
-    tb *= shrink
+    qa, qb = branch_current(x, branch_gain, branch_time, EDDY)
+    ta, tb = (ia + g * va + qa) * shrink, (ib + g * vb + qb) * shrink
     out[0] = ta
     out[1] = tb
     # (5)
@@ -101,10 +110,9 @@ def _slope(
     # (6), (7)
     ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia - (kappa - 1.0) * ea
     cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib - (kappa - 1.0) * eb
-    for n in range(branches):
-        if branch_time[n] > 0.0:
-            ca -= branch_gain[n] * x[4 + 2 * n]
-            cb -= branch_gain[n] * x[5 + 2 * n]
+    qa, qb = branch_current(x, branch_gain, branch_time, ROTOR)
+    ca -= qa
+    cb -= qb
     wa = rr * ((1.0 + ras) * ca + rbs * cb)
     wb = rr * (rbs * ca + (1.0 - ras) * cb)
     k[stage, 2] = -wa - omega * x[3]
@@ -131,12 +139,9 @@ def _slope(
         djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
     ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
     fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
-    ua, ub = iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja, iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb
-    for n in range(branches):
-        if branch_time[n] < 0.0:
-            ua += branch_gain[n] * k[0, 4 + 2 * n]
-            ub += branch_gain[n] * k[0, 5 + 2 * n]
-    out[2], out[3] = ua * shrink, ub * shrink
+    qa, qb = branch_current(k[0], branch_gain, branch_time, EDDY)
+    out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja + qa) * shrink
+    out[3] = (iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb + qb) * shrink
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -279,22 +284,16 @@ def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
     ia = gs * ((1.0 + base[8]) * sa + base[9] * sb)
     ib = gs * (base[9] * sa + (1.0 - base[8]) * sb)
     shrink = 1.0 / (1.0 + g * base[0])
-    ta, tb = ia + g * va, ib + g * vb
-    for n in range(branch_gain.shape[0]):
-        if branch_time[n] < 0.0:
-            ta += branch_gain[n] * x[4 + 2 * n]
-            tb += branch_gain[n] * x[5 + 2 * n]
-    ta *= shrink
-    tb *= shrink
+    qa, qb = branch_current(x, branch_gain, branch_time, EDDY)
+    ta, tb = (ia + g * va + qa) * shrink, (ib + g * vb + qb) * shrink
     current[0], current[1] = ta, tb
     k[0] = va - a[0] * ta - a[1] * tb
     k[1] = vb - a[1] * ta - a[2] * tb
     ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) - ia
     cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) - ib
-    for n in range(branch_gain.shape[0]):
-        if branch_time[n] > 0.0:
-            ca -= branch_gain[n] * x[4 + 2 * n]
-            cb -= branch_gain[n] * x[5 + 2 * n]
+    qa, qb = branch_current(x, branch_gain, branch_time, ROTOR)
+    ca -= qa
+    cb -= qb
     wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
     wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
     k[2] = -wa - omega * x[3]
@@ -307,10 +306,9 @@ def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
 def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
-    for n in range(branch_gain.shape[0]):
-        if branch_time[n] < 0.0:
-            slope[0, t] += shrink * branch_gain[n] * k[4 + 2 * n]
-            slope[1, t] += shrink * branch_gain[n] * k[5 + 2 * n]
+    qa, qb = branch_current(k, branch_gain, branch_time, EDDY)
+    slope[0, t] += shrink * qa
+    slope[1, t] += shrink * qb
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)

@@ -43,6 +43,13 @@ def currents(model, setting, segment=1):
     return predict(model, setting.record, segment, setting.layout).currents_a
 
 
+def central_slope(model, setting, row, h):
+    """d current / d theta[row] by a central difference."""
+    step = h * np.eye(model.theta.size)[row]
+    more, less = (currents(model.moved(model.theta + sign * step), setting) for sign in (1.0, -1.0))
+    return (more - less) / (2.0 * h)
+
+
 def extended(nominal, setting, name, theta):
     """The nominal model with every number of the effect at `theta` steps."""
     terms = CATALOGUE[name].terms(setting)
@@ -178,14 +185,7 @@ def test_sensitivities_beside_loops_that_widen_with_flux_are_exact(nominal, sett
     model = Model(nominal.nominal, terms, values)
     row = {"R_s": 0, "L_M": 3}.get(symbol) or (0 if symbol == "R_s" else 4 + [t.symbol for t in terms].index(symbol))
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian[row]
-    h = 1e-4
-
-    def moved(by):
-        theta = model.theta.copy()
-        theta[row] += by
-        return currents(model.moved(theta), setting)
-
-    slope = (moved(h) - moved(-h)) / (2.0 * h)
+    slope = central_slope(model, setting, row, 1e-4)
     assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.02 * np.sqrt(np.mean(slope**2))
 
 
@@ -197,12 +197,5 @@ def test_sensitivities_beside_eddy_paths_are_exact(nominal, setting, symbol):
     model = Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
     row = 4 + [t.symbol for t in terms].index(symbol)
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian[row]
-    h = 1e-3
-
-    def moved(by):
-        theta = model.theta.copy()
-        theta[row] += by
-        return currents(model.moved(theta), setting)
-
-    slope = (moved(h) - moved(-h)) / (2.0 * h)
+    slope = central_slope(model, setting, row, 1e-3)
     assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
