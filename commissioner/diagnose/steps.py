@@ -49,6 +49,7 @@ RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
 HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
+LATE = ("sampling_delay", "sensor_lag", "cable_capacitance")
 REGROUPED, HOPEFUL = 4, 1.3
 """Groups refitted at most; and the factor by which a refit may gain more than promised."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
@@ -74,6 +75,7 @@ class Steps:
         self.below: list[str] = []
         self.implausible: list[str] = []
         self.regrouped: set[frozenset[str]] = set()
+        self.lagging: set[frozenset[str]] = set()
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in record.segments]) ** 2)))
@@ -166,6 +168,9 @@ class Steps:
 
         they are taken in the order of their gain, and the first may have stood for two others.
         """
+        lagging = self._as_a_lag(current, accepted)
+        if lagging is not None:
+            return lagging
         mine = tuple(n for n in accepted if n in LINEAR)
         if not 1 <= len(mine) <= 2 or frozenset(mine) in self.regrouped:
             return None
@@ -197,6 +202,36 @@ class Steps:
             )
             self.report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
             if trial.chi2 + numbers < wanted and is_sound:
+                return trial, (*(n for n in accepted if n not in mine), *group)
+        return None
+
+    def _as_a_lag(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...]] | None:
+        """A lag, alone or with a delay, in place of the delay and the cable that imitate it.
+
+        At zero a lag is a delay: that it takes amplitude as well shows in second order only, which nothing promises.
+        """
+        mine = tuple(n for n in accepted if n in LATE)
+        if "cable_capacitance" not in mine or "sensor_lag" not in self.names or frozenset(mine) in self.lagging:
+            return None
+        self.lagging.add(frozenset(mine))
+        model = current.model
+        late = sum(model.sum_kind(kind, size)[:count].sum() for kind, size, count in ((kinds.DELAY, 2, 1), (kinds.LAG, 2, 2)))
+        late = late or 0.5 * self.record.facts.sample_period_s
+        for name in mine:
+            model = model.without(name)
+        cost = sum(required_chi2(sum(t.effect == n for t in current.model.terms)) for n in mine)
+        for group in (("sensor_lag",), ("sampling_delay", "sensor_lag")):
+            if not set(group) <= set(self.names):
+                continue
+            terms = [t for n in group for t in CATALOGUE[n].terms(self.setting)]
+            share = {"lag": 0.7 if len(group) > 1 else 1.0, "delay": 0.3}
+            started = model.with_terms([replace(t, start=share[t.symbol] * late) if t.symbol in share else t for t in terms])
+            wanted = current.chi2 + cost - sum(required_chi2(sum(t.effect == n for t in terms)) for n in group)
+            wanted -= STATISTICAL_FLOOR if len(group) == len(mine) else 0.0
+            trial = fit(started, self.record, self.layout, self.noise, wanted_chi2=wanted)
+            self.report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
+            is_sound = all(self._is_plausible(trial.model, n) for n in group)
+            if trial.chi2 < wanted and is_sound:
                 return trial, (*(n for n in accepted if n not in mine), *group)
         return None
 

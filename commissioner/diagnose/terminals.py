@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import COUNT, current_lost, in_all, slope_lost
 from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
+from commissioner.diagnose.lag import SHORT_LAG, behind, low_pass
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.resample import resample, resample_hermite
@@ -35,22 +35,27 @@ def sense(
     clock = 1e-6 * _clock(segment) if CLOCK in at_work else np.zeros((0, segment.count))
     turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
     late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
-    is_late = bool(np.any(late))
+    lags = model.sum_kind(LAG, 2) / period
+    is_short = lags < SHORT_LAG
+    late = late / period + lags[is_short].sum()
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
-    if is_late:
-        current, slope = resample_hermite(current, after, before, late / period, period)
+    if not is_short.all():
+        long = np.where(is_short, 0.0, lags)
         for row in rows:
-            jacobian[row] = resample(jacobian[row], late / period)
+            jacobian[row] = low_pass(jacobian[row], long)
+        lag_slopes = [_by_lag(current, long, k, late) / period for k in range(lags.size)] if LAG in at_work else []
+        current, slope = behind(current, long, late)
+        slope = slope / period
+    elif late.any():
+        current, slope = resample_hermite(current, after, before, late, period)
     else:
         slope = before
-    lags = model.sum_kind(LAG, 2)
-    lag_slopes = [-slope, -slope]
-    if lags.any():
-        current, slope, lag_slopes = _behind(current, slope, lags, period)
-        held = _filter(lags, period)
+    if late.any():
         for row in rows:
-            jacobian[row] = _low_pass(jacobian[row], held)
+            jacobian[row] = resample(jacobian[row], late)
+    if is_short.all():
+        lag_slopes = [-slope, -slope]
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
@@ -146,38 +151,10 @@ def _edges(voltage_per_period: Array) -> list[Array]:
     return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
 
 
-SHORT_LAG = 0.05
-"""Of a sample: below it a lag is expanded, i - tau i' (its second-order term is then below 1e-3 of the first)."""
-
-
-def _behind(current: Array, slope: Array, lags_s: Array, period_s: float) -> tuple[Array, Array, list[Array]]:
-    """Current and its slope behind the lags, and the current's derivative with respect to each."""
-    is_short = lags_s < SHORT_LAG * period_s
-    bent = current - lags_s[is_short].sum() * slope
-    long = np.where(is_short, 0.0, lags_s)
-    held = _filter(long, period_s)
-    derivatives = []
-    for k, lag in enumerate(lags_s):
-        if is_short[k]:
-            derivatives.append(-_low_pass(slope, held))
-            continue
-        h = 1e-3 * lag * (np.arange(lags_s.size) == k)
-        more, less = (_low_pass(bent, _filter(lags, period_s)) for lags in (long + h, long - h))
-        derivatives.append((more - less) / (2e-3 * lag))
-    return _low_pass(bent, held), _low_pass(slope, _filter(lags_s, period_s)), derivatives
-
-
-def _filter(lags_s: Array, period_s: float) -> tuple[Array, Array] | None:
-    """First-order lags in a row as one filter of a signal linear between samples (first-order hold, exact for it); None: none."""
-    at_work = lags_s[lags_s > 1e-6 * period_s]
-    if not at_work.size:
-        return None
-    denominator = np.ones(1)
-    for lag in at_work:
-        denominator = np.convolve(denominator, [lag / period_s, 1.0])
-    forward, back, _ = cont2discrete((np.ones(1), denominator), 1.0, method="foh")
-    return forward.ravel(), back
-
-
-def _low_pass(signal: Array, held: tuple[Array, Array] | None) -> Array:
-    return signal if held is None else np.asarray(lfilter(*held, signal, axis=-1))
+def _by_lag(current: Array, lags: Array, k: int, late: Array) -> Array:
+    """Derivative of the lagged current by one lag (samples); by one that is not there as by a delay."""
+    if not lags[k]:
+        return -behind(current, lags, late)[1]
+    h = 1e-3 * lags[k] * (np.arange(lags.size) == k)
+    more, less = (behind(current, moved, late)[0] for moved in (lags + h, lags - h))
+    return np.asarray((more - less) / (2e-3 * lags[k]))
