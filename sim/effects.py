@@ -98,10 +98,15 @@ def _dc_link_sag(effect, plant, p, s):
     p[at.P_SAG_SHAPE] = _shape(effect)
 
 
+def _mains_hz(plant):
+    """Of the supply, whatever frequency the motor is rated for."""
+    return 60.0 if plant.nameplate.rated_frequency_hz == 60.0 else 50.0
+
+
 @_entry("dc_link_ripple", "fraction", "amplitude of the rectifier ripple", ("sine", "sawtooth"), 0.0005, 0.03)
 def _dc_link_ripple(effect, plant, p, s):
     p[at.P_RIPPLE] = effect.size
-    p[at.P_RIPPLE_HZ] = effect.details.get("frequency_hz", 6.0 * plant.nameplate.rated_frequency_hz + 0.3)
+    p[at.P_RIPPLE_HZ] = effect.details.get("frequency_hz", 6.0 * _mains_hz(plant) + 0.3)
     p[at.P_RIPPLE_RAD] = effect.details.get("phase_rad", 0.0)
     p[at.P_RIPPLE_SHAPE] = _shape(effect)
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
+from scipy.special import gammainccinv
 
+from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
-from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
 
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.001, 0.01, 0.1)
@@ -27,18 +31,50 @@ MAINS_HZ = (50.0, 60.0)
 SEARCH = 0.008
 """Relative range in which a mains-bound frequency is looked for (grid codes allow 1 %, seconds-long records see less)."""
 
+AT_A_TONE = 4.0
+"""Lines beside an excited one that count as its own."""
+BY_CHANCE = 1e-6
+"""Chance with which noise makes a line at one frequency that counts as seen."""
+SAME_LINE = 0.2
+"""Turns by which two frequencies may come apart over the recording."""
 
-def add_channels(record: Record, model: Model, layout: Layout) -> tuple[Record, dict[str, float]]:
+
+def add_channels(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Record, dict[str, float]]:
     """The record with every known function of time, and the refined mains-bound frequencies (`ripple_300`: Hz)."""
     predictions = [predict(model, record, k, layout) for k in range(len(record.segments))]
     residuals = [s.currents_a - p.currents_a for s, p in zip(record.segments, predictions, strict=True)]
-    lines: dict[str, float] = {}
+    lines = {name: frequency for name, (frequency, _) in _lines(record, residuals, model, noise).items()}
+    return with_known(record, [p.rotor_current_a for p in predictions], lines), lines
+
+
+def with_clearer_lines(
+    record: Record, model: Model, layout: Layout, noise: Noise, lines: Mapping[str, float], kept: Sequence[str]
+) -> tuple[Record, Mapping[str, float]]:
+    """The record with the lines that a better model shows where they differ from `lines` (but for those of the `kept` kinds):
+
+    a strong cause that was not in the model hides them.
+    """
+    residuals = each_segment(lambda k: record.segments[k].currents_a - predict(model, record, k, layout).currents_a, record)
+    span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
+    readings = len(residuals)
+    clear = float(gammainccinv(readings, BY_CHANCE) / gammainccinv(readings, 0.5))
+    fresh: dict[str, float] = {}
+    for (old, known), (new, (frequency, ratio)) in zip(lines.items(), _lines(record, residuals, model, noise).items(), strict=True):
+        is_same = old == new and abs(frequency - known) * span < SAME_LINE
+        is_old = is_same or ratio < clear or new.partition("_")[0] in kept
+        fresh |= {old: known} if is_old else {new: frequency}
+    return (record, lines) if fresh == lines else (_with_lines(record, fresh), fresh)
+
+
+def _lines(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> dict[str, tuple[float, float]]:
+    """Of ripple and mains each the frequency that stands out most, Hz, and by how much (`ripple_300`: ...)."""
+    lines = {}
     for name, bases, build in (("ripple", RIPPLE_HZ, _ripple_drive), ("mains", MAINS_HZ, _mains_drive)):
-        signals = build(record, residuals, model)
+        signals = build(record, residuals, model, noise)
         found = [_refine(record, signals, base) for base in bases]
         best = int(np.argmax([ratio for _, ratio in found]))
-        lines[f"{name}_{bases[best]:.0f}"] = found[best][0]
-    return with_known(record, [p.rotor_current_a for p in predictions], lines), lines
+        lines[f"{name}_{bases[best]:.0f}"] = found[best]
+    return lines
 
 
 def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[str, float]) -> Record:
@@ -46,7 +82,15 @@ def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[
     record = _with(record, _phase_patterns(record))
     record = _with(record, _heat(record, rotor_current_a))
     record = _with(record, _sag(record))
-    record = _with(record, _hats(record))
+    return _with_lines(_with(record, _hats(record)), lines)
+
+
+def _with_lines(record: Record, lines: Mapping[str, float]) -> Record:
+    """The record with these lines as its last channels, in place of those it had."""
+    others = sum(name.partition("_")[0].partition("x")[0] not in HARMONICS for name in record.channel_names)
+    record = replace(
+        record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels)
+    )
     for name, frequency in lines.items():
         record = _with(record, _line(record, name, frequency))
         for order in HARMONICS[name.partition("_")[0]]:
@@ -150,24 +194,30 @@ def _hats(record: Record) -> Named:
     return tuple(f"hat_{k}" for k in range(most)), padded
 
 
-def _mains_drive(record: Record, residuals: Sequence[Array], model: Model) -> list[Array]:
+def _mains_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> list[Array]:
     return [np.asarray(r) for r in residuals]
 
 
-def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model) -> list[Array]:
-    """Residual turned into a voltage by the nominal impedance, times the command: a ripple line stands out at its f."""
+def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> list[Array]:
+    """The residual as seen by a ripple: through the conjugate admittance over the noise's power, times the command (matched
+
+    filter: G. Turin, IRE Trans. Inf. Theory 6(3), 1960); a ripple line stands out at its frequency.
+    """
     r_s, r_r, l_sigma, l_m = model.nominal
+    tones = np.array(excited_lines(record))
     out = []
     for segment, residual in zip(record.segments, residuals, strict=True):
-        n = segment.count
+        n, period = segment.count, record.facts.sample_period_s
         angle = np.deg2rad(segment.axis_deg)
         weights = TO_PHASES[: residual.shape[0]] @ np.array([np.cos(angle), np.sin(angle)])
-        along = weights @ residual / float(weights @ weights)
-        s = 2j * np.pi * np.fft.rfftfreq(n, record.facts.sample_period_s)
+        along = weights @ np.where(segment.is_good, residual, 0.0)
+        frequency = np.fft.rfftfreq(n, period)
+        s = 2j * np.pi * frequency
         impedance = r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m)
-        impedance[s.imag > 2.0 * np.pi * 800.0] = 0.0
-        voltage = np.fft.irfft(np.fft.rfft(along) * impedance, n)
-        out.append((voltage * segment.voltage_axis_v)[None])
+        matched = np.fft.rfft(along) / (np.conj(impedance) * (weights**2 @ noise.weights(n, period) ** 2))
+        # an error at one tone, times another, is no ripple
+        matched[(np.abs(frequency[:, None] - tones) < AT_A_TONE / (n * period)).any(axis=1)] = 0.0
+        out.append((np.fft.irfft(matched, n) * segment.voltage_axis_v)[None])
     return out
 
 

@@ -292,6 +292,10 @@ def _verdict(
     if tied:
         classes = "; ".join(" or ".join((c.name, *c.equivalent)) for c in tied)
         return Verdict.NOT_DISTINGUISHABLE, f"These data cannot tell apart: {classes}."
+    if rest.sigma > 0.0:
+        return Verdict.EXPLAINED, (
+            f"The named causes leave {rest.sigma:.2g} times the noise, {1.0 - share:.1%} of the error power that there was to explain."
+        )
     return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
 
 

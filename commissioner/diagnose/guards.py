@@ -21,6 +21,7 @@ SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
     frozenset({"shaft_motion", "remanence"}): 0.05, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+    frozenset({"remanence", "sensor_offset"}): 2e-3, frozenset({"remanence", "sensor_drift"}): 2e-3,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the

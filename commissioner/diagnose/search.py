@@ -74,10 +74,8 @@ def search(
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
     regrouped: set[frozenset[str]] = set()
-    for samples in (*EXPLORED, record.samples):
-        if 0.7 * record.samples <= samples < record.samples:
-            continue
-        part = record if samples >= record.samples else record.beginning(samples)
+    for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
+        part = record if samples == record.samples else record.beginning(samples)
         whole = Steps(part, layout, replace(setting, record=part), noise, names, report, record, go_on)
         whole.regrouped = regrouped
         start = fit(model, part, layout, noise)
@@ -88,6 +86,7 @@ def search(
             start = whole.with_new_flux_before(whole.relayout(start))
         fitted, accepted, last = whole.run(start, accepted)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
+        setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
         model = without_curves(_completed(fitted.model, accepted, setting))
     if accepted and losses:
         unmended = _with_the_losses(whole.record, raw, fitted, whole.layout, noise)

@@ -41,7 +41,7 @@ def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.iron_vectors.shape[0]
     step = setting.facts.rated_current_peak_a / max(setting.iron_flux_wb, 1e-9) * 0.01
     curve = tuple(
-        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > 2 else -np.inf)
+        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > count // 4 else -np.inf)
         for k in range(count)
     )
     return (*curve, _split("magnetizing_saturation"))

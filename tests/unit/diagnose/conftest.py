@@ -7,6 +7,7 @@ from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.model import Model
+from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import layout_for
 from commissioner.diagnose.plant import predict
 from commissioner.records import StandstillRecording
@@ -17,6 +18,7 @@ PLATE = {
     "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0,
     "switching_frequency_hz": 5000.0, "sample_period_s": PERIOD_S,
 }  # fmt: skip
+WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
 
 def recording(axes=(0.0, 60.0, 120.0), seconds=1.2, currents=None, link_v=540.0):
@@ -40,7 +42,7 @@ def setting_of(model, **about):
     currents = np.concatenate([predict(model, blank, k, layout).currents_a for k in range(len(blank.segments))], axis=1)
     record, _ = prepare([recording(currents=currents, **about)])
     layout, flux = layout_for(record, model)
-    record, lines = add_channels(record, model, layout)
+    record, lines = add_channels(record, model, layout, WHITE)
     return Setting(record, layout, flux, record.facts.current_peak_a * model.nominal[2], model.nominal[2], lines)
 
 
