@@ -45,6 +45,7 @@ SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
+DELAY_OR_LAG_TIE = 1e-5
 SAME_ORDER_TIE = 2e-3
 NEARLY_ALL, LEFT_TIE = 0.001, 0.1
 """A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
@@ -216,8 +217,12 @@ def _cause(
 
 
 def _share_open(name: str, rival: str) -> float:
-    """Share of a gain within which two networks of the same order are the same to the terminals, whatever fits better."""
-    return SAME_ORDER_TIE if {name, rival} == SAME_ORDER else 0.0
+    """Share of a gain within which two causes are the same to the terminals, whatever fits better: networks of the same
+
+    order; a delay and a lag, whose currents are taken as straight between the samples.
+    """
+    shares = {SAME_ORDER: SAME_ORDER_TIE, frozenset({"sampling_delay", "sensor_lag"}): DELAY_OR_LAG_TIE}
+    return shares.get(frozenset({name, rival}), 0.0)
 
 
 def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:

@@ -30,6 +30,8 @@ EXPLORED = (45_000, 180_000)
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
 MENDED_SHARE = 0.7
+UNKNOWN_SIGMA = 0.25
+"""Where so much of the noise's rms is left, no cause makes it: nothing to be gained by settling the others."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,9 @@ def search(
             losses += more
             whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
-    fitted, layout = settled(fitted, whole.record, whole.layout, noise)
+    layout, count = whole.layout, float(fitted.normal.count.sum())
+    if fitted.chi2 - count < UNKNOWN_SIGMA**2 * count:
+        fitted, layout = settled(fitted, whole.record, layout, noise)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
         whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]

@@ -26,6 +26,13 @@ def test_two_causes_are_both_named_and_nothing_else_is(seed):
     assert all(any(class_of(name) & names for name in hidden) for names in named), (hidden, named)
 
 
+@pytest.mark.parametrize("seed", [1100059, pytest.param(1000030, marks=pytest.mark.campaign)])
+def test_a_lag_beside_a_clock_that_drifts_is_no_delay_and_cable(seed):
+    seen, scenario = diagnosed(Case("two" if seed == 1100059 else "three", seed))
+    assert {"sensor_lag", "clock_drift"} <= hidden_names(scenario)
+    assert {c.name for c in seen.causes} == hidden_names(scenario)
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", [60, 62])
 def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
