@@ -87,6 +87,11 @@ def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
 
 
+def is_plausible_in(model: Model, name: str, setting: Setting) -> bool:
+    """As `is_plausible`, of the effect's numbers in a model."""
+    return is_plausible(name, CATALOGUE[name].sizes(setting, model.of(name)), setting.facts.current_peak_a)
+
+
 def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:
     """Delta chi2 of each effect, the others free (linear, at the fit)."""
     return {name: loss_without(fitted, name) for name in names}

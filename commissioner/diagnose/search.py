@@ -78,14 +78,14 @@ def search(
     regrouped: set[frozenset[str]] = set()
     for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
         part = record if samples == record.samples else record.beginning(samples)
-        whole = Steps(part, layout, replace(setting, record=part), noise, names, report, record, go_on)
+        whole = Steps(replace(setting, record=part), noise, names, report, record, go_on)
         whole.regrouped = regrouped
         start = fit(model, part, layout, noise)
         if not np.isfinite(start.chi2):
             # what fitted the smaller part runs away beyond it
             start, accepted = fit(nominal.model, part, layout, noise), ()
         if accepted or part is record:
-            start = whole.with_new_flux_before(whole.relayout(start))
+            start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
         fitted, accepted, last = whole.run(start, accepted)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
         setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
