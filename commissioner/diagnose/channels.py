@@ -35,8 +35,10 @@ AT_A_TONE = 4.0
 """Lines beside an excited one that count as its own."""
 BY_CHANCE = 1e-6
 """Chance with which noise makes a line at one frequency that counts as seen."""
-SAME_LINE = 0.2
-"""Turns by which two frequencies may come apart over the recording."""
+SAME_LINE = 0.02
+"""Turns by which two frequencies may come apart in a segment: every segment has its own phase."""
+LINES = {"ripple": "dc_link_ripple", "mains": "mains_pickup"}
+"""The causes that ride on each kind of line."""
 
 
 def add_channels(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Record, dict[str, float]]:
@@ -50,18 +52,22 @@ def add_channels(record: Record, model: Model, layout: Layout, noise: Noise) -> 
 def with_clearer_lines(
     record: Record, model: Model, layout: Layout, noise: Noise, lines: Mapping[str, float], kept: Sequence[str]
 ) -> tuple[Record, Mapping[str, float]]:
-    """The record with the lines that a better model shows where they differ from `lines` (but for those of the `kept` kinds):
+    """The record with the lines that a better model shows where they differ from `lines`: a strong cause that was not in the
 
-    a strong cause that was not in the model hides them.
+    model hides them. Lines of the `kept` kinds, which the model has, stay near where they are.
     """
-    residuals = each_segment(lambda k: record.segments[k].currents_a - predict(model, record, k, layout).currents_a, record)
-    span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
+    # what the model has of a line is in the residual as well where the line is looked for
+    bare = model
+    for kind in kept:
+        bare = bare.without(LINES[kind])
+    residuals = each_segment(lambda k: record.segments[k].currents_a - predict(bare, record, k, layout).currents_a, record)
     readings = len(residuals)
     clear = float(gammainccinv(readings, BY_CHANCE) / gammainccinv(readings, 0.5))
+    longest = max(s.count for s in record.segments) * record.facts.sample_period_s
     fresh: dict[str, float] = {}
     for (old, known), (new, (frequency, ratio)) in zip(lines.items(), _lines(record, residuals, model, noise).items(), strict=True):
-        is_same = old == new and abs(frequency - known) * span < SAME_LINE
-        is_old = is_same or ratio < clear or new.partition("_")[0] in kept
+        is_same = old == new and abs(frequency - known) * longest < SAME_LINE
+        is_old = is_same or ratio < clear or (old != new and new.partition("_")[0] in kept)
         fresh |= {old: known} if is_old else {new: frequency}
     return (record, lines) if fresh == lines else (_with_lines(record, fresh), fresh)
 

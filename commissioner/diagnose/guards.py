@@ -21,7 +21,6 @@ SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
     frozenset({"shaft_motion", "remanence"}): 0.05, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
-    frozenset({"remanence", "sensor_offset"}): 2e-3, frozenset({"remanence", "sensor_drift"}): 2e-3,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
@@ -32,6 +31,12 @@ TONE_TO_TONE = 0.05
 """As CLASS_GUARD, for a ripple whose side lines fall from one tone to another, beside linear causes."""
 RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
+LINES_OF_THEIR_OWN = frozenset({"dc", "non-periodic"})
+"""Families that act where the tones and their multiples are not."""
+EXACT_GUARD = 2e-3
+"""As CLASS_GUARD, beside an accepted cause of exact form."""
+APART_GUARD = 1e-4
+"""As RIGID_GUARD, where what the one may leave and what the other makes lie at other frequencies."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
@@ -62,10 +67,13 @@ def guard_of_lost_samples(fitted: Fit) -> float:
 def _share_left(accepted: str, name: str) -> float:
     if accepted in SHAPED:
         return GUARD
-    share = 0.0 if accepted in EXACT else RIGID_GUARD
     if accepted in CATALOGUE[name].confounders or name in CATALOGUE[accepted].confounders:
-        share = max(share, PAIR_GUARDS.get(frozenset({accepted, name}), CLASS_GUARD))
-    return share
+        plain = EXACT_GUARD if accepted in EXACT and accepted not in LINEAR else CLASS_GUARD
+        return PAIR_GUARDS.get(frozenset({accepted, name}), plain)
+    if accepted in EXACT:
+        return 0.0
+    first, second = CATALOGUE[accepted].family, CATALOGUE[name].family
+    return APART_GUARD if first != second and {first, second} & LINES_OF_THEIR_OWN else RIGID_GUARD
 
 
 def meets_tones(record: Record, setting: Setting) -> bool:

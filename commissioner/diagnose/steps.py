@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channels import with_clearer_lines
+from commissioner.diagnose.channels import LINES, with_clearer_lines
 from commissioner.diagnose.dictionaries import following, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, as_a_lag, large_delay, regrouped
@@ -35,7 +35,8 @@ RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
 HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
-LINES = {"ripple": "dc_link_ripple", "mains": "mains_pickup"}
+MOST_LOOKS = 3
+"""Times that lines are looked for again: once they are, what was beside them is known better."""
 STEPS_GUARD = 2e-2
 """As GUARD, of the power of coarse converter steps, which repeat with the signal and look a little like anything."""
 LARGE_REST, CRUMB = 0.3, 0.08
@@ -56,6 +57,7 @@ class Steps:
         self.implausible: list[str] = []
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
+        self.looks = 0
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in self.record.segments]) ** 2)))
@@ -97,8 +99,9 @@ class Steps:
             if step is None:
                 current, accepted, _ = self._backward(current, accepted, accepted)
                 other = None if is_over else self._exchanged(current, accepted)
-                if other is None and not is_over and accepted and self._shows_clearer_lines(current, accepted):
-                    continue
+                if other is None and not is_over and accepted:
+                    clearer = self._with_clearer_lines(current, accepted)
+                    other = None if clearer is None else (clearer, accepted)
                 if other is None:
                     return current, accepted, screening
                 current, accepted = other
@@ -114,16 +117,17 @@ class Steps:
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = set(dropped)
 
-    def _shows_clearer_lines(self, current: Fit, accepted: Sequence[str]) -> bool:
-        """Whether the model with the accepted causes shows ripple or mains at frequencies that were not looked at yet."""
+    def _with_clearer_lines(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
+        """The fit where ripple or mains lie at other frequencies than were looked at so far, once the causes are in the model."""
         kept = [kind for kind, name in LINES.items() if name in accepted]
         full, lines = with_clearer_lines(self.full, current.model, self.layout, self.noise, self.setting.lines_hz, kept)
-        if lines == self.setting.lines_hz:
-            return False
+        if lines == self.setting.lines_hz or self.looks == MOST_LOOKS:
+            return None
+        self.looks += 1
         self.report(f"  looking at {', '.join(f'{name} ({hz:.2f} Hz)' for name, hz in lines.items())}")
         self.full, self.setting = full, replace(self.setting, record=self._part_of(full), lines_hz=lines)
         self.ripple_meets_tones = meets_tones(full, self.setting)
-        return True
+        return fit(current.model, self.record, self.layout, self.noise) if kept else current
 
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
