@@ -21,10 +21,12 @@ SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
     frozenset({"shaft_motion", "remanence"}): 0.05, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+    frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
-segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly.)"""
+segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly, and so does a shaft, which moves
+current across the axis.)"""
 LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
 """Causes that only turn and scale the excited lines: any two of them can look like a third."""
 TONE_TO_TONE = 0.05
