@@ -20,7 +20,7 @@ CLASS_GUARD = 1e-2
 SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
-    frozenset({"shaft_motion", "remanence"}): 0.05, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+    frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
     frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
@@ -35,10 +35,12 @@ RIGID_GUARD = 1e-3
 """As GUARD, beside an accepted cause whose form has few numbers."""
 LINES_OF_THEIR_OWN = frozenset({"dc", "non-periodic"})
 """Families that act where the tones and their multiples are not."""
+ALIKE_ON_ALL_AXES = frozenset({"linear", "axis"})
+"""What a linear cause leaves is the same on every axis: nothing that an anisotropy or gains would take."""
 EXACT_GUARD = 2e-3
 """As CLASS_GUARD, beside an accepted cause of exact form."""
 APART_GUARD = 1e-4
-"""As RIGID_GUARD, where what the one may leave and what the other makes lie at other frequencies."""
+"""As RIGID_GUARD, where what the one may leave and what the other makes lie at other frequencies, or axes."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
@@ -75,7 +77,8 @@ def _share_left(accepted: str, name: str) -> float:
     if accepted in EXACT:
         return 0.0
     first, second = CATALOGUE[accepted].family, CATALOGUE[name].family
-    return APART_GUARD if first != second and {first, second} & LINES_OF_THEIR_OWN else RIGID_GUARD
+    is_apart = {first, second} & LINES_OF_THEIR_OWN or {first, second} == ALIKE_ON_ALL_AXES
+    return APART_GUARD if first != second and is_apart else RIGID_GUARD
 
 
 def meets_tones(record: Record, setting: Setting) -> bool:
