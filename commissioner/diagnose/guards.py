@@ -39,8 +39,8 @@ ALIKE_ON_ALL_AXES = frozenset({"linear", "axis"})
 """What a linear cause leaves is the same on every axis: nothing that an anisotropy or gains would take."""
 EXACT_GUARD = 2e-3
 """As CLASS_GUARD, beside an accepted cause of exact form."""
-APART_GUARD = 1e-4
-"""As RIGID_GUARD, where what the one may leave and what the other makes lie at other frequencies, or axes."""
+APART = 0.1
+"""Factor on a guard where what the one may leave and what the other makes lie at other frequencies, or axes."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
@@ -69,16 +69,17 @@ def guard_of_lost_samples(fitted: Fit) -> float:
 
 
 def _share_left(accepted: str, name: str) -> float:
+    mine, other = CATALOGUE[accepted], CATALOGUE[name]
     if accepted in SHAPED:
-        return GUARD
-    if accepted in CATALOGUE[name].confounders or name in CATALOGUE[accepted].confounders:
+        return APART * GUARD if other.family == "non-periodic" else GUARD
+    if accepted in other.confounders or name in mine.confounders:
         plain = EXACT_GUARD if accepted in EXACT and accepted not in LINEAR else CLASS_GUARD
         return PAIR_GUARDS.get(frozenset({accepted, name}), plain)
     if accepted in EXACT:
         return 0.0
-    first, second = CATALOGUE[accepted].family, CATALOGUE[name].family
-    is_apart = {first, second} & LINES_OF_THEIR_OWN or {first, second} == ALIKE_ON_ALL_AXES
-    return APART_GUARD if first != second and is_apart else RIGID_GUARD
+    families = {mine.family, other.family}
+    is_apart = len(families) == 2 and (families & LINES_OF_THEIR_OWN or families == ALIKE_ON_ALL_AXES)
+    return APART * RIGID_GUARD if is_apart else RIGID_GUARD
 
 
 def meets_tones(record: Record, setting: Setting) -> bool:
