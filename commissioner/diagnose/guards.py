@@ -115,7 +115,7 @@ def loss_without(current: Fit, name: str) -> float:
     """How much chi2 rises to first order when the effect's numbers go to zero and the others re-adjust."""
     mine, information = current.information_of(name)
     value = current.model.theta[mine]
-    return float(value @ information @ value)
+    return max(float(value @ information @ value), 0.0)
 
 
 def effects_of(model: Model) -> tuple[str, ...]:

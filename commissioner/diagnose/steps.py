@@ -125,9 +125,12 @@ class Steps:
             return None
         self.looks += 1
         self.report(f"  looking at {', '.join(f'{name} ({hz:.2f} Hz)' for name, hz in lines.items())}")
-        self.full, self.setting = full, replace(self.setting, record=self._part_of(full), lines_hz=lines)
-        self.ripple_meets_tones = meets_tones(full, self.setting)
-        return fit(current.model, self.record, self.layout, self.noise) if kept else current
+        setting = replace(self.setting, record=self._part_of(full), lines_hz=lines)
+        again = fit(current.model, setting.record, self.layout, self.noise) if kept else current
+        if not np.isfinite(again.chi2):
+            return None
+        self.full, self.setting, self.ripple_meets_tones = full, setting, meets_tones(full, setting)
+        return again
 
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
@@ -203,7 +206,9 @@ class Steps:
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
             if holds_place or loss < 10.0 * wanted or not is_plausible_in(current.model, name, self.setting):
                 trial = fit(current.model.without(name), self.record, self.layout, self.noise)
-                if trial.chi2 - current.chi2 < wanted or not is_plausible_in(current.model, name, self.setting):
+                is_idle = trial.chi2 - current.chi2 < wanted or not is_plausible_in(current.model, name, self.setting)
+                # what was left runs away alone: better an implausible cause than no model
+                if is_idle and np.isfinite(trial.chi2):
                     self.report(f"  dropped {name}")
                     current, accepted = trial, tuple(n for n in accepted if n != name)
                     every = losses_of(current, accepted)
@@ -222,8 +227,11 @@ class Steps:
         old, new = (np.array([s.flux_before_wb for s in r.segments]) for r in (self.record, record))
         if not np.isfinite(new).all() or np.abs(new - old).max() < 1e-3 * np.abs(new).max():
             return current
+        again = fit(current.model, record, self.layout, self.noise)
+        if not np.isfinite(again.chi2):
+            return current
         self.full, self.setting = full, replace(self.setting, record=record)
-        return fit(current.model, record, self.layout, self.noise)
+        return again
 
     def with_new_dictionaries(self, current: Fit) -> Fit:
         current, self.setting = following(current, self.setting, self.noise)
