@@ -95,7 +95,7 @@ def alternatives(
             if score.delta_chi2 < ALTERNATIVE_SHARE * gain:
                 continue
             trial = fit(without.model.with_terms(CATALOGUE[score.name].terms(setting)), record, layout, noise)
-            if is_plausible(score.name, CATALOGUE[score.name].sizes(setting, trial.model.of(score.name)), record.facts.current_peak_a):
+            if is_plausible(trial.model, score.name, setting):
                 rivals[score.name] = (trial.chi2 - found.chi2) * whole / record.samples
         out[name] = rivals
     return out

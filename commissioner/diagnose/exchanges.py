@@ -9,7 +9,7 @@ from dataclasses import replace
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, SAME_ORDER, is_plausible_in, loss_without
+from commissioner.diagnose.guards import LINEAR, SAME_ORDER, is_plausible, loss_without
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import impedance_starts
@@ -41,7 +41,7 @@ def large_delay(current: Fit, setting: Setting, noise: Noise, report: Report) ->
             trials.append(fit(model, record, layout, noise, tolerance=1.0))
     best = min(trials, key=lambda f: f.chi2)
     report(f"  try a large sampling_delay: gained {current.chi2 - best.chi2:.4g}")
-    return best if is_plausible_in(best.model, "sampling_delay", setting) else None
+    return best if is_plausible(best.model, "sampling_delay", setting) else None
 
 
 def as_a_lag(
@@ -67,7 +67,7 @@ def as_a_lag(
         wanted -= STATISTICAL_FLOOR if len(group) == len(mine) else 0.0
         trial = fit(started, setting.record, setting.layout, noise, wanted_chi2=wanted)
         report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
-        if trial.chi2 < wanted and all(is_plausible_in(trial.model, n, setting) for n in group):
+        if trial.chi2 < wanted and all(is_plausible(trial.model, n, setting) for n in group):
             return trial, (*(n for n in accepted if n not in mine), *group)
     return None
 
@@ -101,7 +101,7 @@ def regrouped(
         terms = [t for n in group for t in CATALOGUE[n].terms(setting)]
         trial = fit(without.model.with_terms(terms), record, layout, noise, wanted_chi2=wanted - numbers)
         is_sound = all(
-            is_plausible_in(trial.model, n, setting) and loss_without(trial, n) > threshold(screening.scores[n].numbers)
+            is_plausible(trial.model, n, setting) and loss_without(trial, n) > threshold(screening.scores[n].numbers)
             for n in group
         )
         report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")

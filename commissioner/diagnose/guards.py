@@ -8,7 +8,6 @@ import numpy as np
 
 from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.record import Record
@@ -91,19 +90,15 @@ def meets_tones(record: Record, setting: Setting) -> bool:
     return any(bool((np.abs(apart - f) < width).any()) for f in ripples)
 
 
-def is_plausible(name: str, sizes: Sizes, current_peak_a: float) -> bool:
+def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     """The sign physics demands; and a leg error that is at half its height before a fifth of the largest current."""
+    sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
     if sign and sizes and next(iter(sizes.values()))[0] * sign <= 0:
         return False
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
-    return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * current_peak_a
-
-
-def is_plausible_in(model: Model, name: str, setting: Setting) -> bool:
-    """As `is_plausible`, of the effect's numbers in a model."""
-    return is_plausible(name, CATALOGUE[name].sizes(setting, model.of(name)), setting.facts.current_peak_a)
+    return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * setting.facts.current_peak_a
 
 
 def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:

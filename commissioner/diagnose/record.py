@@ -116,13 +116,17 @@ class Record:
         channels = tuple(np.ascontiguousarray(self.channels[k][: s.count]) for k, s in zip(keep, cut, strict=True))
         return Record(tuple(cut), self.facts, self.channel_names, channels)
 
+    def first(self, samples: int) -> Record:
+        """So many samples from the beginning of every segment."""
+        return self.subset(tuple(range(len(self.segments))), samples)
+
     def share_of(self, samples: int) -> int:
         """Samples of each segment when all of them get so many together; some tenths of a second at least."""
         return max(samples // max(len(self.segments), 1), LEAST_SHARE)
 
     def beginning(self, samples: int) -> Record:
         """The first part of every segment, about so many samples together."""
-        return self.subset(tuple(range(len(self.segments))), self.share_of(samples))
+        return self.first(self.share_of(samples))
 
 
 def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Result]:

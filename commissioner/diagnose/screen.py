@@ -83,7 +83,7 @@ def screen(
     """
     whole = record.samples
     if whole > SCREENED_SAMPLES:
-        record = record.subset(tuple(range(len(record.segments))), SCREENED_SAMPLES // len(record.segments))
+        record = record.first(SCREENED_SAMPLES // len(record.segments))
     candidates = {name: CATALOGUE[name].terms(setting) for name in absent}
     candidates = {name: terms for name, terms in candidates.items() if terms}
     wanted = [*model.terms, *(t for terms in candidates.values() for t in terms)]

@@ -17,7 +17,7 @@ from commissioner.diagnose.dictionaries import following, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, as_a_lag, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, effects_of, guard, is_plausible_in, losses_of, meets_tones
+from commissioner.diagnose.guards import LINEAR, effects_of, guard, is_plausible, losses_of, meets_tones
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import with_flux_before
@@ -154,10 +154,10 @@ class Steps:
             )
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
-            is_plausible = is_plausible_in(trial.model, score.name, self.setting)
-            if not is_plausible:
+            is_sound = is_plausible(trial.model, score.name, self.setting)
+            if not is_sound:
                 self.implausible.append(score.name)
-            if gain < wanted or not is_plausible:
+            if gain < wanted or not is_sound:
                 if required_chi2(score.numbers) < gain:
                     self.below.append(score.name)
                 continue
@@ -204,9 +204,9 @@ class Steps:
             wanted = max(self._guard(losses, name), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
-            if holds_place or loss < 10.0 * wanted or not is_plausible_in(current.model, name, self.setting):
+            if holds_place or loss < 10.0 * wanted or not is_plausible(current.model, name, self.setting):
                 trial = fit(current.model.without(name), self.record, self.layout, self.noise)
-                is_idle = trial.chi2 - current.chi2 < wanted or not is_plausible_in(current.model, name, self.setting)
+                is_idle = trial.chi2 - current.chi2 < wanted or not is_plausible(current.model, name, self.setting)
                 # what was left runs away alone: better an implausible cause than no model
                 if is_idle and np.isfinite(trial.chi2):
                     self.report(f"  dropped {name}")
@@ -216,7 +216,7 @@ class Steps:
         return current, accepted, dropped
 
     def _part_of(self, full: Record) -> Record:
-        return full.subset(tuple(range(len(full.segments))), max(s.count for s in self.record.segments))
+        return full.first(max(s.count for s in self.record.segments))
 
     def with_new_flux_before(self, current: Fit) -> Fit:
         """The flux each segment inherits, by the improved model: a wrong one would pass for remanence."""

@@ -40,22 +40,20 @@ def sense(
     late = late / period + lags[is_short].sum()
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
-    if not is_short.all():
+    if is_short.all():
+        current, slope = resample_hermite(current, after, before, late, period) if late.any() else (current, before)
+        lag_slopes = [-slope, -slope]
+    else:
         long = np.where(is_short, 0.0, lags)
         for row in rows:
             jacobian[row] = low_pass(jacobian[row], long)
-        lag_slopes = [_by_lag(current, long, k, late) / period for k in range(lags.size)] if LAG in at_work else []
+        is_asked = any(t.kind == LAG for t in listed)
+        lag_slopes = [_by_lag(current, long, k, late) / period for k in range(lags.size)] if is_asked else []
         current, slope = behind(current, long, late)
         slope = slope / period
-    elif late.any():
-        current, slope = resample_hermite(current, after, before, late, period)
-    else:
-        slope = before
     if late.any():
         for row in rows:
             jacobian[row] = resample(jacobian[row], late)
-    if is_short.all():
-        lag_slopes = [-slope, -slope]
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
