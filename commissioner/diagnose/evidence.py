@@ -21,7 +21,7 @@ from commissioner.diagnose.screen import screen
 Array = NDArray[np.float64]
 TIE_CHI2 = 10.0
 ALTERNATIVE_SHARE = 0.9
-"""An alternative is refitted only if it promises this share of the cause's own gain."""
+"""An alternative is refitted only if it promises this share of the cause's own gain, or of what that one promises."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +89,12 @@ def alternatives(
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
         gain = without.chi2 - found.chi2
         absent = [n for n in CATALOGUE if n not in accepted and n not in excluded]
-        screening = screen(without.model, record, layout, noise, setting, absent)
+        screening = screen(without.model, record, layout, noise, setting, [*absent, name])
+        # where the way to a cause bends, its own promise falls short as its rivals' do
+        own = screening.scores[name].delta_chi2 if name in screening.scores else gain
         rivals: dict[str, float] = {}
-        for score in screening.ranked()[:3]:
-            if score.delta_chi2 < ALTERNATIVE_SHARE * gain:
+        for score in [s for s in screening.ranked() if s.name != name][:3]:
+            if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
             trial = fit(without.model.with_terms(CATALOGUE[score.name].terms(setting)), record, layout, noise)
             if is_plausible(trial.model, score.name, setting):

@@ -53,7 +53,7 @@ def as_a_lag(
     """
     mine = tuple(n for n in accepted if n in LATE)
     model = current.model
-    late = model.total(kinds.DELAY) + float(model.sum_kind(kinds.LAG, 2).sum()) or 0.5 * setting.facts.sample_period_s
+    late = model.total(kinds.DELAY) + model.total(kinds.LAG) or 0.5 * setting.facts.sample_period_s
     for name in mine:
         model = model.without(name)
     cost = sum(required_chi2(sum(t.effect == n for t in current.model.terms)) for n in mine)

@@ -20,6 +20,8 @@ from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
 TRIFLE = 1e-4
+DULL, DULL_ROUNDS = 5e-4, 3
+"""A fit that gained less than this share of what the noise does not explain, so often in a row, creeps along a valley: enough."""
 PATIENCE = 10.0
 """A fit that must gain so much goes on while this many times its next step's promise would get it there."""
 SLICE = 12 * 1024
@@ -215,8 +217,10 @@ def fit(
     normal = normal_equations(model, record, layout, model.terms, noise)
     if not np.isfinite(normal.total_gram).all():
         return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)
+    dull = 0
     for done in range(rounds):
-        enough = max(tolerance, TRIFLE * (normal.total_chi2 - float(normal.count.sum())))
+        unexplained = normal.total_chi2 - float(normal.count.sum())
+        enough = max(tolerance, TRIFLE * unexplained)
         low, high = limits(model, layout)
         theta = model.theta
         improved = was_shortened = False
@@ -246,7 +250,8 @@ def fit(
         damping = max(damping, 1e-9)
         if report:
             report(f"round {done}: chi2 {normal.total_chi2:.1f}")
-        if gained < enough:
+        dull = dull + 1 if gained < DULL * unexplained else 0
+        if gained < enough or dull == DULL_ROUNDS:
             return Fit(model, normal, True, done)
     return Fit(model, normal, False, rounds)
 

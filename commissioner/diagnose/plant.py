@@ -54,7 +54,9 @@ def predict(
         _to_phases(
             _tangent(path, segment, channels, layout, at_work, indices), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)]
         )
-    measured = sense(model, record, segment, channels, layout, (path.current, path.after, path.before), jacobian, listed)
+    held_v = segment.voltage_ab_v * path.drive[2]
+    trajectory = (path.current, path.after, path.before)
+    measured = sense(model, record, segment, channels, layout, trajectory, held_v, jacobian, listed)
     nu = path.machine[0][4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
     leakage = (path.states[:-1, 0:2] - path.machine[0][12] * path.states[:-1, 2:4]).T

@@ -64,3 +64,9 @@ def resample(values: Array, late: Array) -> Array:
     out = np.empty_like(values)
     _lagrange(np.ascontiguousarray(values), np.ascontiguousarray(late, dtype=np.float64), out)
     return out
+
+
+def held_at(steps: Array, late: Array) -> Array:
+    """Rows (rows, n) that are held from each sample on, at `k - late[k]` samples; at a sample, what was held until there."""
+    at = np.ceil(np.arange(steps.shape[1]) - late).astype(np.intp) - 1
+    return np.where(at < 0, 0.0, steps[:, np.clip(at, 0, steps.shape[1] - 1)])

@@ -32,6 +32,8 @@ MENDED = 3
 MENDED_SHARE = 0.7
 UNKNOWN_SIGMA = 0.25
 """Where so much of the noise's rms is left, no cause makes it: nothing to be gained by settling the others."""
+HOPELESS_SIGMA, HOPELESS_SHARE = 0.3, 0.05
+"""Where a part's search ends with so much of the noise's rms, and of the error there was to explain, the whole finds no more."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ def search(
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
     regrouped: set[frozenset[str]] = set()
+    is_hopeless = False
     for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
         part = record if samples == record.samples else record.beginning(samples)
         whole = Steps(replace(setting, record=part), noise, names, report, record, go_on)
@@ -86,7 +89,8 @@ def search(
             start, accepted = fit(nominal.model, part, layout, noise), ()
         if accepted or part is record:
             start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
-        fitted, accepted, last = whole.run(start, accepted)
+        fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
+        is_hopeless = _is_hopeless(fitted, nominal)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
         setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
         model = without_curves(_completed(fitted.model, accepted, setting))
@@ -115,6 +119,11 @@ def search(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
         tuple(whole.below), losses_of(fitted, accepted), losses, go_on(),
     )
+
+
+def _is_hopeless(fitted: Fit, nominal: Fit) -> bool:
+    left, before = (f.chi2 / float(f.normal.count.sum()) - 1.0 for f in (fitted, nominal))
+    return left > max(HOPELESS_SIGMA**2, HOPELESS_SHARE * before)
 
 
 def _mended(

@@ -154,7 +154,7 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 
 def _spare(model: Model) -> list[list[int]]:
-    """Rows of theta that may as well be zero: of each memory operator and second path, and of what only refines a clock or a delay."""
+    """Rows of theta that may as well be zero: each memory operator and second path, and what only refines a clock, a delay or a lag."""
     rows = list(enumerate(model.terms, 4))
-    refining = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY)]
+    refining = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY, kinds.LAG)]
     return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in refining if group]

@@ -87,14 +87,15 @@ class Steps:
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)
 
-    def run(self, start: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...], Screening]:
+    def run(self, start: Fit, accepted: tuple[str, ...], *, adds: bool = True) -> tuple[Fit, tuple[str, ...], Screening]:
+        """The fit, the accepted causes and the last screening from a start that has some; `adds` False: none is added."""
         current, self.setting = with_finer_curves(start, self.setting, self.noise, self.report)
         refused: set[str] = set()
         while True:
             absent = [n for n in self.names if n not in accepted]
             screening = screen(current.model, self.record, self.layout, self.noise, self.setting, absent)
             self.first = self.first or screening
-            is_over = len(accepted) >= MOST_CAUSES or not self.go_on()
+            is_over = not adds or len(accepted) >= MOST_CAUSES or not self.go_on()
             step = None if is_over else self._forward(current, screening, refused)
             if step is None:
                 current, accepted, _ = self._backward(current, accepted, accepted)

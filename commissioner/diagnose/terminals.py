@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import COUNT, current_lost, in_all, slope_lost
 from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
-from commissioner.diagnose.lag import SHORT_LAG, behind, low_pass
 from commissioner.diagnose.model import Layout, Model, Term
+from commissioner.diagnose.reading import conductance_per_volt, reading
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
-from commissioner.diagnose.resample import resample, resample_hermite
 
 Array = NDArray[np.float64]
 
 
 def sense(
     model: Model, record: Record, segment: Segment, channels: Array, layout: Layout,
-    trajectory: tuple[Array, Array, Array], jacobian: Array, listed: Sequence[Term],
+    trajectory: tuple[Array, Array, Array], held_v: Array, jacobian: Array, listed: Sequence[Term],
 ) -> Array:
     """From terminal currents to what the sensors report: cable, delay, lag, nonlinearity, gain, offset, pickup."""
     phases = record.facts.phases
@@ -31,29 +30,17 @@ def sense(
     if capacitance.any() or any(t.kind == CABLE for t in listed):
         edges = _edges(to_phases @ segment.voltage_ab_v / period)
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
-    at_work = {t.kind for t in (*model.terms, *listed)}
-    clock = 1e-6 * _clock(segment) if CLOCK in at_work else np.zeros((0, segment.count))
-    turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
-    late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
-    lags = model.sum_kind(LAG, 2) / period
-    is_short = lags < SHORT_LAG
-    late = late / period + lags[is_short].sum()
+    reader = reading(model, segment, listed)
+    held = to_phases @ held_v
+    per_volt, grows = conductance_per_volt(model)
+    steps, at_samples = per_volt * held, current
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
-    if is_short.all():
-        current, slope = resample_hermite(current, after, before, late, period) if late.any() else (current, before)
-        lag_slopes = [-slope, -slope]
-    else:
-        long = np.where(is_short, 0.0, lags)
+    current, slope = reader.of(at_samples, after, before, steps)
+    if reader.lag or reader.late.any():
         for row in rows:
-            jacobian[row] = low_pass(jacobian[row], long)
-        is_asked = any(t.kind == LAG for t in listed)
-        lag_slopes = [_by_lag(current, long, k, late) / period for k in range(lags.size)] if is_asked else []
-        current, slope = behind(current, long, late)
-        slope = slope / period
-    if late.any():
-        for row in rows:
-            jacobian[row] = resample(jacobian[row], late)
+            is_conductance = row > 3 and listed[row - 4].kind == kinds.IRON_LOSS
+            jacobian[row] = reader.of_row(jacobian[row], grows * listed[row - 4].step * held if is_conductance else None)
     scale = layout.nonlinearity_scale_a
     gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
     s = current / scale
@@ -72,12 +59,8 @@ def sense(
             sensed[term.index % 3] += value * channels[:, term.index // 3]
     for k, term in enumerate(listed):
         row = jacobian[4 + k]
-        if term.kind == DELAY:
-            row[:] = -slope * turns[term.index]
-        elif term.kind == LAG:
-            row[:] = lag_slopes[term.index]
-        elif term.kind == CLOCK:
-            row[:] = -slope * clock[term.index]
+        if term.kind in (DELAY, LAG, CLOCK):
+            row[:] = reader.derivatives(term, at_samples, steps, slope)
         elif term.kind == OFFSET:
             row[term.index] = 1.0
         elif term.kind == DRIFT:
@@ -127,32 +110,8 @@ def _ages(record: Record, segment: Segment) -> list[Array]:
     return [age, *settling, np.sin(turn * age) / turn, (1.0 - np.cos(turn * age)) / turn]
 
 
-def _delays(segment: Segment) -> Array:
-    """Delay (s) per unit at every sample: alike, and longer for every other one."""
-    return np.stack([np.ones(segment.count), np.where(np.arange(segment.count) % 2, -1.0, 1.0)])
-
-
-def _clock(segment: Segment) -> Array:
-    """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
-
-    and fro within it (cosine and sine).
-    """
-    elapsed = segment.time_s - segment.time_s[0]
-    turn = 2.0 * np.pi / max(segment.count * segment.period_s, 1e-9)
-    return np.stack([elapsed, np.sin(turn * elapsed) / turn, (1.0 - np.cos(turn * elapsed)) / turn])
-
-
 def _edges(voltage_per_period: Array) -> list[Array]:
     """Step of the command at, before and after each sample, over the period."""
     edge = np.diff(voltage_per_period, axis=1, prepend=0.0)
     none = np.zeros((edge.shape[0], 1))
     return [edge, np.hstack([none, edge[:, :-1]]), np.hstack([edge[:, 1:], none])]
-
-
-def _by_lag(current: Array, lags: Array, k: int, late: Array) -> Array:
-    """Derivative of the lagged current by one lag (samples); by one that is not there as by a delay."""
-    if not lags[k]:
-        return -behind(current, lags, late)[1]
-    h = 1e-3 * lags[k] * (np.arange(lags.size) == k)
-    more, less = (behind(current, moved, late)[0] for moved in (lags + h, lags - h))
-    return np.asarray((more - less) / (2e-3 * lags[k]))

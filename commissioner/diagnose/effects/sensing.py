@@ -33,8 +33,11 @@ def sampling_delay(setting: Setting) -> tuple[Term, ...]:
     )
 
 
+MOST_RESONANT = 0.5
+
+
 def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"time_constant_us": (sum(values.values()) * 1e6, "us")}
+    return {"time_constant_us": (values["lag"] * 1e6, "us")}
 
 
 @effect(
@@ -45,8 +48,14 @@ def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
 )
 def sensor_lag(setting: Setting) -> tuple[Term, ...]:
-    """Time constants >= 0 [s] of two lags in a row; the size is their sum."""
-    return tuple(Term("sensor_lag", symbol, "s", LAG, k, 1e-6, 0.0, 0.02) for k, symbol in enumerate(("lag", "second_lag")))
+    """Sum S >= 0 [s] of the time constants of 1 / (1 + s S + s² q S²) and its shape q: 0 one lag, 1/4 two equal ones, 1/2
+
+    Butterworth's. The size is the sum.
+    """
+    return (
+        Term("sensor_lag", "lag", "s", LAG, 0, 1e-6, 0.0, 0.02),
+        Term("sensor_lag", "shape", "1", LAG, 1, 1e-2, 0.0, MOST_RESONANT),
+    )
 
 
 def _offset_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:

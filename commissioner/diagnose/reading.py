@@ -1,0 +1,112 @@
+"""When, and behind which filter, a channel reads the current: delay, wandering clock and lag in one place.
+
+The current is cubic between samples, and steps where the held voltage does by what a conductance across the terminals draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.kinds import CLOCK, DELAY, IRON_LOSS, LAG
+from commissioner.diagnose.lag import SHORT_LAG, behind, by_lag, by_shape, low_pass
+from commissioner.diagnose.model import Model, Term
+from commissioner.diagnose.record import Segment
+from commissioner.diagnose.resample import held_at, resample, resample_hermite
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """`late` (n,) in samples; the filter's `lag` in samples, 0 for none, and its `shape`; `turns` and `clock` (k, n) delays in s
+
+    per unit of their numbers.
+    """
+
+    late: Array
+    lag: float
+    shape: float
+    period_s: float
+    turns: Array
+    clock: Array
+
+    def of(self, current: Array, after: Array, before: Array, steps: Array) -> tuple[Array, Array]:
+        """Values and slopes (1/s) read of a current (rows, n) with its slopes at the samples; `steps` (rows, n) its part that is
+
+        held from each sample on.
+        """
+        if self.lag:
+            value, slope = behind(current - _before(steps), steps, self.lag, self.shape, self.late)
+            return value, slope / self.period_s
+        if not self.late.any():
+            return current, before
+        value, slope = resample_hermite(current - _before(steps), after, before, self.late, self.period_s)
+        return value + held_at(steps, self.late), slope
+
+    def of_row(self, row: Array, steps: Array | None = None) -> Array:
+        """A derivative (rows, n) of the current as it is read."""
+        if steps is not None:
+            apart = self.of_row(row - _before(steps))
+            if not self.lag:
+                return apart + held_at(steps, self.late)
+            return apart + self._late(low_pass(steps, self.lag, self.shape, "zoh"))
+        return self._late(low_pass(row, self.lag, self.shape) if self.lag else row)
+
+    def _late(self, row: Array) -> Array:
+        return resample(row, self.late) if self.late.any() else row
+
+    def derivatives(self, term: Term, current: Array, steps: Array, slope: Array) -> Array:
+        """By a number of the reading itself, from the current at the samples and the slope that was read."""
+        if term.kind == DELAY:
+            return np.asarray(-slope * self.turns[term.index])
+        if term.kind == CLOCK:
+            return np.asarray(-slope * self.clock[term.index])
+        if not self.lag:
+            return np.asarray(-slope if term.index == 0 else np.zeros_like(slope))
+        smooth = current - _before(steps)
+        if term.index == 0:
+            return by_lag(smooth, steps, self.lag, self.shape, self.late) / self.period_s
+        return by_shape(smooth, steps, self.lag, self.shape, self.late)
+
+
+def reading(model: Model, segment: Segment, listed: Sequence[Term]) -> Reading:
+    """Of one segment, from the model's delay, clock and lag; `listed`: numbers whose derivatives will be asked for."""
+    at_work = {t.kind for t in (*model.terms, *listed)}
+    turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
+    clock = 1e-6 * _clock(segment) if CLOCK in at_work else np.zeros((0, segment.count))
+    late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
+    period = segment.period_s
+    lag, shape = model.total(LAG) / period, model.total(LAG, 1)
+    is_short = lag < SHORT_LAG
+    return Reading(late / period + (lag if is_short else 0.0), 0.0 if is_short else lag, shape, period, turns, clock)
+
+
+def conductance_per_volt(model: Model) -> tuple[float, float]:
+    """What each volt of the held voltage draws at once, A/V, and how that grows with the conductance: (4) of `trajectory`."""
+    conductance = model.total(IRON_LOSS)
+    shrink = 1.0 / (1.0 + conductance * model.nominal[0])
+    return conductance * shrink, shrink**2
+
+
+def _before(steps: Array) -> Array:
+    """The part held until each sample: what the sample itself still shows."""
+    return np.hstack([np.zeros((steps.shape[0], 1)), steps[:, :-1]])
+
+
+def _delays(segment: Segment) -> Array:
+    """Delay (s) per unit at every sample: alike, and longer for every other one."""
+    return np.stack([np.ones(segment.count), np.where(np.arange(segment.count) % 2, -1.0, 1.0)])
+
+
+def _clock(segment: Segment) -> Array:
+    """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
+
+    and fro within it (cosine and sine).
+    """
+    elapsed = segment.time_s - segment.time_s[0]
+    turn = 2.0 * np.pi / max(segment.count * segment.period_s, 1e-9)
+    return np.stack([elapsed, np.sin(turn * elapsed) / turn, (1.0 - np.cos(turn * elapsed)) / turn])
