@@ -22,9 +22,9 @@ STEP, SHAPE_STEP = 1e-3, 5e-3
 """Of the sum, relative, and of the shape, for derivatives."""
 
 
-def low_pass(signal: Array, lag: float, shape: float, hold: str = "foh") -> Array:
-    """`signal` (..., n) behind the filter, at the samples: straight between them, or held from each (`hold` "zoh")."""
-    return _filtered(signal, lag, shape, (1.0,), hold)
+def low_pass(signal: Array, lag: float, shape: float) -> Array:
+    """`signal` (..., n) behind the filter, at the samples (first-order hold)."""
+    return _filtered(signal, lag, shape, (1.0,), "foh")
 
 
 def _filtered(signal: Array, lag: float, shape: float, numerator: tuple[float, ...], hold: str) -> Array:

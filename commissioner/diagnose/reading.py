@@ -50,14 +50,12 @@ class Reading:
     def of_row(self, row: Array, steps: Array | None = None) -> Array:
         """A derivative (rows, n) of the current as it is read."""
         if steps is not None:
-            apart = self.of_row(row - _before(steps))
-            if not self.lag:
-                return apart + held_at(steps, self.late)
-            return apart + self._late(low_pass(steps, self.lag, self.shape, "zoh"))
-        return self._late(low_pass(row, self.lag, self.shape) if self.lag else row)
-
-    def _late(self, row: Array) -> Array:
-        return resample(row, self.late) if self.late.any() else row
+            straight = row - _before(steps)
+            if self.lag:
+                return behind(straight, steps, self.lag, self.shape, self.late)[0]
+            return self.of_row(straight) + held_at(steps, self.late)
+        lagged = low_pass(row, self.lag, self.shape) if self.lag else row
+        return resample(lagged, self.late) if self.late.any() else lagged
 
     def derivatives(self, term: Term, current: Array, steps: Array, slope: Array) -> Array:
         """By a number of the reading itself, from the current at the samples and the slope that was read."""
