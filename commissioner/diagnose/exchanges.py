@@ -9,7 +9,7 @@ from dataclasses import replace
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, SAME_ORDER, is_plausible, loss_without
+from commissioner.diagnose.guards import LINEAR, RIGID_GUARD, SAME_ORDER, is_plausible, loss_without
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import impedance_starts
@@ -95,16 +95,19 @@ def regrouped(
     promised = sorted(((joint_net(screening, g), g) for g in groups), key=lambda x: -x[0])
     wanted = current.chi2 + sum(price(screening.scores[n].numbers) for n in mine if n in screening.scores) - STATISTICAL_FLOOR
     for net, group in promised[:REGROUPED]:
-        if without.chi2 - HOPEFUL * net > wanted:
-            break
+        # one cause more has to gain what it would have to beside the others
+        least = RIGID_GUARD * (without.chi2 - current.chi2) if len(group) > len(mine) else 0.0
+        if without.chi2 - HOPEFUL * net > wanted - least:
+            continue
         numbers = sum(price(screening.scores[n].numbers) for n in group)
         terms = [t for n in group for t in CATALOGUE[n].terms(setting)]
-        trial = fit(without.model.with_terms(terms), record, layout, noise, wanted_chi2=wanted - numbers)
+        to_beat = wanted - least - numbers
+        trial = fit(without.model.with_terms(terms), record, layout, noise, wanted_chi2=to_beat)
         is_sound = all(
             is_plausible(trial.model, n, setting) and loss_without(trial, n) > threshold(screening.scores[n].numbers)
             for n in group
         )
         report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
-        if trial.chi2 + numbers < wanted and is_sound:
+        if trial.chi2 < to_beat and is_sound:
             return trial, (*(n for n in accepted if n not in mine), *group)
     return None

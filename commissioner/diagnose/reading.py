@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.kinds import CLOCK, DELAY, IRON_LOSS, LAG
-from commissioner.diagnose.lag import SHORT_LAG, behind, by_lag, by_shape, low_pass
+from commissioner.diagnose.lag import SHORT_LAG, Between, behind, by_lag, by_shape, low_pass
 from commissioner.diagnose.model import Model, Term
 from commissioner.diagnose.record import Segment
 from commissioner.diagnose.resample import held_at, resample, resample_hermite
@@ -34,41 +34,55 @@ class Reading:
     turns: Array
     clock: Array
 
-    def of(self, current: Array, after: Array, before: Array, steps: Array) -> tuple[Array, Array]:
-        """Values and slopes (1/s) read of a current (rows, n) with its slopes at the samples; `steps` (rows, n) its part that is
-
-        held from each sample on.
-        """
+    def of(self, current: Terminals) -> tuple[Array, Array]:
+        """Values and slopes (1/s) read of the current."""
         if self.lag:
-            value, slope = behind(current - _before(steps), steps, self.lag, self.shape, self.late)
+            value, slope = behind(current.between(self.period_s), self.lag, self.shape, self.late)
             return value, slope / self.period_s
         if not self.late.any():
-            return current, before
-        value, slope = resample_hermite(current - _before(steps), after, before, self.late, self.period_s)
-        return value + held_at(steps, self.late), slope
+            return current.values, current.before
+        value, slope = resample_hermite(current.unheld, current.after, current.before, self.late, self.period_s)
+        return value + held_at(current.held, self.late), slope
 
-    def of_row(self, row: Array, steps: Array | None = None) -> Array:
-        """A derivative (rows, n) of the current as it is read."""
-        if steps is not None:
-            straight = row - _before(steps)
+    def of_row(self, row: Array, held: Array | None = None) -> Array:
+        """A derivative (rows, n) of the current as it is read, with its part that is held from each sample on."""
+        if held is not None:
+            unheld = row - _until(held)
             if self.lag:
-                return behind(straight, steps, self.lag, self.shape, self.late)[0]
-            return self.of_row(straight) + held_at(steps, self.late)
+                return behind(Between.straight(unheld, held), self.lag, self.shape, self.late)[0]
+            return self.of_row(unheld) + held_at(held, self.late)
         lagged = low_pass(row, self.lag, self.shape) if self.lag else row
         return resample(lagged, self.late) if self.late.any() else lagged
 
-    def derivatives(self, term: Term, current: Array, steps: Array, slope: Array) -> Array:
-        """By a number of the reading itself, from the current at the samples and the slope that was read."""
+    def by(self, term: Term, current: Terminals, slope: Array) -> Array:
+        """Derivative by a number of the reading itself, from the current and the slope that was read."""
         if term.kind == DELAY:
             return np.asarray(-slope * self.turns[term.index])
         if term.kind == CLOCK:
             return np.asarray(-slope * self.clock[term.index])
         if not self.lag:
             return np.asarray(-slope if term.index == 0 else np.zeros_like(slope))
-        smooth = current - _before(steps)
+        between = current.between(self.period_s)
         if term.index == 0:
-            return by_lag(smooth, steps, self.lag, self.shape, self.late) / self.period_s
-        return by_shape(smooth, steps, self.lag, self.shape, self.late)
+            return by_lag(between, self.lag, self.shape, self.late) / self.period_s
+        return by_shape(between, self.lag, self.shape, self.late)
+
+
+@dataclass(frozen=True)
+class Terminals:
+    """Currents (rows, n) at the samples with their slopes (1/s) after and before each; `held`: their part from each sample on."""
+
+    values: Array
+    after: Array
+    before: Array
+    held: Array
+
+    @property
+    def unheld(self) -> Array:
+        return self.values - _until(self.held)
+
+    def between(self, period_s: float) -> Between:
+        return Between(self.unheld, self.after * period_s, self.before * period_s, self.held)
 
 
 def reading(model: Model, segment: Segment, listed: Sequence[Term]) -> Reading:
@@ -90,9 +104,9 @@ def conductance_per_volt(model: Model) -> tuple[float, float]:
     return conductance * shrink, shrink**2
 
 
-def _before(steps: Array) -> Array:
+def _until(held: Array) -> Array:
     """The part held until each sample: what the sample itself still shows."""
-    return np.hstack([np.zeros((steps.shape[0], 1)), steps[:, :-1]])
+    return np.hstack([np.zeros((held.shape[0], 1)), held[:, :-1]])
 
 
 def _delays(segment: Segment) -> Array:

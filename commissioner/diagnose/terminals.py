@@ -11,7 +11,7 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import COUNT, current_lost, in_all, slope_lost
 from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Layout, Model, Term
-from commissioner.diagnose.reading import conductance_per_volt, reading
+from commissioner.diagnose.reading import Terminals, conductance_per_volt, reading
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 
 Array = NDArray[np.float64]
@@ -33,10 +33,10 @@ def sense(
     reader = reading(model, segment, listed)
     held = to_phases @ held_v
     per_volt, grows = conductance_per_volt(model)
-    steps, at_samples = per_volt * held, current
+    there = Terminals(current, after, before, per_volt * held)
     filled = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
     rows = [0, 1, 2, 3, *(4 + k for k in filled)] if jacobian.shape[0] else []
-    current, slope = reader.of(at_samples, after, before, steps)
+    current, slope = reader.of(there)
     if reader.lag or reader.late.any():
         for row in rows:
             is_conductance = row > 3 and listed[row - 4].kind == kinds.IRON_LOSS
@@ -60,7 +60,7 @@ def sense(
     for k, term in enumerate(listed):
         row = jacobian[4 + k]
         if term.kind in (DELAY, LAG, CLOCK):
-            row[:] = reader.derivatives(term, at_samples, steps, slope)
+            row[:] = reader.by(term, there, slope)
         elif term.kind == OFFSET:
             row[term.index] = 1.0
         elif term.kind == DRIFT:

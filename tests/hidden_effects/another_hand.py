@@ -1,0 +1,185 @@
+"""Recordings by another hand: a T circuit in complex numbers with iron loss beside its magnetizing branch, stepped by its own
+
+Runge-Kutta, behind its own sensors. Shares nothing with `sim`, whose physics the rest of the protocol comes from.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+
+from commissioner.records import StandstillRecording
+
+PERIOD_S = 2e-4
+FINE = 80
+PLATE = {
+    "rated_power_w": 3000.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 6.6,
+    "switching_frequency_hz": 5000.0, "sample_period_s": PERIOD_S,
+}  # fmt: skip
+PEAK_A = math.sqrt(2.0) * 6.6
+SEGMENTS = (
+    (0.0, 1.0, 0.0), (60.0, 1.0, 0.0), (120.0, 1.0, 0.0), (0.0, 1.8, 0.0), (60.0, 1.0, 0.25), (120.0, 1.4, 0.35),
+    (0.0, 1.0, 0.0), (60.0, 1.8, 0.0),
+)  # fmt: skip
+"""Axis in degrees, level of the tones, bias as a share of the rated peak current."""
+TONES_HZ = (0.67, 3.0, 11.0, 42.0, 123.0, 327.0)
+SHARE = 0.07
+PAUSE_S = 1.5
+
+
+@dataclass(frozen=True)
+class Machine:
+    """T circuit: ohm, H; what is wrong with the machine, its inverter and its sensors, none of it by default."""
+
+    r_s: float = 2.1
+    r_r: float = 1.7
+    l_s: float = 0.009
+    l_r: float = 0.011
+    l_m: float = 0.24
+    knee_wb: float = math.inf
+    """Flux of the magnetizing branch at which its current has doubled, ninth order."""
+    iron_ohm: float = math.inf
+    leg_v: float = 0.0
+    leg_a: float = 0.2
+    """A leg loses (2 / pi) leg_v atan(i / leg_a)."""
+    lag_s: float = 0.0
+    cut_off_hz: float = math.inf
+    """Of a Butterworth filter of second order."""
+    delay_s: float = 0.0
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    offsets_a: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hum_a: float = 0.0
+    noise: float = 1e-3
+    """Of the rated peak current."""
+    bar_share: float = 0.0
+    """Of the rotor's leakage that a second cage of three times the resistance shunts."""
+    tones_hz: tuple[float, ...] = field(default=TONES_HZ)
+
+
+def impedance(machine: Machine, hz: float) -> complex:
+    s = 2j * math.pi * hz
+    rotor = machine.r_r + s * machine.l_r
+    return machine.r_s + s * machine.l_s + rotor * s * machine.l_m / (rotor + s * machine.l_m)
+
+
+def command(machine: Machine, level: float, bias: float, seconds: float, seed: int) -> np.ndarray:
+    """Voltage along the axis (n,), risen over a tenth of a second."""
+    random = np.random.default_rng(seed)
+    t = np.arange(round(seconds / PERIOD_S)) * PERIOD_S
+    out = np.full(t.size, machine.r_s * bias * PEAK_A)
+    for hz in machine.tones_hz:
+        size = SHARE * level * PEAK_A * abs(impedance(machine, hz))
+        out += size * np.cos(2.0 * math.pi * hz * t + random.uniform(-math.pi, math.pi))
+    return np.asarray(out * np.clip(t / 0.1, 0.0, 1.0))
+
+
+def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> StandstillRecording:
+    """All segments one after the other, the machine at rest and without flux before each."""
+    random = np.random.default_rng([seed, 7])
+    times, numbers, axes, volts, currents = [], [], [], [], []
+    begin = 0.0
+    for k, (axis, level, bias) in enumerate(SEGMENTS):
+        volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
+        along = cmath.exp(1j * math.radians(axis))
+        seen = _simulated(volt * along, PERIOD_S, FINE, *_numbers(machine))
+        t = begin + np.arange(volt.size) * PERIOD_S
+        phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
+        hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
+        noise = machine.noise * PEAK_A * random.normal(size=phases.shape)
+        currents.append(np.array(machine.gains)[:, None] * phases + np.array(machine.offsets_a)[:, None] + hum + noise)
+        times.append(t)
+        numbers.append(np.full(volt.size, k))
+        axes.append(np.full(volt.size, axis))
+        volts.append(volt)
+        begin += seconds + PAUSE_S
+    u, v, w = np.concatenate(currents, axis=1)
+    return StandstillRecording(
+        np.concatenate(times), np.concatenate(numbers), np.concatenate(axes), np.concatenate(volts), u, v, w,
+        np.full(u.size, 560.0), PERIOD_S, PLATE,
+    )  # fmt: skip
+
+
+def _numbers(m: Machine) -> tuple[float, ...]:
+    turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
+    knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
+    iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
+    return (m.r_s, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share)
+
+
+@njit(cache=True)
+def _magnetizing(flux, l_m, knee):
+    return flux / l_m * (1.0 + (abs(flux) * knee) ** 8)
+
+
+@njit(cache=True)
+def _leg_loss(current, leg_v, leg_a):
+    """Space vector of what the three legs lose."""
+    out = 0.0 + 0.0j
+    for p in range(3):
+        turned = complex(math.cos(2.0 * math.pi * p / 3.0), math.sin(2.0 * math.pi * p / 3.0))
+        i = (current * turned.conjugate()).real
+        out += 2.0 / 3.0 * turned * leg_v * 2.0 / math.pi * math.atan(i / leg_a)
+    return out
+
+
+@njit(cache=True)
+def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar):
+    """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, and the two states of the filter."""
+    own = (1.0 - bar) * l_r
+    if iron > 0.0:
+        middle = x[2]
+    else:
+        middle = (x[0] / l_s + x[1] / own) / (1.0 / l_s + 1.0 / own + 1.0 / l_m)
+        for _ in range(12 if knee > 0.0 else 0):
+            wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee)
+            middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8) / l_m)
+    i_s, i_r = (x[0] - middle) / l_s, (x[1] - middle) / own
+    d = np.zeros(7, dtype=np.complex128)
+    d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a) if leg_v > 0.0 else 0.0)
+    if bar > 0.0:
+        # the cage is two in parallel: a resistance alone, and one in series with the deeper part of the leakage
+        deep = x[3] / (bar * l_r)
+        d[1] = -3.0 * r_r * (i_r - deep)
+        d[3] = -d[1] - 1.5 * r_r * deep
+    else:
+        d[1] = -r_r * i_r
+    if iron > 0.0:
+        d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee))
+    if lag > 0.0:
+        d[4] = (i_s - x[4]) / lag
+    if turn > 0.0:
+        d[5] = x[6]
+        d[6] = turn * turn * (i_s - x[5]) - math.sqrt(2.0) * turn * x[6]
+    seen = x[4] if lag > 0.0 else (x[5] if turn > 0.0 else i_s)
+    return d, seen
+
+
+@njit(cache=True)
+def _simulated(volts, period, fine, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar):
+    """Current (n,) that the sensors see, `delay` old, before noise."""
+    n, h = volts.size, period / fine
+    x = np.zeros(7, dtype=np.complex128)
+    late = round(delay / h)
+    memory = np.zeros(late + 1, dtype=np.complex128)
+    out = np.zeros(n, dtype=np.complex128)
+    at = 0
+    v = 0.0j
+    for k in range(n):
+        for step in range(fine):
+            # the sample shows what was before the voltage stepped
+            k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            memory[at % (late + 1)] = seen
+            if step == 0:
+                out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
+                v = volts[k]
+                k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            at += 1
+            k2, seen = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            k3, seen = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            k4, seen = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return out
