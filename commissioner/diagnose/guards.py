@@ -21,7 +21,7 @@ PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
     frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
     frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
-    frozenset({"iron_loss", "sensor_lag"}): 1e-3, frozenset({"iron_loss", "sampling_delay"}): 1e-3,
+    frozenset({"iron_loss", "sensor_lag"}): 5e-4, frozenset({"iron_loss", "sampling_delay"}): 5e-4,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
