@@ -53,6 +53,10 @@ class Machine:
     gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
     offsets_a: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hum_a: float = 0.0
+    warming: float = 0.0
+    """Relative rise of the stator resistance per minute."""
+    end_a: float = math.inf
+    """Largest current that the sensors report."""
     noise: float = 1e-3
     """Of the rated peak current."""
     bar_share: float = 0.0
@@ -85,12 +89,13 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
     for k, (axis, level, bias) in enumerate(SEGMENTS):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
-        seen = _simulated(volt * along, PERIOD_S, FINE, *_numbers(machine))
+        seen = _simulated(volt * along, PERIOD_S, FINE, begin, *_numbers(machine))
         t = begin + np.arange(volt.size) * PERIOD_S
         phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
         hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
         noise = machine.noise * PEAK_A * random.normal(size=phases.shape)
-        currents.append(np.array(machine.gains)[:, None] * phases + np.array(machine.offsets_a)[:, None] + hum + noise)
+        sensed = np.array(machine.gains)[:, None] * phases + np.array(machine.offsets_a)[:, None] + hum + noise
+        currents.append(np.clip(sensed, -machine.end_a, machine.end_a))
         times.append(t)
         numbers.append(np.full(volt.size, k))
         axes.append(np.full(volt.size, axis))
@@ -107,7 +112,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share)
 
 
 @njit(cache=True)
@@ -159,7 +164,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar):
+def _simulated(volts, period, fine, begin, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7, dtype=np.complex128)
@@ -169,6 +174,7 @@ def _simulated(volts, period, fine, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, 
     at = 0
     v = 0.0j
     for k in range(n):
+        r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
             k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)

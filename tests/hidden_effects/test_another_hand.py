@@ -1,0 +1,66 @@
+"""Names and sizes in recordings that another author's machine made, whose laws and integrator are not `sim`'s."""
+
+import math
+
+import pytest
+
+from commissioner.diagnose.diagnosis import diagnose
+from tests.hidden_effects.another_hand import Machine, recorded
+from tests.hidden_effects.cases import class_of
+
+
+def named(machine, seconds=1.5):
+    seen = diagnose([recorded(machine, seconds)])
+    return seen, {c.name: {c.name, *c.equivalent} for c in seen.causes}
+
+
+def long(*values):
+    return pytest.param(*values, marks=pytest.mark.campaign)
+
+
+def test_a_machine_without_a_fault_has_none():
+    seen, names = named(Machine())
+    assert seen.verdict.value == "nothing_significant" and not names
+
+
+@pytest.mark.parametrize(
+    ("about", "name", "symbol", "size"),
+    [
+        ({"lag_s": 1.2e-4}, "sensor_lag", "time_constant_us", 120.0),
+        long({"cut_off_hz": 2500.0}, "sensor_lag", "time_constant_us", math.sqrt(2.0) / (2e-6 * math.pi * 2500.0)),
+        long({"cut_off_hz": 900.0}, "sensor_lag", "time_constant_us", math.sqrt(2.0) / (2e-6 * math.pi * 900.0)),
+        long({"delay_s": 1.5e-4}, "sampling_delay", "delay_us", 150.0),
+        long({"hum_a": 0.02}, "mains_pickup", "amplitude_50_hz_a", 0.02),
+        long({"gains": (1.0, 1.005, 1.0)}, "sensor_gain_mismatch", "gain_v_over_u", 0.005),
+        long({"knee_wb": 0.75}, "magnetizing_saturation", None, 0.0),
+        long({"leg_v": 4.0}, "dead_time", None, 0.0),
+        long({"iron_ohm": 900.0}, "iron_loss", None, 0.0),
+        long({"bar_share": 0.3}, "rotor_skin_effect", None, 0.0),
+        long({"warming": 0.1}, "stator_heating", None, 0.0),
+        long({"end_a": 6.0}, "clipping", "limit_a", 6.0),
+    ],
+)
+def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbol, size):
+    seen, names = named(Machine(**about))
+    assert len(names) == 1 and any(class_of(name) & found for found in names.values()), (seen.reason, names)
+    assert seen.left.sigma < 0.1
+    if symbol:
+        assert seen.causes[0].sizes[symbol][0] == pytest.approx(size, rel=0.01)
+
+
+@pytest.mark.campaign
+def test_saturation_a_lag_and_offsets_are_told_apart():
+    seen, names = named(Machine(knee_wb=0.75, lag_s=6e-5, offsets_a=(0.02, -0.01, 0.0)))
+    assert set(names) == {"magnetizing_saturation", "sensor_lag", "sensor_offset"}
+    sizes = {c.name: c.sizes for c in seen.causes}
+    assert sizes["sensor_lag"]["time_constant_us"][0] == pytest.approx(60.0, rel=0.01)
+    assert sizes["sensor_offset"]["offset_u_a"][0] == pytest.approx(0.02, rel=0.03)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("about", [{"lag_s": 9e-5}, {"delay_s": 9e-5}])
+def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(about):
+    """700 ohm beside the magnetizing branch look to the terminals like 8 us less delay, to a few parts in 1e5 of its trace."""
+    _, names = named(Machine(iron_ohm=700.0, **about), 3.0)
+    true = class_of("sensor_lag") | class_of("iron_loss")
+    assert names and all(found & true for found in names.values()), names
