@@ -15,7 +15,8 @@ import numpy as np
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
-FORMAT = 1
+FORMAT = 2
+"""2: a lag is its sum and its shape, no longer two time constants."""
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
@@ -57,8 +58,10 @@ def _dictionary(layout: Layout) -> dict[str, Any]:
 
 def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
     """The model and its dictionary back from the document. KeyError or ValueError where it is not one."""
-    if document.get("kind") != "extended_model" or document.get("format") != FORMAT:
-        raise ValueError("not an extended model of a known format")
+    if document.get("kind") != "extended_model":
+        raise ValueError("not an extended model")
+    if document.get("format") != FORMAT:
+        raise ValueError(f"an extended model of format {document.get('format')}, read is {FORMAT}: diagnose the recording again")
     n = document["nominal"]
     nominal = (
         float(n["stator_resistance_ohm"]), float(n["rotor_resistance_ohm"]),

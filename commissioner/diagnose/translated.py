@@ -88,6 +88,12 @@ def _sag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Ent
     return {"size": sizes["sag_at_rated_power"], "time_constant_s": mean}
 
 
+def _lag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    """One time constant, or from half of the shape of two equal ones on, those."""
+    shape = "second_order" if values.get("shape", 0.0) > 0.125 else "first_order"
+    return {"size": 1e-6 * sizes["time_constant_us"], "shape": shape}
+
+
 def _hysteresis(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
     return {"size": sizes["coercive_current_a"], "shape": "plays"}
 
@@ -178,7 +184,7 @@ def _clock(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> E
 TRANSLATED: dict[str, Translate] = {
     "dead_time": _legs(1.0), "device_drop": _legs(ROOT_AT_HALF), "dc_link_sag": _sag,
     "dc_link_ripple": _line("ripple"), "sampling_delay": _size("delay_us", 1e-6),
-    "sensor_lag": _size("time_constant_us", 1e-6), "magnetizing_saturation": _saturation,
+    "sensor_lag": _lag, "magnetizing_saturation": _saturation,
     "magnetic_hysteresis": _hysteresis, "remanence": _remanence, "leakage_saturation": _leakage,
     "rotor_skin_effect": _skin, "iron_loss": _size("conductance_ms", 1e-3),
     "stator_heating": _size("rise_per_minute_at_rated_current"), "rotor_heating": _size("rise_per_minute_at_rated_current"),
