@@ -14,6 +14,7 @@ from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.evidence import (
     TIE_CHI2,
     HeldOut,
+    Rival,
     alternatives,
     claim_features,
     confidence,
@@ -142,6 +143,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
     doubt = _doubt(rest, _explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, doubt) for name in found.accepted]
+    causes = _with_open_ties(causes, rivals)
     causes = _without_truncation(causes, audit)
     causes += _audit_causes(audit, found, noise, {c.name for c in causes})
     unsure = tuple(c for c in causes if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest)))
@@ -178,12 +180,12 @@ def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
     return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
 
 
-def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, float]]:
+def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, Rival]]:
     """Alternatives of the causes `asked` about, tried on the first part of every segment where that shows them as well."""
     if not asked:
         return {}
     record, layout = found.record, found.layout
-    out: dict[str, dict[str, float]] = {}
+    out: dict[str, dict[str, Rival]] = {}
     for samples in (*EXPLORED, record.samples):
         if len(out) == len(asked):
             break
@@ -197,7 +199,7 @@ def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence
 
 
 def _cause(
-    found: Found, name: str, rest: Leftover, rivals: Mapping[str, float], noise: Noise, excluded: Sequence[str],
+    found: Found, name: str, rest: Leftover, rivals: Mapping[str, Rival], noise: Noise, excluded: Sequence[str],
     doubt: float,
 ) -> Cause:
     gain = found.gains[name]
@@ -205,15 +207,29 @@ def _cause(
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
-    close = tuple(r for r, loss in rivals.items() if loss < max(TIE_CHI2, _share_open(name, r) * gain, unsettled))
+    close = tuple(n for n, r in rivals.items() if r.loss < max(TIE_CHI2, _share_open(name, n) * gain, unsettled))
     features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * doubt
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
     return Cause(
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
-        float(np.sqrt(gain / count)), gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded), rivals, tuple(features),
+        float(np.sqrt(gain / count)), gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
+        {n: r.loss for n, r in rivals.items()}, tuple(features),
     )
+
+
+def _with_open_ties(causes: Sequence[Cause], rivals: Mapping[str, Mapping[str, Rival]]) -> list[Cause]:
+    """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one: either may be true."""
+    out = []
+    for cause in causes:
+        tied = [rivals[c.name][n] for c in causes if c is not cause for n in c.equivalent if n in rivals.get(c.name, {})]
+        sizes = {}
+        for key, (value, spread, unit) in cause.sizes.items():
+            moved = [0.5 * r.moved.get(cause.name, {}).get(key, 0.0) for r in tied]
+            sizes[key] = (value, float(np.linalg.norm([spread, max(np.abs(moved), default=0.0)])), unit)
+        out.append(replace(cause, sizes=sizes))
+    return out
 
 
 def _share_open(name: str, rival: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,15 +76,20 @@ def _without_segment(one: Fit, k: int, layout: Layout) -> Model:
     return one.model.moved(theta + step)
 
 
+@dataclass(frozen=True)
+class Rival:
+    """What takes a cause's place: the loss in chi2, scaled to the whole recording, and by how much it moves the others' sizes."""
+
+    loss: float
+    moved: Mapping[str, Mapping[str, float]]
+
+
 def alternatives(
     found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
     excluded: Sequence[str], asked: Sequence[str],
-) -> dict[str, dict[str, float]]:
-    """For every accepted cause that is `asked` about: what of the rest (but for `excluded`) takes its place, with the
-
-    loss in chi2 scaled to the whole recording.
-    """
-    out: dict[str, dict[str, float]] = {}
+) -> dict[str, dict[str, Rival]]:
+    """For every accepted cause that is `asked` about: what of the rest (but for `excluded`) takes its place."""
+    out: dict[str, dict[str, Rival]] = {}
     for name in asked:
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
         gain = without.chi2 - found.chi2
@@ -92,14 +97,23 @@ def alternatives(
         screening = screen(without.model, record, layout, noise, setting, [*absent, name])
         # where the way to a cause bends, its own promise falls short as its rivals' do
         own = screening.scores[name].delta_chi2 if name in screening.scores else gain
-        rivals: dict[str, float] = {}
+        rivals: dict[str, Rival] = {}
         for score in [s for s in screening.ranked() if s.name != name][:3]:
             if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
             trial = fit(without.model.with_terms(CATALOGUE[score.name].terms(setting)), record, layout, noise)
             if is_plausible(trial.model, score.name, setting):
-                rivals[score.name] = (trial.chi2 - found.chi2) * whole / record.samples
+                loss = (trial.chi2 - found.chi2) * whole / record.samples
+                rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], setting))
         out[name] = rivals
+    return out
+
+
+def _moved(here: Model, there: Model, names: Sequence[str], setting: Setting) -> dict[str, dict[str, float]]:
+    out = {}
+    for name in names:
+        old, new = (CATALOGUE[name].sizes(setting, one.of(name)) for one in (here, there))
+        out[name] = {key: new[key][0] - old[key][0] for key in old if key in new}
     return out
 
 
