@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Cause, Diagnosis
+from commissioner.diagnose.causes import Cause
+from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.effects.effect import PLACES, Sizes
 from commissioner.diagnose.points_diagnosis import PointsDiagnosis

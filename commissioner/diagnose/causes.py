@@ -1,0 +1,204 @@
+"""Causes as they are named: size, strength, confidence, what else would do as well, and those kept back."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from commissioner.diagnose import calibration
+from commissioner.diagnose.audit import Audit
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.evidence import (
+    TIE_CHI2,
+    Rival,
+    alternatives,
+    claim_features,
+    confidence,
+    setting_for,
+    sizes_with_spread,
+)
+from commissioner.diagnose.fit import on_part
+from commissioner.diagnose.guards import SAME_ORDER, loss_without
+from commissioner.diagnose.leftover import Leftover
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.search import EXPLORED, Found
+
+MOSTLY_EXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.95
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.1
+"""Named as a cause: steps beyond a share of the rated peak current that make a hundredth of the noise power."""
+TRUNCATION_SLACK = 0.15
+ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+SHOWN_BY_A_PART = 0.3
+"""Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
+LEAST_CONFIDENCE = 0.5
+"""Below it a name is more likely wrong than right, and is not given."""
+DELAY_OR_LAG_TIE = 1e-5
+SAME_ORDER_TIE = 2e-3
+NEARLY_ALL, LEFT_TIE = 0.001, 0.1
+"""A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
+the unknown rest may favour either."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause. `sizes`: name -> (value, std, unit); `strength_sigma` rms contribution over the noise rms."""
+
+    name: str
+    title: str
+    sizes: Mapping[str, tuple[float, float, str]]
+    gain_share: float
+    strength_sigma: float
+    delta_chi2: float
+    confidence: float
+    equivalent: tuple[str, ...] = ()
+    rivals: Mapping[str, float] = field(default_factory=dict)
+    features: tuple[float, ...] = ()
+    from_audit: bool = False
+
+
+def causes_of(
+    found: Found, rest: Leftover, trust: float, audit: Audit, noise: Noise, excluded: Sequence[str]
+) -> tuple[list[Cause], tuple[Cause, ...]]:
+    """Causes that are named, and those that were fitted but are more likely wrong than right as names.
+
+    `trust`: factor on every confidence (see `doubt`).
+    """
+    rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
+    causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, trust) for name in found.accepted]
+    causes = _without_truncation(_with_open_ties(causes, rivals), audit)
+    causes += _audit_causes(audit, found, noise, {c.name for c in causes})
+    unsure = tuple(
+        c for c in causes
+        if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest))
+    )
+    return [c for c in causes if c not in unsure], unsure
+
+
+def explained_share(found: Found, rest: Leftover, left_sigma: float) -> float:
+    """Share of the structured error power that is not among what is left (`left_sigma`, causes not named included)."""
+    count = float(found.fit.normal.count.sum())
+    structured = max(found.nominal.chi2 - found.fit.chi2, 0.0) + rest.sigma**2 * count
+    return 1.0 - min(left_sigma**2 * count / max(structured, left_sigma**2 * count, 1.0), 1.0)
+
+
+def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
+    """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
+    return rest.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+
+
+def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
+    """Whether the name is likely enough: else its alternatives need not be sought."""
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    sure = confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
+    return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+
+
+def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, Rival]]:
+    """Alternatives of the causes `asked` about, tried on the first part of every segment where that shows them as well."""
+    if not asked:
+        return {}
+    record, layout = found.record, found.layout
+    out: dict[str, dict[str, Rival]] = {}
+    for samples in (*EXPLORED, record.samples):
+        if len(out) == len(asked):
+            break
+        fitted, part = on_part(found.fit, record, layout, noise, samples)
+        share = SHOWN_BY_A_PART * part.samples / record.samples
+        shown = [n for n in asked if n not in out and (part is record or loss_without(fitted, n) > share * found.gains[n])]
+        if shown:
+            setting = setting_for(found.setting, part)
+            out |= alternatives(fitted, found.accepted, part, layout, setting, noise, record.samples, excluded, shown)
+    return out
+
+
+def _cause(
+    found: Found, name: str, rest: Leftover, rivals: Mapping[str, Rival], noise: Noise, excluded: Sequence[str],
+    trust: float,
+) -> Cause:
+    gain = found.gains[name]
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
+    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
+    close = tuple(n for n, r in rivals.items() if r.loss < max(TIE_CHI2, _share_open(name, n) * gain, unsettled))
+    features = claim_features(found.fit, found.accepted, name, rest, total)
+    sure = confidence(features, calibration.WEIGHTS) * trust
+    if not noise.is_known:
+        sure *= calibration.UNKNOWN_NOISE_FACTOR
+    return Cause(
+        name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
+        float(np.sqrt(gain / count)), gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
+        {n: r.loss for n, r in rivals.items()}, tuple(features),
+    )
+
+
+def _with_open_ties(causes: Sequence[Cause], rivals: Mapping[str, Mapping[str, Rival]]) -> list[Cause]:
+    """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one: either may be true."""
+    out = []
+    for cause in causes:
+        tied = [rivals[c.name][n] for c in causes if c is not cause for n in c.equivalent if n in rivals.get(c.name, {})]
+        sizes = {}
+        for key, (value, spread, unit) in cause.sizes.items():
+            moved = [0.5 * r.moved.get(cause.name, {}).get(key, 0.0) for r in tied]
+            sizes[key] = (value, float(np.linalg.norm([spread, max(np.abs(moved), default=0.0)])), unit)
+        out.append(replace(cause, sizes=sizes))
+    return out
+
+
+def _share_open(name: str, rival: str) -> float:
+    """Share of a gain within which two causes are the same to the terminals, whatever fits better: networks of the same
+
+    order; a delay and a lag, whose currents are taken as straight between the samples.
+    """
+    shares = {SAME_ORDER: SAME_ORDER_TIE, frozenset({"sampling_delay", "sensor_lag"}): DELAY_OR_LAG_TIE}
+    return shares.get(frozenset({name, rival}), 0.0)
+
+
+def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
+    """A converter that cuts off instead of rounding shifts every channel by half a step: that is quantization, no offset."""
+    out = []
+    for cause in causes:
+        offsets = [value for value, _, _ in cause.sizes.values()]
+        halves = 0.5 * np.array(audit.step_a)
+        if cause.name == "sensor_offset" and len(offsets) == halves.size and halves.min() > 0.0:
+            ratio = np.array(offsets) / halves
+            if np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0):
+                step = {"step_a": (float(halves.max()) * 2.0, 0.0, "A")}
+                out.append(replace(cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()))
+                continue
+        out.append(cause)
+    return out
+
+
+def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[str]) -> list[Cause]:
+    """Causes that leave no waveform: coarse converter steps, clipped and missing samples."""
+    out = []
+    step = max(audit.step_a, default=0.0)
+    is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
+    if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
+        out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
+    if audit.clipped and "clipping" not in named:
+        out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
+                                       "samples": (audit.clipped["samples"], 0.0, "1")}))
+    if audit.holes or found.losses:
+        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in found.losses)
+        out.append(_plain("lost_samples", {
+            "samples": (float(marked + unmarked), 0.0, "1"), "without_gap_in_time": (float(unmarked), 0.0, "1"),
+        }))
+    return out
+
+
+def doubt(rest: Leftover, share: float) -> float:
+    """Factor on every confidence where what is left is small, yet more than noise makes around the tones, and a larger
+
+    part of all there was to explain than a right name leaves: 1 at the most that one may leave.
+    """
+    is_trace = rest.from_tones_sigma > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
+
+
+def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
+    return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)
