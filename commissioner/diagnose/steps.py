@@ -37,8 +37,9 @@ HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
 MOST_LOOKS = 3
 """Times that lines are looked for again: once they are, what was beside them is known better."""
-STEPS_GUARD = 2e-2
-"""As GUARD, of the power of coarse converter steps, which repeat with the signal and look a little like anything."""
+STEPS_GUARD = 0.5
+"""As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
+slow changes from segment to segment, as a shaft's motion or a drift does."""
 LARGE_REST, CRUMB = 0.3, 0.08
 """A rest above this multiple of the noise of which the best candidate takes less than this share is left as it is."""
 
