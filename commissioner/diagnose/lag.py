@@ -19,6 +19,8 @@ SHORT_LAG = 0.05
 """Of a sample: below it a lag is a delay (what else it does is below 1e-3 of that)."""
 ALIKE = 1e-6
 """Relative squared difference of two time constants that are taken as one."""
+QUICK = 1e-3
+"""Of a sample: a second time constant below it does nothing."""
 STEP, SHAPE_STEP = 1e-3, 5e-3
 """Of the sum, relative, and of the shape, for derivatives."""
 
@@ -30,7 +32,7 @@ def low_pass(signal: Array, lag: float, shape: float) -> Array:
 
 @lru_cache(maxsize=16)
 def _discrete(lag: float, shape: float) -> tuple[Array, Array]:
-    denominator = (shape * lag**2, lag, 1.0)[0 if shape > 0.0 else 1 :]
+    denominator = (shape * lag**2, lag, 1.0)[0 if shape * lag > QUICK else 1 :]
     forward, back, _ = cont2discrete(((1.0,), denominator), 1.0, method="foh")
     return forward.ravel(), back
 

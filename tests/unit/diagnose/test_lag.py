@@ -56,6 +56,16 @@ def test_a_tone_behind_the_filter_has_its_amplitude_and_phase(shape):
     assert np.abs((slope[0] + 1j * slope[1]) - 1j * turn * wanted)[late_part].max() < 1e-5 * turn
 
 
+@pytest.mark.parametrize("shape", [1e-300, 1e-20, 1e-9, 1e-4])
+def test_a_shape_of_next_to_nothing_is_one_lag(shape):
+    between = Between.straight(zigzag(), 0.0 * zigzag())
+    late = np.full(60, 0.3)
+    (value, slope), (once, once_slope) = (behind(between, 0.4, q, late) for q in (shape, 0.0))
+    assert np.abs(value - once).max() < 1e-3 and np.abs(slope - once_slope).max() < 1e-2
+    assert np.abs(low_pass(zigzag(), 0.4, shape) - low_pass(zigzag(), 0.4, 0.0)).max() < 1e-3
+    assert np.isfinite(by_shape(between, 0.4, shape, late)).all()
+
+
 def test_derivatives_by_sum_and_shape_are_those_of_the_response():
     lag, shape, turn = 6.0, 0.2, 0.03
     tone = np.exp(1j * turn * np.arange(4000))
