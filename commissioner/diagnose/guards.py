@@ -10,6 +10,7 @@ from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.model import Model
+from commissioner.diagnose.reading import clock_courses
 from commissioner.diagnose.record import Record
 
 GUARD = 2e-5
@@ -49,6 +50,9 @@ SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leaka
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
 LEAST_BESIDE = 800.0
 """Lost samples must gain at least so much beside accepted causes."""
+MOST_CONSTANT = 0.95
+"""Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
+CLOCK_RATES = ("drift", "wander_cos", "wander_sin")
 LEAST_SLOPE_LOST = 0.25
 """A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
 
@@ -92,7 +96,12 @@ def meets_tones(record: Record, setting: Setting) -> bool:
 
 
 def is_plausible(model: Model, name: str, setting: Setting) -> bool:
-    """The sign physics demands; and a leg error that is at half its height before a fifth of the largest current."""
+    """The sign physics demands; a leg error that is at half its height before a fifth of the largest current; and a clock whose
+
+    delay grows: one that jumps to a value in each segment and stays there is a delay in disguise.
+    """
+    if name == "clock_drift" and constancy(model.of(name), setting.record) > MOST_CONSTANT:
+        return False
     sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
     if sign and sizes and next(iter(sizes.values()))[0] * sign <= 0:
@@ -100,6 +109,18 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * setting.facts.current_peak_a
+
+
+def constancy(rates: Mapping[str, float], record: Record) -> float:
+    """Share of what a clock's delay does that a constant delay would do as well, each instant weighed by how fast the command moves."""
+    mean = square = weight = 0.0
+    for segment in record.segments:
+        delay = np.array([rates.get(n, 0.0) for n in CLOCK_RATES]) @ clock_courses(segment)
+        moves = np.gradient(segment.voltage_axis_v) ** 2
+        mean, square, weight = (
+            total + float(x) for total, x in ((mean, moves @ delay), (square, moves @ delay**2), (weight, moves.sum()))
+        )
+    return float(mean**2 / (square * weight)) if square * weight > 0.0 else 0.0
 
 
 def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:

@@ -89,7 +89,7 @@ def reading(model: Model, segment: Segment, listed: Sequence[Term]) -> Reading:
     """Of one segment, from the model's delay, clock and lag; `listed`: numbers whose derivatives will be asked for."""
     at_work = {t.kind for t in (*model.terms, *listed)}
     turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
-    clock = 1e-6 * _clock(segment) if CLOCK in at_work else np.zeros((0, segment.count))
+    clock = 1e-6 * clock_courses(segment) if CLOCK in at_work else np.zeros((0, segment.count))
     late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
     period = segment.period_s
     lag, shape = model.total(LAG) / period, model.total(LAG, 1)
@@ -114,7 +114,7 @@ def _delays(segment: Segment) -> Array:
     return np.stack([np.ones(segment.count), np.where(np.arange(segment.count) % 2, -1.0, 1.0)])
 
 
-def _clock(segment: Segment) -> Array:
+def clock_courses(segment: Segment) -> Array:
     """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
 
     and fro within it (cosine and sine).
