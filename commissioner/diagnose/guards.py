@@ -50,7 +50,7 @@ SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leaka
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
 LEAST_BESIDE = 800.0
 """Lost samples must gain at least so much beside accepted causes."""
-MOST_CONSTANT = 0.95
+MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
 """Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
 CLOCK_RATES = ("drift", "wander_cos", "wander_sin")
 LEAST_SLOPE_LOST = 0.25
@@ -100,7 +100,7 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
 
     delay grows: one that jumps to a value in each segment and stays there is a delay in disguise.
     """
-    if name == "clock_drift" and constancy(model.of(name), setting.record) > MOST_CONSTANT:
+    if name == "clock_drift" and _is_a_delay(model.of(name), setting.record):
         return False
     sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
@@ -111,8 +111,17 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * setting.facts.current_peak_a
 
 
+def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:
+    """Whether a clock only makes currents late alike; where the command moves too briefly to show a drift, nobody knows."""
+    shows_drifts = constancy({"drift": 1.0}, record) < LEAST_SHOWN
+    return shows_drifts and constancy(rates, record) > MOST_CONSTANT
+
+
 def constancy(rates: Mapping[str, float], record: Record) -> float:
-    """Share of what a clock's delay does that a constant delay would do as well, each instant weighed by how fast the command moves."""
+    """Share of what a clock's delay does that a constant delay would do as well, each instant weighed by how fast the command
+
+    moves; none where it makes currents early.
+    """
     mean = square = weight = 0.0
     for segment in record.segments:
         delay = np.array([rates.get(n, 0.0) for n in CLOCK_RATES]) @ clock_courses(segment)
@@ -120,7 +129,7 @@ def constancy(rates: Mapping[str, float], record: Record) -> float:
         mean, square, weight = (
             total + float(x) for total, x in ((mean, moves @ delay), (square, moves @ delay**2), (weight, moves.sum()))
         )
-    return float(mean**2 / (square * weight)) if square * weight > 0.0 else 0.0
+    return float(max(mean, 0.0) ** 2 / (square * weight)) if square * weight > 0.0 else 0.0
 
 
 def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:
