@@ -131,6 +131,7 @@ def fit(problem: Problem, start: Start, first: TCircuit | None = None) -> Fitted
         method="trf",
         bounds=(middle - reach, middle + reach),
         x_scale=np.append(prior, 1.0),
+        jac="3-point",
         max_nfev=80,
     )
     circuit = circuit_of(solved.x[:4], split)
