@@ -452,8 +452,16 @@ def _open_flux(rotor_flux, m):
 def _open_terminals(x, m):
     """Stator circuit open: flux follows the rotor, no current, memory of plays and filters at rest."""
     size = math.hypot(x[2], x[3])
-    ratio = _open_flux(size, m) / size if size > 1e-12 else 1.0
-    x[0], x[1] = ratio * x[2], ratio * x[3]
+    flux = _open_flux(size, m)
+    x[0], x[1] = x[2], x[3]
+    if size > 1e-12:  # S psi_s = L (psi_r - psi_s), both tensors at that flux
+        slope = magnetizing_slope(flux * flux, m)
+        l_aa, l_ab, l_bb = m.per_leak_h * (1.0 + m.aniso_c), m.per_leak_h * m.aniso_s, m.per_leak_h * (1.0 - m.aniso_c)
+        push_a, push_b = l_aa * x[2] + l_ab * x[3], l_ab * x[2] + l_bb * x[3]
+        s_aa, s_bb = slope * (1.0 + m.salient_c) + l_aa, slope * (1.0 - m.salient_c) + l_bb
+        s_ab = slope * m.salient_s + l_ab
+        whole = s_aa * s_bb - s_ab * s_ab
+        x[0], x[1] = (s_bb * push_a - s_ab * push_b) / whole, (s_aa * push_b - s_ab * push_a) / whole
     for j in range(4, 12):
         x[j] = 0.0
     for j in range(PLAYS):
@@ -492,9 +500,15 @@ def coast(x, p, seconds):
         size = math.hypot(x[2], x[3])
         rate = p[at.P_RR] * (size - _open_flux(size, m)) * m.per_leak_h
         keep = math.exp(-step * rate / size) if size > 1e-12 else 0.0
+        ir_a, ir_b = rotor_current(x[2] - x[0], x[3] - x[1], m)
+        lost_a = p[at.P_RR] * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b)
+        lost_b = p[at.P_RR] * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b)
+        share = rate / size if size > 1e-12 else 0.0
+        side_a, side_b = step * (share * x[2] - lost_a), step * (share * x[3] - lost_b)  # what a direction keeps more than the mean
         turn = step * _shaft_speed(x[at.X_TIME] + spent, p)  # the rotor takes its flux along
-        c, s = keep * math.cos(turn), keep * math.sin(turn)
-        x[2], x[3] = c * x[2] - s * x[3], s * x[2] + c * x[3]
+        c, s = math.cos(turn), math.sin(turn)
+        left_a, left_b = keep * (x[2] + side_a), keep * (x[3] + side_b)
+        x[2], x[3] = c * left_a - s * left_b, s * left_a + c * left_b
         _open_terminals(x, m)
         spent += step
     _cool(x, p, seconds)

@@ -15,8 +15,8 @@ import numpy as np
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
-FORMAT = 2
-"""2: a lag is its sum and its shape, no longer two time constants."""
+FORMAT = 3
+"""2: a lag is its sum and its shape, no longer two time constants. 3: tilts of L_sigma and L_M are what they become together."""
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:

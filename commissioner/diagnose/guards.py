@@ -19,15 +19,15 @@ CLASS_GUARD = 1e-2
 """Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
 SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
-    SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 0.05,
+    SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 2e-3,
     frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
     frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
     frozenset({"iron_loss", "sensor_lag"}): 5e-4, frozenset({"iron_loss", "sampling_delay"}): 5e-4,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
-a leakage's anisotropy, which tilts the cage's resistance by as much as of it lies on the rotor's side; flux left from the
-segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly, and so does a shaft, which moves
-current across the axis; and a conductance's current steps with the voltage, which a delay or a lag does to no current.)"""
+flux left from the segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly, and so does a
+shaft, which moves current across the axis; a conductance's current steps with the voltage, which a delay or a lag does to no current; and how
+far a leakage's anisotropy tilts the cage's resistance is a number of its own.)"""
 LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
 """Causes that only turn and scale the excited lines: any two of them can look like a third."""
 TONE_TO_TONE = 0.05

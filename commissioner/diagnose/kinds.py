@@ -9,6 +9,7 @@ VOLTAGE_MOD, OMEGA, PHASE_RESISTANCE, ROTOR_MOD = 11, 12, 13, 14
 ROTOR_ANISOTROPY, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY, INITIAL_FLUX = 15, 16, 17, 18
 LEGS_LINK = 19  # as LEGS, scaled with the link voltage and switching frequency (dead time, not device threshold)
 LEAK_SPLIT = 21  # share of the saturating leakage on the rotor side
+ANISOTROPY_SPLIT = 22  # share of the leakage on the rotor side where inductances differ between directions
 CARRY = 20  # share of the flux at the end of the segment before that is left at the start: along it (0), across (1)
 
 NOMINAL = (R_S, R_R, GAMMA_SIGMA, GAMMA_M)

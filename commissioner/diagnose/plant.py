@@ -52,7 +52,7 @@ def predict(
             *(listed[k].step for k in inside),
         ])
         _to_phases(
-            _tangent(path, segment, channels, layout, at_work, indices), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)]
+            _tangent(path, model, segment, channels, layout, at_work, indices), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)]
         )
     held_v = segment.voltage_ab_v * path.drive[2]
     trajectory = (path.current, path.after, path.before)
@@ -91,7 +91,7 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
     every = set(at_work.tolist()) | {t.kind for t in model.terms}
     machine = _machine(model, layout, every)
     period = segment.period_s
-    start = _initial_state(model, segment)
+    start = _initial_state(model, segment, _decay_tilt(machine[0]))
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v} | (every & {kinds.STOP, kinds.BRANCH})
@@ -130,16 +130,18 @@ def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> t
 
 
 def _tangent(
-    path: _Path, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64],
+    path: _Path, model: Model, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64],
     indices: NDArray[np.int64],
 ) -> Array:
     wanted = set(at_work.tolist())
+    before = np.array(segment.flux_before_wb)
+    flux_before = np.stack([before, _per_tilt(_carried(model, segment)[0]) * before])
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
         path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK}), layout.legs_vectors),
         _if(kinds.IRON_CURVE in wanted, layout.iron_vectors), _if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors),
-        np.array(segment.flux_before_wb), out,
+        flux_before, out,
     )
     return out
 
@@ -169,13 +171,14 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
     r_s, r_r, l_sigma, l_m = model.nominal
     nu = float(np.clip(0.5 + model.total(kinds.NU), 0.0, 1.0))
     kappa = 1.0 + (0.5 + model.total(kinds.LEAK_SPLIT)) * layout.leak_ratio
-    # an inductance that differs between directions, leakage half on the rotor side, tilts R_R and the other one, too
-    coupled = layout.leak_ratio / (1.0 + layout.leak_ratio)
+    # where L_sigma and L_M tilt differently, the turns ratio of the inverse-Gamma circuit does, and R_R by its square
+    per_share = 2.0 * layout.leak_ratio / (1.0 + layout.leak_ratio)
     rotor, leakage, magnetizing = aniso
+    coupled = per_share * (0.5 + model.total(kinds.ANISOTROPY_SPLIT))
     base = np.array([
         r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS),
-        *(rotor + coupled * (leakage - magnetizing)), *(leakage + 0.5 * coupled * magnetizing),
-        *(magnetizing - 0.5 * coupled * leakage), kappa, layout.leak_ratio, coupled,
+        *(rotor + coupled * (leakage - magnetizing)), *leakage, *magnetizing, kappa, layout.leak_ratio, coupled,
+        *(per_share * (leakage - magnetizing)),
     ])
     stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros((0, 2))
     branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
@@ -196,16 +199,13 @@ def _if(is_used: bool, vectors: Array) -> Array:
     return vectors if is_used else vectors[:0]
 
 
-def _initial_state(model: Model, segment: Segment) -> Array:
+def _initial_state(model: Model, segment: Segment, tilt: Array) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
-    carried = [0.0, 0.0]
-    for term, value in zip(model.terms, model.values, strict=True):
-        if term.kind == kinds.CARRY and term.segment in (-1, segment.uid):
-            carried[term.index] += value
-    along, across = carried
+    along, across = _carried(model, segment)
     alpha, beta = segment.flux_before_wb
-    left = (along * alpha - across * beta, along * beta + across * alpha)
+    turned = _per_tilt(along) * np.array([tilt[0] * alpha + tilt[1] * beta, tilt[1] * alpha - tilt[0] * beta])
+    left = np.array([along * alpha - across * beta, along * beta + across * alpha]) + turned
     state[:] = [*left, *left]
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
@@ -215,6 +215,26 @@ def _initial_state(model: Model, segment: Segment) -> Array:
             else:
                 state[term.index - 2] += value
     return state
+
+
+def _carried(model: Model, segment: Segment) -> tuple[float, float]:
+    """Share of the flux before that is left at the start: along it and across."""
+    along, across = (
+        sum(v for t, v in zip(model.terms, model.values, strict=True)
+            if t.kind == kinds.CARRY and t.index == k and t.segment in (-1, segment.uid))
+        for k in (0, 1)
+    )
+    return along, across
+
+
+def _per_tilt(along: float) -> float:
+    """What a tilt of the open machine's rate R_R / L_M changes in the share left: exp(-t R_R / L_M (1 + tilt)), first order."""
+    return along * float(np.log(along)) if 0.0 < along < 1.0 else 0.0
+
+
+def _decay_tilt(base: Array) -> Array:
+    """(2,) tilt of R_R / L_M."""
+    return base[6:8] + base[10:12]
 
 
 def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from commissioner.diagnose.kinds import (
+    ANISOTROPY_SPLIT,
     BRANCH,
     CARRY,
     GAMMA_M,
@@ -78,7 +79,8 @@ def sensitivities(
     """Fills `out` (2, P, n): d i / d parameter at every sample, for the `kinds` and `indices` (P,) listed.
 
     `states`, `stop_states` and everything before `kinds` are the trajectory's; the dictionaries may be empty where no
-    listed parameter needs them.
+    listed parameter needs them. `flux_before` (2, 2): the flux that the segment before left, and what of it decays more per tilt
+    of R_R / L_M.
     """
     samples = voltage_a.shape[0]
     count = kinds.shape[0]
@@ -86,7 +88,7 @@ def sensitivities(
     stops = stop_gain.shape[0]
     rs, r_r, gs, gm, nu, g = base[0], base[1], base[2], base[3], base[4], base[5]
     ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
-    kappa, leak_ratio, coupled = base[12], base[13], base[14]
+    kappa, leak_ratio, coupled, splits_a, splits_b = base[12], base[13], base[14], base[15], base[16]
     shrink = 1.0 / (1.0 + g * rs)
     half = 0.5 * period
     has_legs = bool(np.any(legs != 0.0) or np.any(legs_link != 0.0))
@@ -117,7 +119,15 @@ def sensitivities(
         n = indices[p]
         if kinds[p] == CARRY:
             for c in range(2):
-                left = flux_before[c] if n == 0 else (flux_before[0] if c == 1 else -flux_before[1])
+                left = flux_before[0, c] if n == 0 else (flux_before[0, 0] if c == 1 else -flux_before[0, 1])
+                dx[c, p] = left
+                dx[2 + c, p] = left
+        elif kinds[p] in (ROTOR_ANISOTROPY, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY):
+            share = 1.0
+            if kinds[p] != ROTOR_ANISOTROPY:
+                share = coupled if kinds[p] == LEAKAGE_ANISOTROPY else 1.0 - coupled
+            for c in range(2):
+                left = share * (flux_before[1, 1 - c] if n == 1 else (1.0 - 2.0 * c) * flux_before[1, c])
                 dx[c, p] = left
                 dx[2 + c, p] = left
         elif kinds[p] == INITIAL_FLUX:
@@ -264,19 +274,15 @@ def sensitivities(
                 fwa, fwb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
             elif kind == LEAKAGE_ANISOTROPY:
                 fia, fib = (gs * sa, -gs * sb) if n == 0 else (gs * sb, gs * sa)
-                qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
-                fwa, fwb = -0.5 * coupled * (waa * qa + wab * qb), -0.5 * coupled * (wab * qa + wbb * qb)
-                qa, qb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
-                fwa += coupled * qa
-                fwb += coupled * qb
+                fwa, fwb = (coupled * rr * ca, -coupled * rr * cb) if n == 0 else (coupled * rr * cb, coupled * rr * ca)
             elif kind == MAGNETIZING_ANISOTROPY:
                 qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
                 qa, qb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
                 fwa -= coupled * qa
                 fwb -= coupled * qb
-                qa, qb = (gs * sa, -gs * sb) if n == 0 else (gs * sb, gs * sa)
-                fia, fib = 0.5 * coupled * qa, 0.5 * coupled * qb
+            elif kind == ANISOTROPY_SPLIT:
+                fwa, fwb = rr * (splits_a * ca + splits_b * cb), rr * (splits_b * ca - splits_a * cb)
             fj[0, p], fj[1, p] = fja, fjb
             push_t[0, p], push_t[1, p] = fia, fib
             push_w[0, p], push_w[1, p] = fwa, fwb

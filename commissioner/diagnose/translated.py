@@ -168,6 +168,16 @@ def _tensor(first: str, second: str, shapes: tuple[str, str], of_phases: float =
     return translate
 
 
+def _inductance(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    """The Gamma circuit's two tensors (1/L_leak and 1/L_s tilted) that tilt 1/L_sigma and 1/L_M as found; the larger one."""
+    leakage, main = (complex(*(values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin"))) for p in ("leakage", "magnetizing"))
+    ratio = model.nominal[2] / model.nominal[3]
+    both = ratio / (1.0 + ratio) * (leakage - main)
+    turned = {f"{p}_{c}": x for p, z in (("leakage", leakage + both), ("main", main + both))
+              for c, x in (("cos", z.real), ("sin", z.imag))}
+    return _tensor("leakage", "main", ("leakage", "main"))(sizes, turned, setting, model)
+
+
 def _remanence(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
     first = setting.record.segments[0].uid
     flux = complex(values.get(f"alpha_{first}", 0.0), values.get(f"beta_{first}", 0.0))
@@ -195,7 +205,7 @@ TRANSLATED: dict[str, Translate] = {
     },
     "lost_samples": _size("samples"), "mains_pickup": _line("mains"), "clock_drift": _clock,
     "shaft_motion": _size("speed_rad_per_s"),
-    "inductance_anisotropy": _tensor("leakage", "magnetizing", ("leakage", "main")),
+    "inductance_anisotropy": _inductance,
     "resistance_anisotropy": _tensor("stator", "rotor", ("phases", "cage"), 0.5),
     "cable_capacitance": _size("capacitance_nf", 1e-9),
 }  # fmt: skip

@@ -284,15 +284,17 @@ def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
     """1/L_sigma times (1 + [c s; s -c]), and the same for 1/L_M; needs at least two axes.
 
-    A leakage tensor, half of it on the rotor side, also turns R_R and 1/L_M a little: that part is tied to it.
+    R_R tilts with the two: K = L_m / (L_m + L_rl) turns the T circuit into this one, R_R = K^2 R_r, so that with the share
+    y = 0.5 + split of the leakage on the rotor's side its tilt is 2 y x / (1 + x) (leakage - magnetizing), x = L_sigma / L_M.
     """
     if setting.axes < 2:
         return ()
     parts = (("leakage", kinds.LEAKAGE_ANISOTROPY), ("magnetizing", kinds.MAGNETIZING_ANISOTROPY))
-    return tuple(
+    tilts = tuple(
         Term("inductance_anisotropy", f"{part}_{name}", "1", kind, c, 0.01, -0.5, 0.5)
         for part, kind in parts for c, name in enumerate(("cos", "sin"))
     )
+    return (*tilts, Term("inductance_anisotropy", "split", "1", kinds.ANISOTROPY_SPLIT, 0, 0.1, -0.5, 0.5))
 
 
 def _resistance_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:

@@ -15,6 +15,7 @@ from sim.scenario import build, load
 from tests.unit.diagnose.conftest import NOMINAL, PLATE
 
 TONES = [[14.0, 2.3, 0.4], [20.0, 41.9, 1.0], [30.0, 331.7, 2.0]]
+SHARE = NOMINAL[2] / (NOMINAL[2] + NOMINAL[3])
 VALUES = {
     "dead_time": {"leg_5": 0.5, "leg_6": 0.8, "leg_7": 0.5},
     "dc_link_sag": {"sag_10ms": 0.05},
@@ -32,7 +33,10 @@ VALUES = {
     "sensor_gain_mismatch": {"v": 0.01, "w": -0.02},
     "sensor_nonlinearity": {f"{p}_{k}": 0.01 for p in ("odd", "even") for k in "uvw"},
     "clock_drift": {"drift": 40.0},
-    "inductance_anisotropy": {"leakage_cos": 0.03, "leakage_sin": -0.02},
+    "inductance_anisotropy": {
+        "leakage_cos": 0.03 * (1.0 - SHARE), "leakage_sin": -0.02 * (1.0 - SHARE),
+        "magnetizing_cos": -0.03 * SHARE, "magnetizing_sin": 0.02 * SHARE, "split": 0.5,
+    },  # a leakage that lies on the rotor's side, as in the Gamma circuit
     "resistance_anisotropy": {"stator_cos": 0.02, "stator_sin": 0.03},
     "cable_capacitance": {"at": 3e-8},
 }
@@ -44,9 +48,10 @@ EQUAL = {
     "clock_drift",
     "sensor_lag",
     "resistance_anisotropy",
+    "inductance_anisotropy",
 }
 """Effects that both sides parameterise alike; the others are matched at one operating point."""
-EXACT = {"sampling_delay", "sensor_lag", "sensor_offset", "iron_loss"}
+EXACT = {"sampling_delay", "sensor_lag", "sensor_offset", "iron_loss", "inductance_anisotropy"}
 """Of these, those that both sides also solve alike."""
 
 
