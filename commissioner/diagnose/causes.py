@@ -192,11 +192,11 @@ def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[st
 
 
 def doubt(rest: Leftover, share: float) -> float:
-    """Factor on every confidence where what is left is small, yet more than noise makes around the tones, and a larger
+    """Factor on every confidence where what is left is small, yet more than noise makes around the tones or in a state, and a
 
-    part of all there was to explain than a right name leaves: 1 at the most that one may leave.
+    larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
     """
-    is_trace = rest.from_tones_sigma > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    is_trace = max(rest.from_tones_sigma, rest.from_states_sigma) > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
     return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
 
 

@@ -125,7 +125,7 @@ def _verdict(
     fitted = any(not c.from_audit for c in causes)
     if (
         rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
+        or (not fitted and (rest.sigma > MOSTLY_EXPLAINED_SIGMA or rest.from_states_sigma > 0.0)) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         if not is_complete:

@@ -13,6 +13,8 @@ from commissioner.diagnose.model import Model
 from commissioner.diagnose.reading import clock_courses
 from commissioner.diagnose.record import Record
 
+MATERIAL_SHARE = 1e-4
+"""A cause must move the current by this share of its rms (-80 dB), else it is listed as below materiality."""
 GUARD = 2e-5
 """A later cause must gain this share of what the strongest accepted nonlinearity gains, else it may be its shape."""
 CLASS_GUARD = 1e-2

@@ -1,4 +1,7 @@
-"""What is left of the error after the fit, judged against the measured noise: in all, line by line, and around the tones."""
+"""What is left of the error after the fit, judged against the measured noise: in all, line by line, around the tones, and
+
+by the current and its slope.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from commissioner.diagnose.fit import whiten
+from commissioner.diagnose.guards import MATERIAL_SHARE
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
@@ -19,7 +23,13 @@ Array = NDArray[np.float64]
 TONE_BINS, BESIDE_BINS = 3, 25
 """A tone is read with so many bins on each side; what the noise is there, from the bins beyond, up to so many."""
 ONCE_IN = 1e-9
-"""Chance with which noise alone may exceed the limit of one tone."""
+"""Chance with which noise alone may exceed the limit of one tone, or of all states together."""
+STATE_EDGES = (1e-3, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999)
+"""Quantiles between which a phase current, and its slope, count as one state: a limit is met in the last thousandth."""
+FEWEST = 20
+"""Samples of a state whose mean is judged."""
+PART_OF_MATERIAL = 0.1
+"""Of what a material error has, so much must show in the means over states: they hold a part of it."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +40,18 @@ class Leftover:
     from_power_sigma: float
     from_lines_sigma: float
     from_tones_sigma: float
+    from_states_sigma: float
     strongest_hz: float
 
 
 def leftover(
     model: Model, record: Record, layout: Layout, noise: Noise, numbers: int, tones_hz: Sequence[float] = ()
 ) -> Leftover:
-    """Three measures, the largest counts: total power above the noise (beyond three standard errors of the noise
+    """Four measures, the largest counts: total power above the noise (beyond three standard errors of the noise
 
-    estimate), power in single frequencies that noise would not show once in a thousand recordings, and power around
-    each excited tone, all segments and phases together, where what a model misses piles up first.
+    estimate), power in single frequencies that noise would not show once in a thousand recordings, power around
+    each excited tone, all segments and phases together, where what a model misses piles up first, and power that goes with the
+    state: a law that is met in a few instants only, like a slew limit, shows in no line.
     """
     power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
     around: list[list[_Around]] = [[] for _ in tones_hz]
@@ -67,10 +79,39 @@ def leftover(
     by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
     at_tones = 2.0 * sum(_excess(rows, noise.uncertainty) for rows in around)
     # the lines that coarse steps make are counted with the noise already
-    by_lines, by_tones = (
-        float(np.sqrt(max(power / count - noise.rounding_share, 0.0))) for power in (line_power, at_tones)
+    by_lines, by_tones, by_states = (
+        float(np.sqrt(max(power / count - noise.rounding_share, 0.0)))
+        for power in (line_power, at_tones, _by_state(record, predicted, noise))
     )
-    return Leftover(max(by_power, by_lines, by_tones), by_power, by_lines, by_tones, strongest[1])
+    return Leftover(max(by_power, by_lines, by_tones, by_states), by_power, by_lines, by_tones, by_states, strongest[1])
+
+
+def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float:
+    """Power of the whitened residual's means over states of a phase, its current and its slope, beyond chance
+
+    and material (else 0).
+    """
+    power, states, material = 0.0, 0, 0.0
+    for phase in range(record.facts.phases):
+        current = [expected[phase] for expected in predicted]
+        slope = [np.gradient(one) for one in current]
+        edges = [np.quantile(np.concatenate(some), STATE_EDGES) for some in (current, slope)]
+        cells = (len(STATE_EDGES) + 1) ** 2
+        total, samples = np.zeros(cells), np.zeros(cells)
+        for segment, i, d in zip(record.segments, current, slope, strict=True):
+            good = segment.is_good
+            residual = np.where(good, segment.currents_a[phase] - i, 0.0)
+            # the whitened residual in its place in time
+            white = np.fft.irfft(np.fft.rfft(residual) / noise.weights(i.size, segment.period_s)[phase], i.size)
+            state = np.searchsorted(edges[0], i) * (len(STATE_EDGES) + 1) + np.searchsorted(edges[1], d)
+            total += np.bincount(state[good], white[good], cells)
+            samples += np.bincount(state[good], minlength=cells)
+            material += float(np.sum(i**2)) * (MATERIAL_SHARE / noise.sigma_a[phase]) ** 2
+        kept = samples >= FEWEST
+        power += float((total[kept] ** 2 / samples[kept]).sum())
+        states += int(kept.sum())
+    is_chance = power < 2.0 * float(gammainccinv(0.5 * states, ONCE_IN))
+    return 0.0 if is_chance or power - states < PART_OF_MATERIAL * material else power - states
 
 
 @dataclass(frozen=True)

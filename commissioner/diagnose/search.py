@@ -30,10 +30,10 @@ EXPLORED = (45_000, 180_000)
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
 MENDED_SHARE = 0.7
-UNKNOWN_SIGMA = 0.25
-"""Where so much of the noise's rms is left, no cause makes it: nothing to be gained by settling the others."""
-HOPELESS_SIGMA, HOPELESS_SHARE = 0.3, 0.05
-"""Where a part's search ends with so much of the noise's rms, and of the error there was to explain, the whole finds no more."""
+UNKNOWN_SIGMA, UNKNOWN_SHARE = 0.1, 0.05
+"""Where so much of the noise's rms is left, and of the error there was to explain, no cause makes it: settling the others gains nothing."""
+HOPELESS_SIGMA = 0.3
+"""Where a part's search ends with so much, and that share, the whole finds no more."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def search(
         if accepted or part is record:
             start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
         fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
-        is_hopeless = _is_hopeless(fitted, nominal)
+        is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
         setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
         model = without_curves(_completed(fitted.model, accepted, setting))
@@ -108,8 +108,8 @@ def search(
             losses += more
             whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
-    layout, count = whole.layout, float(fitted.normal.count.sum())
-    if fitted.chi2 - count < UNKNOWN_SIGMA**2 * count:
+    layout = whole.layout
+    if not _leaves(UNKNOWN_SIGMA, fitted, nominal):
         fitted, layout = settled(fitted, whole.record, layout, noise)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
@@ -121,9 +121,10 @@ def search(
     )
 
 
-def _is_hopeless(fitted: Fit, nominal: Fit) -> bool:
+def _leaves(sigma: float, fitted: Fit, nominal: Fit) -> bool:
+    """Whether more than so many `sigma` of the noise, and more than a right model leaves, is not explained."""
     left, before = (f.chi2 / float(f.normal.count.sum()) - 1.0 for f in (fitted, nominal))
-    return left > max(HOPELESS_SIGMA**2, HOPELESS_SHARE * before)
+    return left > max(sigma**2, UNKNOWN_SHARE * before)
 
 
 def _mended(

@@ -17,7 +17,7 @@ from commissioner.diagnose.dictionaries import following, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, as_a_lag, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, effects_of, guard, is_plausible, losses_of, meets_tones
+from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, guard, is_plausible, losses_of, meets_tones
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import with_flux_before
@@ -26,8 +26,6 @@ from commissioner.diagnose.screen import Screening, price, required_chi2, screen
 from commissioner.diagnose.settle import placed
 
 MOST_CAUSES = 6
-MATERIAL_SHARE = 1e-4
-"""A cause must move the current by this share of its rms (-80 dB), else it is listed as below materiality."""
 REFITTED = 4
 IMPLAUSIBLE = 2
 """A candidate whose refit came out implausible so often is not refitted again."""
@@ -40,7 +38,7 @@ MOST_LOOKS = 3
 STEPS_GUARD = 0.5
 """As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
 slow changes from segment to segment, as a shaft's motion or a drift does."""
-LARGE_REST, CRUMB = 0.3, 0.08
+LARGE_REST, CRUMB = 0.1, 0.15
 """A rest above this multiple of the noise of which the best candidate takes less than this share is left as it is."""
 
 Report = Callable[[str], None]
