@@ -29,7 +29,8 @@ EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
-MENDED_SHARE = 0.7
+MENDED_SHARE, MENDED_LEAST_SHARE = 0.7, 0.3
+"""Of the misfit that the noise's doubt cannot make, and at the least of all of it, so much must be gone with them."""
 UNKNOWN_SIGMA, UNKNOWN_SHARE = 0.1, 0.05
 """Where so much of the noise's rms is left, and of the error there was to explain, no cause makes it: settling the others gains nothing."""
 HOPELESS_SIGMA = 0.3
@@ -146,7 +147,10 @@ def _mended(
             break
         mended, better, losses = again, trial, seen
     excess, left = (f.chi2 - f.normal.count.sum() for f in (current, better))
-    if not losses or left > (1.0 - MENDED_SHARE) * excess or excess - left < least:
+    # what a noise measured too low adds to both
+    doubt = noise.uncertainty * float(current.normal.count.sum())
+    stays = max(left - doubt, 0.0) > (1.0 - MENDED_SHARE) * max(excess - doubt, 0.0)
+    if not losses or stays or excess - left < max(least, MENDED_LEAST_SHARE * excess):
         return record, current, ()
     report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
     return mended, better, losses
