@@ -26,7 +26,7 @@ ONCE_IN = 1e-9
 """Chance with which noise alone may exceed the limit of one tone, or of all states together."""
 STATE_EDGES = (1e-3, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999)
 """Quantiles between which a phase current, and its slope, count as one state: a limit is met in the last thousandth."""
-FEWEST = 20
+FEWEST = 10
 """Samples of a state whose mean is judged."""
 PART_OF_MATERIAL = 0.1
 """Of what a material error has, so much must show in the means over states: they hold a part of it."""
@@ -87,31 +87,35 @@ def leftover(
 
 
 def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float:
-    """Power of the whitened residual's means over states of a phase, its current and its slope, beyond chance
+    """Power of the whitened residual's means over states of a phase, beyond chance and material (else 0): over its current,
 
-    and material (else 0).
+    over its slope, or over both, whichever shows most.
     """
-    power, states, material = 0.0, 0, 0.0
+    bins = len(STATE_EDGES) + 1
+    power, states = np.zeros(3), np.zeros(3)
+    material = 0.0
     for phase in range(record.facts.phases):
         current = [expected[phase] for expected in predicted]
         slope = [np.gradient(one) for one in current]
         edges = [np.quantile(np.concatenate(some), STATE_EDGES) for some in (current, slope)]
-        cells = (len(STATE_EDGES) + 1) ** 2
-        total, samples = np.zeros(cells), np.zeros(cells)
+        total, samples = np.zeros((bins, bins)), np.zeros((bins, bins))
         for segment, i, d in zip(record.segments, current, slope, strict=True):
             good = segment.is_good
             residual = np.where(good, segment.currents_a[phase] - i, 0.0)
             # the whitened residual in its place in time
             white = np.fft.irfft(np.fft.rfft(residual) / noise.weights(i.size, segment.period_s)[phase], i.size)
-            state = np.searchsorted(edges[0], i) * (len(STATE_EDGES) + 1) + np.searchsorted(edges[1], d)
-            total += np.bincount(state[good], white[good], cells)
-            samples += np.bincount(state[good], minlength=cells)
+            at = (np.searchsorted(edges[0], i[good]), np.searchsorted(edges[1], d[good]))
+            np.add.at(total, at, white[good])
+            np.add.at(samples, at, 1.0)
             material += float(np.sum(i**2)) * (MATERIAL_SHARE / noise.sigma_a[phase]) ** 2
-        kept = samples >= FEWEST
-        power += float((total[kept] ** 2 / samples[kept]).sum())
-        states += int(kept.sum())
-    is_chance = power < 2.0 * float(gammainccinv(0.5 * states, ONCE_IN))
-    return 0.0 if is_chance or power - states < PART_OF_MATERIAL * material else power - states
+        for k, over in enumerate(((1,), (0,), ())):
+            sums, counts = total.sum(axis=over), samples.sum(axis=over)
+            kept = counts >= FEWEST
+            power[k] += float((sums[kept] ** 2 / counts[kept]).sum())
+            states[k] += int(kept.sum())
+    excess = power - states
+    is_seen = (power > 2.0 * gammainccinv(0.5 * states, ONCE_IN)) & (excess > PART_OF_MATERIAL * material)
+    return float(excess[is_seen].max(initial=0.0))
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
     every = set(at_work.tolist()) | {t.kind for t in model.terms}
     machine = _machine(model, layout, every)
     period = segment.period_s
-    start = _initial_state(model, segment, _decay_tilt(machine[0]))
+    start = initial_state(model, segment, _decay_tilt(machine[0]))
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v} | (every & {kinds.STOP, kinds.BRANCH})
@@ -199,7 +199,7 @@ def _if(is_used: bool, vectors: Array) -> Array:
     return vectors if is_used else vectors[:0]
 
 
-def _initial_state(model: Model, segment: Segment, tilt: Array) -> Array:
+def initial_state(model: Model, segment: Segment, tilt: Array) -> Array:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
     state = np.zeros(4)
     along, across = _carried(model, segment)

@@ -130,6 +130,11 @@ def sensitivities(
                 left = share * (flux_before[1, 1 - c] if n == 1 else (1.0 - 2.0 * c) * flux_before[1, c])
                 dx[c, p] = left
                 dx[2 + c, p] = left
+        elif kinds[p] == ANISOTROPY_SPLIT:
+            for c in range(2):
+                left = splits_b * flux_before[1, 1 - c] + (1.0 - 2.0 * c) * splits_a * flux_before[1, c]
+                dx[c, p] = left
+                dx[2 + c, p] = left
         elif kinds[p] == INITIAL_FLUX:
             if n < 2:
                 dx[n, p] = 1.0

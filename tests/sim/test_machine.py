@@ -125,6 +125,23 @@ def test_blocked_output_kills_the_current_in_milliseconds_and_leaves_the_rotor_t
     assert middle < before
 
 
+@pytest.mark.parametrize("shape", ["leakage", "main"])
+def test_an_open_anisotropic_machine_carries_no_current_and_its_flux_decays_by_direction(shape):
+    """d psi_r/dt = -R_r (L_s + L_leak)^-1 psi_r with both inductances tensors: the closed form of the open Gamma circuit."""
+    size, angle = 0.05, math.radians(2.0 * 30.0)
+    plant = replace(IDEAL, effects=(Effect("inductance_anisotropy", size, shape, {"angle_deg": 30.0}),))
+    m, tilt = plant.machine, np.array([[math.cos(angle), math.sin(angle)], [math.sin(angle), -math.cos(angle)]])
+    tilted, plain = np.linalg.inv(np.eye(2) + size * tilt), np.eye(2)
+    main, leak = (tilted, plain) if shape == "main" else (plain, tilted)
+    rate = m.rotor_resistance_ohm * np.linalg.inv(m.inductance_h * main + m.leakage_inductance_h * leak)
+    _, x, p = play(plant, np.full(10000, 15.0))
+    coast(x, p, 0.0501)
+    assert all_currents(x, p)[:2] == pytest.approx((0.0, 0.0), abs=1e-9)
+    before = x[2:4].copy()
+    coast(x, p, 0.1)
+    assert x[2:4] == pytest.approx(expm(-0.1 * rate) @ before, rel=1e-3, abs=2e-5 * before[0])
+
+
 def test_inverse_gamma_and_gamma_circuits_have_one_impedance():
     m, q = REAL.machine, inverse_gamma(REAL, 0.9)
     ls = 0.34 / (1.0 + (0.84 * 0.9) ** 7)

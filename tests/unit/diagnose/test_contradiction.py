@@ -92,3 +92,16 @@ def test_a_weak_structure_around_the_tones_is_seen_and_noise_is_not(plain, setti
     right, missed = (leftover(m, record, layout, noise, 4, audit.excited_hz) for m in (nominal, wrong))
     assert right.sigma == right.from_tones_sigma == 0.0
     assert 0.02 < missed.from_tones_sigma < 0.3
+
+
+def test_a_law_met_in_two_samples_of_a_thousand_is_seen_and_no_cause_is_named_for_it(plain, setting, nominal):
+    """A sensor that cannot follow the steepest instants: 6 sigma there, nothing elsewhere, 0.27 of the noise in all."""
+    expected = np.concatenate([predict(nominal, setting.record, k, setting.layout).currents_a for k in range(3)], axis=1)
+    slope = np.gradient(expected, axis=1)
+    steep = np.abs(slope) > np.quantile(np.abs(slope), 0.998)
+    rows = [plain.current_u_a, plain.current_v_a, plain.current_w_a] - 0.06 * np.sign(slope) * steep
+    seen = diagnose([replace(plain, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])
+    assert seen.verdict.value == "unexplained"
+    assert not [c for c in seen.causes if c.confidence > 0.8]
+    assert seen.left.from_states_sigma > 0.05
+    assert diagnose([plain]).left.from_states_sigma == 0.0

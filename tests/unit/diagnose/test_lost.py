@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.diagnosis import diagnose
+from commissioner.diagnose.fit import fit
 from commissioner.diagnose.lost import mend
 from commissioner.diagnose.noise import measure_noise
 from commissioner.diagnose.plant import predict
+from commissioner.diagnose.search import _mended
 from tests.unit.diagnose.conftest import recording
 
 NOISE_A = 2e-3
@@ -59,3 +61,24 @@ def test_a_whole_record_loses_nothing(nominal, setting):
     record = record_with(nominal, setting, lambda k, rows: rows)
     mended, losses = mend(record, nominal, setting.layout, measure_noise(record), is_first=True)
     assert losses == () and all(a is b for a, b in zip(mended.segments, record.segments, strict=True))
+
+
+def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, setting):
+    """Noise too low adds as much misfit as seven held samples: within its stated doubt, or as if something else were there."""
+    rows = predict(nominal, setting.record, 1, setting.layout).currents_a
+    step = np.abs(np.diff(rows, axis=1, prepend=rows[:, :1])).max(axis=0)
+    held = np.flatnonzero((step > 35.0 * NOISE_A) & (step < 50.0 * NOISE_A))[::8][:7]
+
+    def change(k, rows):
+        if k == 1:
+            rows[:, held] = rows[:, held - 1]
+        return rows
+
+    record, noise = record_with(nominal, setting, change), measure_noise(record_with(nominal, setting, lambda k, rows: rows))
+    true = fit(nominal, record, setting.layout, noise)
+    excess = true.chi2 / float(true.normal.count.sum()) - 1.0
+    low = replace(noise, sigma_a=noise.sigma_a / np.sqrt(1.0 + excess), uncertainty=excess)
+    current = fit(nominal, record, setting.layout, low)
+    losses = _mended(record, current, setting.layout, low, lambda _: None)[2]
+    assert sum(x.samples for x in losses) == held.size
+    assert _mended(record, current, setting.layout, replace(low, uncertainty=0.0), lambda _: None)[2] == ()
