@@ -1,6 +1,6 @@
 """What is left of the error after the fit, judged against the measured noise: in all, line by line, around the tones, and
 
-by the current and its slope.
+by the current, its slope and the time.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ ONCE_IN = 1e-9
 """Chance with which noise alone may exceed the limit of one tone, or of all states together."""
 STATE_EDGES = (1e-3, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999)
 """Quantiles between which a phase current, and its slope, count as one state: a limit is met in the last thousandth."""
+PARTS = 4
+"""Parts of a segment over which time is a state."""
 FEWEST = 10
 """Samples of a state whose mean is judged."""
 PART_OF_MATERIAL = 0.1
@@ -89,10 +91,10 @@ def leftover(
 def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float:
     """Power of the whitened residual's means over states of a phase, beyond chance and material (else 0): over its current,
 
-    over its slope, or over both, whichever shows most.
+    over its slope, over both, or over time, whichever shows most.
     """
     bins = len(STATE_EDGES) + 1
-    power, states = np.zeros(3), np.zeros(3)
+    means = [_Means() for _ in range(4)]
     material = 0.0
     for phase in range(record.facts.phases):
         current = [expected[phase] for expected in predicted]
@@ -107,15 +109,34 @@ def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float
             at = (np.searchsorted(edges[0], i[good]), np.searchsorted(edges[1], d[good]))
             np.add.at(total, at, white[good])
             np.add.at(samples, at, 1.0)
+            parts = zip(np.array_split(np.where(good, white, 0.0), PARTS), np.array_split(good, PARTS), strict=True)
+            means[3].add(*(np.array(one) for one in zip(*((w.sum(), g.sum()) for w, g in parts), strict=True)))
             material += float(np.sum(i**2)) * (MATERIAL_SHARE / noise.sigma_a[phase]) ** 2
-        for k, over in enumerate(((1,), (0,), ())):
-            sums, counts = total.sum(axis=over), samples.sum(axis=over)
-            kept = counts >= FEWEST
-            power[k] += float((sums[kept] ** 2 / counts[kept]).sum())
-            states[k] += int(kept.sum())
-    excess = power - states
-    is_seen = (power > 2.0 * gammainccinv(0.5 * states, ONCE_IN)) & (excess > PART_OF_MATERIAL * material)
-    return float(excess[is_seen].max(initial=0.0))
+        for over, one in zip(((1,), (0,), ()), means, strict=False):
+            one.add(total.sum(axis=over), samples.sum(axis=over))
+    seen = [m.excess for m in means if m.is_beyond_chance and m.excess > PART_OF_MATERIAL * material]
+    return max(seen, default=0.0)
+
+
+@dataclass
+class _Means:
+    """Power of means over states in units of the noise's, one for every state that has samples enough."""
+
+    power: float = 0.0
+    states: int = 0
+
+    def add(self, sums: Array, samples: Array) -> None:
+        kept = samples >= FEWEST
+        self.power += float((sums[kept] ** 2 / samples[kept]).sum())
+        self.states += int(kept.sum())
+
+    @property
+    def excess(self) -> float:
+        return self.power - self.states
+
+    @property
+    def is_beyond_chance(self) -> bool:
+        return self.power > 2.0 * float(gammainccinv(0.5 * max(self.states, 1), ONCE_IN))
 
 
 @dataclass(frozen=True)
