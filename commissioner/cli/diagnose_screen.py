@@ -109,7 +109,7 @@ def _next(document: Mapping[str, Any]) -> None:
 
 def _limits(document: Mapping[str, Any]) -> str:
     """The smallest detectable sizes of the commonest causes that were not found and are not in doubt."""
-    known = document.get("detection_limit_sizes", {})
+    known = document.get("detection_limits", {})
     apart = {u["name"] for u in document.get("uncertain", ())} | {n for c in document["causes"] for n in members(c)}
     names = [n for n in dict.fromkeys((*COMMON, *known)) if n in known and n not in apart]
     return ", ".join(f"{spoken(n)} from {limit_words(document, n)}" for n in names[:MOST_LIMITS])

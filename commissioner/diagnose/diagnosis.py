@@ -64,7 +64,6 @@ class Diagnosis:
     left: Leftover | None = None
     parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
     parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
-    detection_limits: Mapping[str, float] = field(default_factory=dict)
     next_experiment: Mapping[str, object] | None = None
     model: Mapping[str, object] = field(default_factory=dict)
     found: Found | None = None
@@ -113,7 +112,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
-        rest, _parameters(found.nominal), _parameters(found.fit), _limits(found), experiment,
+        rest, _parameters(found.nominal), _parameters(found.fit), experiment,
         model_document(found, [*causes, *unsure]), found, split_lines(record), share,
         _remarks(noise, record, found.is_complete, unsure), unsure,
     )
@@ -161,20 +160,6 @@ def _parameters(one: Fit) -> dict[str, Quantity]:
     spread = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3]
     t = l_m.value / r_r.value
     out["rotor_time_constant_s"] = Quantity(t, float(t * np.sqrt(max(spread, 0.0))))
-    return out
-
-
-def _limits(found: Found) -> dict[str, float]:
-    """Smallest size of each effect (its step's multiple) that would have been found, in its first number's unit."""
-    out = {}
-    screening = found.first_screening
-    scale = found.record.samples / max(sum(screening.normal.count) / found.record.facts.phases, 1.0)
-    for name, score in screening.scores.items():
-        k = list(screening.columns[name])
-        power = screening.projected[np.ix_(k, k)]
-        best = float(np.linalg.eigvalsh(power)[-1]) * max(scale, 1.0)
-        if best > 0:
-            out[name] = float(np.sqrt(score.threshold / best) * score.terms[0].step)
     return out
 
 

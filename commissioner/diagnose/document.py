@@ -42,8 +42,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
         "parameters_before": _quantities(seen.parameters_before),
         "parameters_after": _quantities(seen.parameters_after),
         "below_materiality": list(seen.below_materiality),
-        "detection_limits": dict(seen.detection_limits),
-        "detection_limit_sizes": limit_sizes(seen.found) if seen.found else {},
+        "detection_limits": detection_limits(seen.found) if seen.found else {},
         "cannot_tell": list(NEVER_NAMEABLE) if seen.found else [],
         "line_levels_db": dict(seen.split.level_db) if seen.split else {},
         "audit": list(seen.audit.sentences),
@@ -69,8 +68,8 @@ def _cause(cause: Cause) -> dict[str, Any]:
     }
 
 
-def limit_sizes(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
-    """The detection limits as engineering sizes: the first of each effect, at its most visible shape."""
+def detection_limits(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
+    """Smallest size of each effect that these data would have shown: the first of its sizes, at its most visible shape."""
     screening = found.first_screening
     out: dict[str, dict[str, dict[str, float | str]]] = {}
     scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)

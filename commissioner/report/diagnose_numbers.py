@@ -87,7 +87,7 @@ def _readable(entry: Mapping[str, Any], key: str) -> tuple[float, float, str]:
 
 def limit_words(document: Mapping[str, Any], name: str) -> str:
     """Smallest size these data would have shown, in the unit that the cause's size has; `-` where there is none."""
-    for key, entry in document.get("detection_limit_sizes", {}).get(name, {}).items():
+    for key, entry in document.get("detection_limits", {}).get(name, {}).items():
         return short({"std": None, **entry}, key)
     return "-"
 

@@ -49,7 +49,7 @@ def test_numbers_have_no_tails_and_nothing_is_certain():
 
 def test_a_detection_limit_is_read_in_the_unit_of_its_size():
     limits = {"sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}}, "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}}}
-    document = {"detection_limit_sizes": limits}
+    document = {"detection_limits": limits}
     assert limit_words(document, "sensor_offset") == "71 µA"
     assert limit_words(document, "dc_link_sag") == "0.12 %"
     assert limit_words(document, "clipping") == "-"

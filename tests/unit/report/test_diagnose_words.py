@@ -33,11 +33,11 @@ def document(verdict, causes=(), **more):
     """What `diagnose` writes, as far as the words need it."""
     gain = {"held_out": 0.9999, "rmse_before_a": 0.33, "rmse_after_a": 0.0104, "noise_floor_a": 0.0103, "explained_share": 0.9999,
             "structured_error_over_noise": 11.3}
-    limits = dict.fromkeys(("sensor_offset", "sensor_lag", "leakage_saturation"), 1.0)
+    limits = {name: {} for name in ("sensor_offset", "sensor_lag", "leakage_saturation")}
     return {
         "verdict": verdict, "reason": "a reason with sensor_offset", "kind": "recording", "causes": list(causes), "gain": gain,
         "remarks": [], "audit": [], "next_experiment": None, "parameters_before": {}, "parameters_after": {}, "uncertain": [],
-        "detection_limits": limits, "detection_limit_sizes": {}, "cannot_tell": [], "line_levels_db": {}, "dc_link_v": 540.0, **more,
+        "detection_limits": limits, "cannot_tell": [], "line_levels_db": {}, "dc_link_v": 540.0, **more,
     }
 
 
