@@ -33,6 +33,8 @@ from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
 UNEXPLAINED_SIGMA = 0.3
+UNEXPLAINED_STATE_SIGMA = 0.03
+"""Of what goes with the state, where nothing is fitted: means over states show about a third of what is there."""
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -124,7 +126,7 @@ def _verdict(
     fitted = any(not c.from_audit for c in causes)
     if (
         rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and (rest.sigma > MOSTLY_EXPLAINED_SIGMA or rest.from_states_sigma > 0.0)) or leaves_a_trace
+        or (not fitted and (rest.sigma > MOSTLY_EXPLAINED_SIGMA or rest.from_states_sigma > UNEXPLAINED_STATE_SIGMA)) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         if not is_complete:
