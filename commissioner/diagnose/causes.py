@@ -128,9 +128,12 @@ def _cause(
     sure = confidence(features, calibration.WEIGHTS) * trust
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
+    strength = float(np.sqrt(gain / count))
+    if strength < calibration.TRACE_SIGMA:
+        sure *= calibration.TRACE_FACTOR
     return Cause(
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
-        float(np.sqrt(gain / count)), gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
+        strength, gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
         {n: r.loss for n, r in rivals.items()}, tuple(features),
     )
 
