@@ -34,7 +34,10 @@ from commissioner.records import StandstillRecording
 
 UNEXPLAINED_SIGMA = 0.3
 UNEXPLAINED_STATE_SIGMA = 0.03
-"""Of what goes with the state, where nothing is fitted: means over states show about a third of what is there."""
+"""Of what goes with the state, where nothing is named and no cause that is too small to matter makes it: means over states show
+
+about a third of what is there.
+"""
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -110,10 +113,13 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     causes, unsure = causes_of(found, rest, trust, audit, noise, excluded)
     total = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
     share, rest = explained_share(found, rest, total.sigma), total
-    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=trust < 1.0, is_complete=found.is_complete)
+    trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
+    trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
+    is_seen = rest.from_states_sigma**2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
+    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=trust < 1.0 or (is_seen and not causes), is_complete=found.is_complete)
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
-        verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), found.below_materiality, audit, noise, held,
+        verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
         rest, _parameters(found.nominal), _parameters(found.fit), experiment,
         model_document(found, [*causes, *unsure]), found, split_lines(record), share,
         _remarks(noise, record, found.is_complete, unsure), unsure,
@@ -126,7 +132,7 @@ def _verdict(
     fitted = any(not c.from_audit for c in causes)
     if (
         rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and (rest.sigma > MOSTLY_EXPLAINED_SIGMA or rest.from_states_sigma > UNEXPLAINED_STATE_SIGMA)) or leaves_a_trace
+        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         if not is_complete:

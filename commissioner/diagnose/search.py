@@ -23,7 +23,7 @@ from commissioner.diagnose.nominal import (
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
 from commissioner.diagnose.settle import settled, without_curves
-from commissioner.diagnose.steps import Report, Steps
+from commissioner.diagnose.steps import NOISE_DOUBT, Report, Steps
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
@@ -49,7 +49,8 @@ class Found:
     setting: Setting
     screening: Screening
     first_screening: Screening
-    below_materiality: tuple[str, ...] = ()
+    below_materiality: dict[str, float] = field(default_factory=dict)
+    """Causes that would gain, but too little to matter: what they gain in chi2."""
     gains: dict[str, float] = field(default_factory=dict)
     losses: tuple[Loss, ...] = ()
     is_complete: bool = True
@@ -91,7 +92,7 @@ def search(
         if accepted or part is record:
             start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
         fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
-        is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal)
+        is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal, noise)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
         setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
         model = without_curves(_completed(fitted.model, accepted, setting))
@@ -110,7 +111,7 @@ def search(
             whole = whole.on(mended)
             fitted, accepted, last = whole.run(again, accepted)
     layout = whole.layout
-    if not _leaves(UNKNOWN_SIGMA, fitted, nominal):
+    if not _leaves(UNKNOWN_SIGMA, fitted, nominal, noise):
         fitted, layout = settled(fitted, whole.record, layout, noise)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
@@ -118,13 +119,15 @@ def search(
     )
     return Found(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
-        tuple(whole.below), losses_of(fitted, accepted), losses, go_on(),
+        whole.below, losses_of(fitted, accepted), losses, go_on(),
     )
 
 
-def _leaves(sigma: float, fitted: Fit, nominal: Fit) -> bool:
-    """Whether more than so many `sigma` of the noise, and more than a right model leaves, is not explained."""
-    left, before = (f.chi2 / float(f.normal.count.sum()) - 1.0 for f in (fitted, nominal))
+def _leaves(sigma: float, fitted: Fit, nominal: Fit, noise: Noise) -> bool:
+    """Whether more than so many `sigma` of the noise, and more than a right model leaves, is surely not explained."""
+    left, before = (
+        f.chi2 / float(f.normal.count.sum()) - 1.0 - NOISE_DOUBT * noise.uncertainty for f in (fitted, nominal)
+    )
     return left > max(sigma**2, UNKNOWN_SHARE * before)
 
 

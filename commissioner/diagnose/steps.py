@@ -38,8 +38,10 @@ MOST_LOOKS = 3
 STEPS_GUARD = 0.5
 """As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
 slow changes from segment to segment, as a shaft's motion or a drift does."""
-LARGE_REST, CRUMB = 0.1, 0.15
-"""A rest above this multiple of the noise of which the best candidate takes less than this share is left as it is."""
+LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 3.0
+"""A rest above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
+
+this share is left as it is."""
 
 Report = Callable[[str], None]
 
@@ -52,7 +54,7 @@ class Steps:
     ) -> None:
         self.setting, self.noise = setting, noise
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
-        self.below: list[str] = []
+        self.below: dict[str, float] = {}
         self.implausible: list[str] = []
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
@@ -159,7 +161,7 @@ class Steps:
                 self.implausible.append(score.name)
             if gain < wanted or not is_sound:
                 if required_chi2(score.numbers) < gain:
-                    self.below.append(score.name)
+                    self.below[score.name] = gain
                 continue
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
@@ -168,9 +170,10 @@ class Steps:
 
     def _is_crumb(self, current: Fit, trial: Fit) -> bool:
         """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
-        rest = current.chi2 - float(current.normal.count.sum())
-        is_large = rest > LARGE_REST**2 * float(current.normal.count.sum())
-        return is_large and current.chi2 - trial.chi2 < CRUMB * rest
+        count = float(current.normal.count.sum())
+        # a noise measured too low is no rest
+        rest = current.chi2 - count * (1.0 + NOISE_DOUBT * self.noise.uncertainty)
+        return rest > LARGE_REST**2 * count and current.chi2 - trial.chi2 < CRUMB * rest
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None
