@@ -38,7 +38,7 @@ MOST_LOOKS = 3
 STEPS_GUARD = 0.5
 """As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
 slow changes from segment to segment, as a shaft's motion or a drift does."""
-LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 3.0
+LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 2.0
 """A rest above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
 
 this share is left as it is."""
