@@ -177,6 +177,12 @@ def _standing(v_a, v_b, t, link, x, p):
 
 
 @piece
+def _cage_drop(ir_a, ir_b, r_r, m):
+    """Voltage (V) that the rotor current loses in the cage, whose resistance may differ between directions."""
+    return r_r * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b), r_r * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b)
+
+
+@piece
 def _stage(ra, rb, is_a, is_b, ir_a, ir_b, now, m):
     """(d psi_s/dt, d psi_r/dt without what deep bars take, i_s), alpha and beta each. Scalars only."""
     e_a, e_b = _back_emf(is_a, is_b, now, m)
@@ -185,8 +191,9 @@ def _stage(ra, rb, is_a, is_b, ir_a, ir_b, now, m):
         for _ in range(6):
             is_a, is_b = core_a + m.iron_s * e_a, core_b + m.iron_s * e_b
             e_a, e_b = _back_emf(is_a, is_b, now, m)
-    d_a = -now.r_r * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b) - now.speed * rb
-    d_b = -now.r_r * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b) + now.speed * ra
+    drop_a, drop_b = _cage_drop(ir_a, ir_b, now.r_r, m)
+    d_a = -drop_a - now.speed * rb
+    d_b = -drop_b + now.speed * ra
     return e_a, e_b, d_a, d_b, is_a, is_b
 
 
@@ -501,8 +508,7 @@ def coast(x, p, seconds):
         rate = p[at.P_RR] * (size - _open_flux(size, m)) * m.per_leak_h
         keep = math.exp(-step * rate / size) if size > 1e-12 else 0.0
         ir_a, ir_b = rotor_current(x[2] - x[0], x[3] - x[1], m)
-        lost_a = p[at.P_RR] * (ir_a + m.cage_c * ir_a + m.cage_s * ir_b)
-        lost_b = p[at.P_RR] * (ir_b + m.cage_s * ir_a - m.cage_c * ir_b)
+        lost_a, lost_b = _cage_drop(ir_a, ir_b, p[at.P_RR], m)
         share = rate / size if size > 1e-12 else 0.0
         side_a, side_b = step * (share * x[2] - lost_a), step * (share * x[3] - lost_b)  # what a direction keeps more than the mean
         turn = step * _shaft_speed(x[at.X_TIME] + spent, p)  # the rotor takes its flux along

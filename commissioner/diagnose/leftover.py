@@ -58,6 +58,7 @@ def leftover(
     power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
     around: list[list[_Around]] = [[] for _ in tones_hz]
     predicted = each_segment(lambda k: predict(model, record, k, layout).currents_a, record)
+    whitened: list[Array] = []
     for segment, expected in zip(record.segments, predicted, strict=True):
         residual = segment.currents_a - expected
         white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
@@ -65,8 +66,10 @@ def leftover(
         count += int(segment.is_good.sum()) * record.facts.phases
         period = record.facts.sample_period_s
         n = segment.count
-        masked = np.where(segment.is_good, residual, 0.0)
-        spectrum = np.abs(np.fft.rfft(masked, axis=1)[:, 1:]) ** 2 / n / noise.weights(n, period)[:, 1:] ** 2
+        transform = np.fft.rfft(np.where(segment.is_good, residual, 0.0), axis=1) / noise.weights(n, period)
+        spectrum = np.abs(transform[:, 1:]) ** 2 / n
+        # the whitened residual in its place in time
+        whitened.append(np.fft.irfft(transform, n, axis=1))
         limit = np.log(spectrum.size * len(record.segments)) + 7.0
         high = spectrum > limit
         line_power += 2.0 * float((spectrum[high] - 1.0).sum())
@@ -83,13 +86,13 @@ def leftover(
     # the lines that coarse steps make are counted with the noise already
     by_lines, by_tones, by_states = (
         float(np.sqrt(max(power / count - noise.rounding_share, 0.0)))
-        for power in (line_power, at_tones, _by_state(record, predicted, noise))
+        for power in (line_power, at_tones, _by_state(record, predicted, whitened, noise))
     )
     return Leftover(max(by_power, by_lines, by_tones, by_states), by_power, by_lines, by_tones, by_states, strongest[1])
 
 
-def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float:
-    """Power of the whitened residual's means over states of a phase, beyond chance and material (else 0): over its current,
+def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Array], noise: Noise) -> float:
+    """Power of the `whitened` residual's means over states of a phase, beyond chance and material (else 0): over its current,
 
     over its slope, over both, or over time, whichever shows most.
     """
@@ -101,11 +104,8 @@ def _by_state(record: Record, predicted: Sequence[Array], noise: Noise) -> float
         slope = [np.gradient(one) for one in current]
         edges = [np.quantile(np.concatenate(some), STATE_EDGES) for some in (current, slope)]
         total, samples = np.zeros((bins, bins)), np.zeros((bins, bins))
-        for segment, i, d in zip(record.segments, current, slope, strict=True):
+        for segment, white, i, d in zip(record.segments, (w[phase] for w in whitened), current, slope, strict=True):
             good = segment.is_good
-            residual = np.where(good, segment.currents_a[phase] - i, 0.0)
-            # the whitened residual in its place in time
-            white = np.fft.irfft(np.fft.rfft(residual) / noise.weights(i.size, segment.period_s)[phase], i.size)
             at = (np.searchsorted(edges[0], i[good]), np.searchsorted(edges[1], d[good]))
             np.add.at(total, at, white[good])
             np.add.at(samples, at, 1.0)

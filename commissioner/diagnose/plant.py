@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from commissioner.diagnose import kinds
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
-from commissioner.diagnose.tangent import sensitivities
+from commissioner.diagnose.tangent import sensitivities, tilted
 from commissioner.diagnose.terminals import sense
 from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying
 
@@ -204,7 +204,7 @@ def initial_state(model: Model, segment: Segment, tilt: Array) -> Array:
     state = np.zeros(4)
     along, across = _carried(model, segment)
     alpha, beta = segment.flux_before_wb
-    turned = _per_tilt(along) * np.array([tilt[0] * alpha + tilt[1] * beta, tilt[1] * alpha - tilt[0] * beta])
+    turned = _per_tilt(along) * np.array(tilted(tilt[0], tilt[1], alpha, beta))
     left = np.array([along * alpha - across * beta, along * beta + across * alpha]) + turned
     state[:] = [*left, *left]
     for term, value in zip(model.terms, model.values, strict=True):

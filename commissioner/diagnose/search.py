@@ -23,7 +23,7 @@ from commissioner.diagnose.nominal import (
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
 from commissioner.diagnose.settle import settled, without_curves
-from commissioner.diagnose.steps import NOISE_DOUBT, Report, Steps
+from commissioner.diagnose.steps import Report, Steps, surely_left
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
@@ -125,10 +125,7 @@ def search(
 
 def _leaves(sigma: float, fitted: Fit, nominal: Fit, noise: Noise) -> bool:
     """Whether more than so many `sigma` of the noise, and more than a right model leaves, is surely not explained."""
-    left, before = (
-        f.chi2 / float(f.normal.count.sum()) - 1.0 - NOISE_DOUBT * noise.uncertainty for f in (fitted, nominal)
-    )
-    return left > max(sigma**2, UNKNOWN_SHARE * before)
+    return surely_left(fitted, noise) > max(sigma**2, UNKNOWN_SHARE * surely_left(nominal, noise))
 
 
 def _mended(

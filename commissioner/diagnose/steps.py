@@ -46,6 +46,11 @@ this share is left as it is."""
 Report = Callable[[str], None]
 
 
+def surely_left(fitted: Fit, noise: Noise) -> float:
+    """Power that is not explained, over the noise's, of which a noise measured too low makes none."""
+    return fitted.chi2 / float(fitted.normal.count.sum()) - 1.0 - NOISE_DOUBT * noise.uncertainty
+
+
 class Steps:
     """One record (the first part of every segment of `full`, or all of it), one dictionary; remembers what was tried."""
 
@@ -170,10 +175,8 @@ class Steps:
 
     def _is_crumb(self, current: Fit, trial: Fit) -> bool:
         """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
-        count = float(current.normal.count.sum())
-        # a noise measured too low is no rest
-        rest = current.chi2 - count * (1.0 + NOISE_DOUBT * self.noise.uncertainty)
-        return rest > LARGE_REST**2 * count and current.chi2 - trial.chi2 < CRUMB * rest
+        rest = surely_left(current, self.noise)
+        return rest > LARGE_REST**2 and current.chi2 - trial.chi2 < CRUMB * rest * float(current.normal.count.sum())
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None

@@ -69,6 +69,18 @@ def _phases(a, b, out):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def tilted(cosine, sine, a, b):
+    """The tensor [c s; s -c] of an axis times (a, b)."""
+    return cosine * a + sine * b, sine * a - cosine * b
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def _in_both(dx, p, a, b):
+    dx[0, p], dx[1, p] = a, b
+    dx[2, p], dx[3, p] = a, b
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
 def sensitivities(
     states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor,
     omega_rad_per_s, channels, period,
@@ -117,24 +129,19 @@ def sensitivities(
             whole_beta += branch_gain[n] * h / (1.0 + h)
     for p in range(count):
         n = indices[p]
+        fa, fb, ta, tb = flux_before[0, 0], flux_before[0, 1], flux_before[1, 0], flux_before[1, 1]
+        # a flux without current is in stator and rotor alike
         if kinds[p] == CARRY:
-            for c in range(2):
-                left = flux_before[0, c] if n == 0 else (flux_before[0, 0] if c == 1 else -flux_before[0, 1])
-                dx[c, p] = left
-                dx[2 + c, p] = left
+            _in_both(dx, p, fa if n == 0 else -fb, fb if n == 0 else fa)
         elif kinds[p] in (ROTOR_ANISOTROPY, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY):
             share = 1.0
             if kinds[p] != ROTOR_ANISOTROPY:
                 share = coupled if kinds[p] == LEAKAGE_ANISOTROPY else 1.0 - coupled
-            for c in range(2):
-                left = share * (flux_before[1, 1 - c] if n == 1 else (1.0 - 2.0 * c) * flux_before[1, c])
-                dx[c, p] = left
-                dx[2 + c, p] = left
+            qa, qb = tilted(1.0 - n, n, ta, tb)
+            _in_both(dx, p, share * qa, share * qb)
         elif kinds[p] == ANISOTROPY_SPLIT:
-            for c in range(2):
-                left = splits_b * flux_before[1, 1 - c] + (1.0 - 2.0 * c) * splits_a * flux_before[1, c]
-                dx[c, p] = left
-                dx[2 + c, p] = left
+            qa, qb = tilted(splits_a, splits_b, ta, tb)
+            _in_both(dx, p, qa, qb)
         elif kinds[p] == INITIAL_FLUX:
             if n < 2:
                 dx[n, p] = 1.0
@@ -276,18 +283,18 @@ def sensitivities(
                 f = r_r * channels[held, n] / rr
                 fwa, fwb = f * wa, f * wb
             elif kind == ROTOR_ANISOTROPY:
-                fwa, fwb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
+                fwa, fwb = tilted(rr * (1.0 - n), rr * n, ca, cb)
             elif kind == LEAKAGE_ANISOTROPY:
-                fia, fib = (gs * sa, -gs * sb) if n == 0 else (gs * sb, gs * sa)
-                fwa, fwb = (coupled * rr * ca, -coupled * rr * cb) if n == 0 else (coupled * rr * cb, coupled * rr * ca)
+                fia, fib = tilted(gs * (1.0 - n), gs * n, sa, sb)
+                fwa, fwb = tilted(coupled * rr * (1.0 - n), coupled * rr * n, ca, cb)
             elif kind == MAGNETIZING_ANISOTROPY:
-                qa, qb = (gm * x2, -gm * x3) if n == 0 else (gm * x3, gm * x2)
+                qa, qb = tilted(gm * (1.0 - n), gm * n, x2, x3)
                 fwa, fwb = waa * qa + wab * qb, wab * qa + wbb * qb
-                qa, qb = (rr * ca, -rr * cb) if n == 0 else (rr * cb, rr * ca)
+                qa, qb = tilted(rr * (1.0 - n), rr * n, ca, cb)
                 fwa -= coupled * qa
                 fwb -= coupled * qb
             elif kind == ANISOTROPY_SPLIT:
-                fwa, fwb = rr * (splits_a * ca + splits_b * cb), rr * (splits_b * ca - splits_a * cb)
+                fwa, fwb = tilted(rr * splits_a, rr * splits_b, ca, cb)
             fj[0, p], fj[1, p] = fja, fjb
             push_t[0, p], push_t[1, p] = fia, fib
             push_w[0, p], push_w[1, p] = fwa, fwb

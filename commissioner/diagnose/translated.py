@@ -155,27 +155,30 @@ def _sensor(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> 
     return {"size": odd, "shape": "cubic", "even": even}
 
 
-def _tensor(first: str, second: str, shapes: tuple[str, str], of_phases: float = 1.0) -> Translate:
-    """The larger of two second-harmonic tensors, as size and direction. `of_phases`: tensor over phase values, the first."""
+def _tilts(values: Numbers, first: str, second: str) -> tuple[complex, complex]:
+    """Two second-harmonic tensors as complex numbers."""
+    one, other = (complex(values.get(f"{p}_cos", 0.0), values.get(f"{p}_sin", 0.0)) for p in (first, second))
+    return one, other
 
-    def translate(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
-        pairs = [complex(values.get(f"{p}_cos", 0.0), values.get(f"{p}_sin", 0.0)) for p in (first, second)]
-        pairs[0] *= of_phases
-        k = int(abs(pairs[1]) > abs(pairs[0]))
-        angle = float(np.degrees(np.angle(pairs[k])) / 2.0)
-        return {"size": abs(pairs[k]), "angle_deg": angle % 180.0, "shape": shapes[k]}
 
-    return translate
+def _larger(one: complex, other: complex, shapes: tuple[str, str]) -> Entry:
+    """The larger of two tensors as size and direction."""
+    tilt, shape = (other, shapes[1]) if abs(other) > abs(one) else (one, shapes[0])
+    return {"size": abs(tilt), "angle_deg": float(np.degrees(np.angle(tilt)) / 2.0) % 180.0, "shape": shape}
+
+
+def _resistance(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    """Phase resistances that differ by 2 e over direction make a tensor of half that."""
+    stator, rotor = _tilts(values, "stator", "rotor")
+    return _larger(0.5 * stator, rotor, ("phases", "cage"))
 
 
 def _inductance(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
-    """The Gamma circuit's two tensors (1/L_leak and 1/L_s tilted) that tilt 1/L_sigma and 1/L_M as found; the larger one."""
-    leakage, main = (complex(*(values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin"))) for p in ("leakage", "magnetizing"))
+    """The Gamma circuit's tensors of 1/L_leak and 1/L_s that tilt 1/L_sigma and 1/L_M as found."""
+    leakage, main = _tilts(values, "leakage", "magnetizing")
     ratio = model.nominal[2] / model.nominal[3]
     both = ratio / (1.0 + ratio) * (leakage - main)
-    turned = {f"{p}_{c}": x for p, z in (("leakage", leakage + both), ("main", main + both))
-              for c, x in (("cos", z.real), ("sin", z.imag))}
-    return _tensor("leakage", "main", ("leakage", "main"))(sizes, turned, setting, model)
+    return _larger(leakage + both, main + both, ("leakage", "main"))
 
 
 def _remanence(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
@@ -206,6 +209,6 @@ TRANSLATED: dict[str, Translate] = {
     "lost_samples": _size("samples"), "mains_pickup": _line("mains"), "clock_drift": _clock,
     "shaft_motion": _size("speed_rad_per_s"),
     "inductance_anisotropy": _inductance,
-    "resistance_anisotropy": _tensor("stator", "rotor", ("phases", "cage"), 0.5),
+    "resistance_anisotropy": _resistance,
     "cable_capacitance": _size("capacitance_nf", 1e-9),
 }  # fmt: skip
