@@ -100,14 +100,14 @@ def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: fl
     n = signal.shape[-1]
     weights = noise.weights(n, period_s)
     masked = np.where(is_good, signal, 0.0) if not is_good.all() else signal
-    spectrum = np.fft.rfft(masked, axis=-1) / weights
+    spectrum = np.fft.rfft(masked, axis=-1)
     scale = np.full(weights.shape[1], np.sqrt(2.0 / n))
     scale[0] = np.sqrt(1.0 / n)
     if n % 2 == 0:
         scale[-1] = np.sqrt(1.0 / n)
-    spectrum *= scale
-    flat = np.stack([spectrum.real, spectrum.imag], axis=-1)
-    return flat.reshape(*signal.shape[:-2], -1)
+    spectrum *= scale / weights
+    # real and imaginary parts side by side
+    return spectrum.view(np.float64).reshape(*signal.shape[:-2], -1)
 
 
 def normal_equations(
@@ -131,11 +131,14 @@ def normal_equations(
         length = SLICE if noise.is_white else max(residual.shape[1], 1)
         for start in range(0, residual.shape[1], length):
             part = slice(start, start + length)
-            stacked, kept = np.concatenate([jacobian[..., part], residual[None, :, part]], axis=0), good[part]
+            kept = good[part]
+            both = [jacobian[..., part], residual[None, :, part]]
             if block > 1 and noise.is_white:
-                stacked, kept = _averaged(stacked, kept, block)
-            white = whiten(stacked, kept, noise, record.facts.sample_period_s)
-            total += white @ white.T
+                both, kept = [_averaged(x, block) for x in both], _whole(kept, block)
+            directions, left = (whiten(x, kept, noise, record.facts.sample_period_s) for x in both)
+            total[:-1, :-1] += directions @ directions.T
+            total[:-1, -1] += directions @ left[0]
+            total[-1, -1] += left[0] @ left[0]
         return total
 
     def of_segment(k: int) -> tuple[Array, Array, float, int]:
@@ -166,12 +169,17 @@ def normal_equations(
     return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
 
 
-def _averaged(stacked: Array, good: NDArray[np.bool_], block: int) -> tuple[Array, NDArray[np.bool_]]:
+def _averaged(signal: Array, block: int) -> Array:
     """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
-    n = stacked.shape[-1] // block * block
-    summed = stacked[..., :n].reshape(*stacked.shape[:-1], -1, block).sum(axis=-1) / np.sqrt(block)
-    whole: NDArray[np.bool_] = np.asarray(good[:n].reshape(-1, block).all(axis=1))
-    return summed, whole
+    n = signal.shape[-1] // block * block
+    summed: Array = signal[..., :n].reshape(*signal.shape[:-1], -1, block).sum(axis=-1) / np.sqrt(block)
+    return summed
+
+
+def _whole(good: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
+    """Blocks whose every sample is good."""
+    whole: NDArray[np.bool_] = np.asarray(good[: good.size // block * block].reshape(-1, block).all(axis=1))
+    return whole
 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from commissioner.diagnose import kinds
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.spline import cells_of
 from commissioner.diagnose.tangent import sensitivities, tilted
 from commissioner.diagnose.terminals import sense
 from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying
@@ -41,19 +42,16 @@ def predict(
     channels = record.channels[position] if record.channels else np.zeros((segment.count, 1))
     listed = [] if wanted is None else list(wanted)
     inside = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
-    at_work = np.array([*kinds.NOMINAL, *(listed[k].kind for k in inside)], dtype=np.int64)
-    indices = np.array([0, 0, 0, 0, *(listed[k].index for k in inside)], dtype=np.int64)
-    path = _trajectory(model, segment, channels, layout, at_work)
+    asked = [listed[k] for k in inside]
+    path = _trajectory(model, segment, channels, layout, asked)
     jacobian = np.zeros((0, record.facts.phases, segment.count))
     if wanted is not None:
         jacobian = np.zeros((4 + len(listed), record.facts.phases, segment.count))
         scale = np.array([
             model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
-            *(listed[k].step for k in inside),
+            *(t.step for t in asked),
         ])
-        _to_phases(
-            _tangent(path, model, segment, channels, layout, at_work, indices), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)]
-        )
+        _to_phases(_tangent(path, model, segment, channels, layout, asked), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
     held_v = segment.voltage_ab_v * path.drive[2]
     trajectory = (path.current, path.after, path.before)
     measured = sense(model, record, segment, channels, layout, trajectory, held_v, jacobian, listed)
@@ -86,15 +84,15 @@ class _Path:
     machine: tuple[Any, ...]
 
 
-def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64]) -> _Path:
+def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]) -> _Path:
     drive = _drive(model, segment, channels)
-    every = set(at_work.tolist()) | {t.kind for t in model.terms}
-    machine = _machine(model, layout, every)
+    machine = _machine(model, layout, asked)
     period = segment.period_s
     start = initial_state(model, segment, _decay_tilt(machine[0]))
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
-    acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v} | (every & {kinds.STOP, kinds.BRANCH})
+    acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v}
+    acting |= {t.kind for t in asked} & {kinds.STOP, kinds.BRANCH}
     if all(k in (kinds.INITIAL_FLUX, kinds.CARRY) or k >= kinds.FIRST_OF_SENSING for k in acting):
         transition, gain, output, slope = exact_step(model.nominal, period)
         states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
@@ -130,18 +128,20 @@ def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> t
 
 
 def _tangent(
-    path: _Path, model: Model, segment: Segment, channels: Array, layout: Layout, at_work: NDArray[np.int64],
-    indices: NDArray[np.int64],
+    path: _Path, model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]
 ) -> Array:
-    wanted = set(at_work.tolist())
+    wanted = {t.kind for t in asked}
+    place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}
+    at_work = np.array([*kinds.NOMINAL, *(t.kind for t in asked)], dtype=np.int64)
+    indices = np.array([0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64)
     before = np.array(segment.flux_before_wb)
     flux_before = np.stack([before, _per_tilt(_carried(model, segment)[0]) * before])
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
         path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK}), layout.legs_vectors),
-        _if(kinds.IRON_CURVE in wanted, layout.iron_vectors), _if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors),
-        flux_before, out,
+        cells_of(_if(kinds.IRON_CURVE in wanted, layout.iron_vectors)),
+        cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)), flux_before, out,
     )
     return out
 
@@ -165,7 +165,13 @@ def _drive(model: Model, segment: Segment, channels: Array) -> tuple[Array, Arra
     return voltage_factor, segment.link_ratio, phase_factor, rotor_factor, omega
 
 
-def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
+def _at_work(kind: int, model: Model, asked: Sequence[Term]) -> list[int]:
+    """Which of a dictionary's operators have a size or are asked for."""
+    acting = {t.index for t, v in zip(model.terms, model.values, strict=True) if t.kind == kind and v}
+    return sorted(acting | {t.index for t in asked if t.kind == kind})
+
+
+def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, ...]:
     aniso = [model.sum_kind(k, 2) for k in (
         kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)]
     r_s, r_r, l_sigma, l_m = model.nominal
@@ -180,18 +186,20 @@ def _machine(model: Model, layout: Layout, every: set[int]) -> tuple[Any, ...]:
         *(rotor + coupled * (leakage - magnetizing)), *leakage, *magnetizing, kappa, layout.leak_ratio, coupled,
         *(per_share * (leakage - magnetizing)),
     ])
-    stops = layout.stop_radius_wb if kinds.STOP in every else np.zeros((0, 2))
-    branches = layout.branch_time_s if kinds.BRANCH in every else np.zeros(0)
-    legs_size = layout.legs_vectors.shape[0]
+    stops, branches = _at_work(kinds.STOP, model, asked), _at_work(kinds.BRANCH, model, asked)
+    wanted = {t.kind for t in asked}
+
+    def shape(kind: int, vectors: Array) -> Array:
+        weights = model.sum_kind(kind, vectors.shape[0]) @ vectors
+        return cells_of(weights if weights.any() or kind in wanted else weights[:3])
+
     return (
         base,
-        model.sum_kind(kinds.LEGS, legs_size) @ layout.legs_vectors,
-        model.sum_kind(kinds.LEGS_LINK, legs_size) @ layout.legs_vectors,
-        model.sum_kind(kinds.IRON_CURVE, layout.iron_vectors.shape[0]) @ layout.iron_vectors,
-        model.sum_kind(kinds.LEAKAGE_CURVE, layout.leak_vectors.shape[0]) @ layout.leak_vectors,
+        shape(kinds.LEGS, layout.legs_vectors), shape(kinds.LEGS_LINK, layout.legs_vectors),
+        shape(kinds.IRON_CURVE, layout.iron_vectors), shape(kinds.LEAKAGE_CURVE, layout.leak_vectors),
         layout.legs_top, layout.legs_knee_a, layout.iron_top_wb, layout.leak_top_wb,
-        model.sum_kind(kinds.STOP, stops.shape[0]), stops,
-        model.sum_kind(kinds.BRANCH, branches.size) if branches.size else np.zeros(0), branches,
+        model.sum_kind(kinds.STOP, layout.stop_radius_wb.shape[0])[stops], layout.stop_radius_wb[stops],
+        model.sum_kind(kinds.BRANCH, layout.branch_time_s.size)[branches], layout.branch_time_s[branches],
     )
 
 
@@ -257,8 +265,9 @@ def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
     """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode)."""
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
-    if model.has_kind(kinds.BRANCH):
-        rate = max(rate, 0.5 / float(np.abs(layout.branch_time_s).min()))
+    branches = _at_work(kinds.BRANCH, model, ())
+    if branches:
+        rate = max(rate, 0.5 / float(np.abs(layout.branch_time_s[branches]).min()))
     if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
     return int(layout.substeps * np.clip(np.ceil(rate * segment.period_s / 0.25), 1, 40))

@@ -1,52 +1,64 @@
-"""Uniform cubic B-splines on [0, top], compiled: the shapes every nonlinear cause is made of."""
+"""Uniform cubic splines on [0, top], compiled: the shapes every nonlinear cause is made of.
+
+A dictionary's vectors are weights of B-splines; the kernels read cells: the four coefficients of a cubic in u = 0 ... 1
+within each interval.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_TO_CELL = np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6.0
+
+
+def cells_of(weights: Array) -> Array:
+    """B-spline weights (..., intervals + 3) as cells (..., intervals, 4), constant term first."""
+    intervals = weights.shape[-1] - 3
+    near = np.stack([weights[..., k : k + intervals] for k in range(4)], axis=-1)
+    return np.ascontiguousarray(near @ _TO_CELL.T)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def spline_weights(y, top, intervals, weights, row):
-    """Uniform cubic B-spline weights on [0, top], linear beyond. `weights[row, 0:4]` values, `[4:8]` slopes; first index."""
-    h = top / intervals
-    beyond = 0.0
-    if y > top:
-        beyond = y - top
-        y = top
-    j = int(y / h)
-    j = min(j, intervals - 1)
-    u = y / h - j
-    m = 1.0 - u
-    weights[row, 0] = m * m * m / 6.0
-    weights[row, 1] = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-    weights[row, 2] = (-3.0 * u * u * u + 3.0 * u * u + 3.0 * u + 1.0) / 6.0
-    weights[row, 3] = u * u * u / 6.0
-    weights[row, 4] = -0.5 * m * m / h
-    weights[row, 5] = (1.5 * u * u - 2.0 * u) / h
-    weights[row, 6] = (-1.5 * u * u + u + 0.5) / h
-    weights[row, 7] = 0.5 * u * u / h
-    if beyond > 0.0:
-        for k in range(4):
-            weights[row, k] += weights[row, 4 + k] * beyond
-    return j
+def place(y, top, intervals):
+    """Interval of y >= 0, and where in it: 0 ... 1, more beyond `top`."""
+    s = min(y * (intervals / top), 1e9)
+    j = max(min(int(s), intervals - 1), 0)
+    return j, s - j
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def curve(coefficients, j, weights, row, offset):
-    return (
-        coefficients[j] * weights[row, offset]
-        + coefficients[j + 1] * weights[row, offset + 1]
-        + coefficients[j + 2] * weights[row, offset + 2]
-        + coefficients[j + 3] * weights[row, offset + 3]
-    )
+def blend(cells, more, factor, out):
+    """cells + factor more, `cells` none where empty."""
+    for j in range(more.shape[0]):
+        for c in range(4):
+            out[j, c] = factor * more[j, c] + (cells[j, c] if cells.shape[0] > 0 else 0.0)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def saturating(a, b, coefficients, top, weights, row):
-    """Current S(|f|) f of a path with flux f = (a, b): interval found, the current, and its derivative's aa, ab, bb."""
+def curve(cells, j, u):
+    """Value of the curve at its place, linear beyond the last interval."""
+    beyond = max(u - 1.0, 0.0)
+    u -= beyond
+    value = ((cells[j, 3] * u + cells[j, 2]) * u + cells[j, 1]) * u + cells[j, 0]
+    return value + beyond * rise(cells, j, u)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def rise(cells, j, u):
+    """Slope of the curve at its place, per interval."""
+    u = min(u, 1.0)
+    return (3.0 * cells[j, 3] * u + 2.0 * cells[j, 2]) * u + cells[j, 1]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def saturating(a, b, cells, top):
+    """Current S(|f|) f of a path with flux f = (a, b): its place, the current, and its derivative's aa, ab, bb."""
     size = np.sqrt(a * a + b * b) + 1e-12
-    j = spline_weights(size, top, coefficients.shape[0] - 3, weights, row)
-    big = curve(coefficients, j, weights, row, 0)
-    steep = curve(coefficients, j, weights, row, 4) / size
-    return j, big * a, big * b, big + steep * a * a, steep * a * b, big + steep * b * b
+    intervals = cells.shape[0]
+    j, u = place(size, top, intervals)
+    big = curve(cells, j, u)
+    steep = rise(cells, j, u) * (intervals / top) / size
+    return j, u, big * a, big * b, big + steep * a * a, steep * a * b, big + steep * b * b

@@ -30,7 +30,7 @@ import numpy as np
 from numba import njit
 
 from commissioner.diagnose.memory import remembered, susceptibility, widened
-from commissioner.diagnose.spline import curve, saturating, spline_weights
+from commissioner.diagnose.spline import blend, curve, place, rise, saturating
 
 SQRT3 = np.sqrt(3.0)
 ROTOR, EDDY = 1.0, -1.0
@@ -49,113 +49,119 @@ def branch_current(x, branch_gain, branch_time, side):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def leg_loss(i, legs, top, knee, weights, row):
-    """Voltage a leg loses at current i (odd), and its slope: a spline over asinh(|i|/knee)."""
-    y = np.arcsinh(abs(i) / knee)
+def leg_loss(i, legs, top, knee):
+    """Voltage a leg loses at current i (odd), and its slope: cells over asinh(|i|/knee)."""
+    size = abs(i) / knee
+    root = np.sqrt(size * size + 1.0)
+    y = np.log(size + root)
+    intervals = legs.shape[0]
+    j, u = place(min(y, top), top, intervals)
     sign = -1.0 if i < 0 else 1.0
-    j = spline_weights(min(y, top), top, legs.shape[0] - 3, weights, row)
-    slope = 0.0 if y >= top else curve(legs, j, weights, row, 4) / np.sqrt(i * i + knee * knee)
-    return sign * curve(legs, j, weights, row, 0), slope
+    slope = 0.0 if y >= top else rise(legs, j, u) * (intervals / top) / (knee * root)
+    return sign * curve(legs, j, u), slope
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def _slope(
-    x, k, stage, va, vb, ru, rv, rw, rr, omega,
-    base, legs, iron, leak, has_legs, legs_top, legs_knee, iron_top, leak_top,
-    stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+def _memory_current(pa, pb, moved_a, moved_b, z, stop_gain, stop_radius):
+    """Current of the memory operators at flux (pa, pb), moved so far since their states `z`."""
+    ja = jb = 0.0
+    for s in range(stop_gain.shape[0]):
+        if stop_gain[s] != 0.0:
+            ya, yb = remembered(z[s, 0], z[s, 1], moved_a, moved_b, stop_radius[s, 0])
+            f = stop_gain[s] / abs(stop_radius[s, 0]) * widened(pa, pb, stop_radius[s, 1])
+            ja += f * ya
+            jb += f * yb
+    return ja, jb
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+def _rates(
+    x, k, va, vb, ru, rv, rw, rr, omega, base, legs, has_legs, legs_top, legs_knee, iron, iron_top, leak, leak_top,
+    ma, mb, branch_gain, branch_time,
 ):
-    """Right-hand side (1)-(7) at x into k[stage]; terminal current and its slope into out[0:4]."""
-    rs, gs, gm, nu, g, kappa = base[0], base[2], base[3], base[4], base[5], base[12]
-    ras, rbs, las, lbs, mas, mbs = base[6], base[7], base[8], base[9], base[10], base[11]
-    branches = branch_gain.shape[0]
-    stops = stop_gain.shape[0]
+    """Right-hand side (1)-(7) at x into k, memory current (ma, mb) given; terminal current and the paths' derivatives."""
+    gs, gm, nu, g, kappa = base[2], base[3], base[4], base[5], base[12]
     # (1), (2)
-    pa = (1.0 - nu) * x[2] + nu * x[0]
-    pb = (1.0 - nu) * x[3] + nu * x[1]
-    ja = jb = jaa = jab = jbb = 0.0
+    ja, jb, jaa, jab, jbb = ma, mb, 0.0, 0.0, 0.0
     if iron.shape[0] > 0:
-        _, ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top, wts, 0)
-    for s in range(stops):
-        ya, yb = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s, 0])
-        f = stop_gain[s] / abs(stop_radius[s, 0]) * widened(pa, pb, stop_radius[s, 1])
-        ja += f * ya
-        jb += f * yb
+        pa, pb = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
+        _, _, qa, qb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top)
+        ja += qa
+        jb += qb
     # (3)
-    sa = x[0] - x[2]
-    sb = x[1] - x[3]
+    sa, sb = x[0] - x[2], x[1] - x[3]
     ea = eb = eaa = eab = ebb = 0.0
     if leak.shape[0] > 0:
-        fa, fb = x[0] - kappa * x[2], x[1] - kappa * x[3]
-        _, ea, eb, eaa, eab, ebb = saturating(fa, fb, leak, leak_top, wts, 1)
-    iaa, iab, ibb = gs * (1.0 + las), gs * lbs, gs * (1.0 - las)
-    ia = iaa * sa + iab * sb + ea + nu * ja
-    ib = iab * sa + ibb * sb + eb + nu * jb
+        _, _, ea, eb, eaa, eab, ebb = saturating(x[0] - kappa * x[2], x[1] - kappa * x[3], leak, leak_top)
+    ia = gs * ((1.0 + base[8]) * sa + base[9] * sb) + ea + nu * ja
+    ib = gs * (base[9] * sa + (1.0 - base[8]) * sb) + eb + nu * jb
     # (4)
-    shrink = 1.0 / (1.0 + g * rs)
+    shrink = 1.0 / (1.0 + g * base[0])
     qa, qb = branch_current(x, branch_gain, branch_time, EDDY)
     ta, tb = (ia + g * va + qa) * shrink, (ib + g * vb + qb) * shrink
-    out[0] = ta
-    out[1] = tb
     # (5)
-    iu = ta
     iv = -0.5 * ta + 0.5 * SQRT3 * tb
     iw = -0.5 * ta - 0.5 * SQRT3 * tb
-    eu, ev, ew = ru * iu, rv * iv, rw * iw
+    eu, ev, ew = ru * ta, rv * iv, rw * iw
     if has_legs:
-        eu += leg_loss(iu, legs, legs_top, legs_knee, wts, 2)[0]
-        ev += leg_loss(iv, legs, legs_top, legs_knee, wts, 3)[0]
-        ew += leg_loss(iw, legs, legs_top, legs_knee, wts, 4)[0]
-    k[stage, 0] = va - (2.0 * eu - ev - ew) / 3.0
-    k[stage, 1] = vb - (ev - ew) / SQRT3
+        eu += leg_loss(ta, legs, legs_top, legs_knee)[0]
+        ev += leg_loss(iv, legs, legs_top, legs_knee)[0]
+        ew += leg_loss(iw, legs, legs_top, legs_knee)[0]
+    k[0] = va - (2.0 * eu - ev - ew) / 3.0
+    k[1] = vb - (ev - ew) / SQRT3
     # (6), (7)
-    ca = gm * ((1.0 + mas) * x[2] + mbs * x[3]) + ja - ia - (kappa - 1.0) * ea
-    cb = gm * (mbs * x[2] + (1.0 - mas) * x[3]) + jb - ib - (kappa - 1.0) * eb
     qa, qb = branch_current(x, branch_gain, branch_time, ROTOR)
-    ca -= qa
-    cb -= qb
-    wa = rr * ((1.0 + ras) * ca + rbs * cb)
-    wb = rr * (rbs * ca + (1.0 - ras) * cb)
-    k[stage, 2] = -wa - omega * x[3]
-    k[stage, 3] = -wb + omega * x[2]
-    for n in range(branches):
-        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[stage, 0], k[stage, 1])
-        k[stage, 4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
-        k[stage, 5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
-    if stage > 0:
-        return
-    # slope of the terminal current while the voltage is held
-    qa = (1.0 - nu) * k[0, 2] + nu * k[0, 0]
-    qb = (1.0 - nu) * k[0, 3] + nu * k[0, 1]
-    dja = jaa * qa + jab * qb
-    djb = jab * qa + jbb * qb
-    for s in range(stops):
-        naa, nab, nbb, _, _, _ = susceptibility(
-            z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], qa, qb, stop_radius[s, 0]
-        )
-        f = stop_gain[s] / abs(stop_radius[s, 0])
-        wide = widened(pa, pb, stop_radius[s, 1])
-        growth = 2.0 * stop_radius[s, 1] * (pa * qa + pb * qb)
-        dja += f * (wide * (naa * qa + nab * qb) + growth * z[s, 0])
-        djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
-    ua, ub = k[0, 0] - k[0, 2], k[0, 1] - k[0, 3]
-    fa, fb = k[0, 0] - kappa * k[0, 2], k[0, 1] - kappa * k[0, 3]
-    qa, qb = branch_current(k[0], branch_gain, branch_time, EDDY)
-    out[2] = (iaa * ua + iab * ub + eaa * fa + eab * fb + nu * dja + qa) * shrink
-    out[3] = (iab * ua + ibb * ub + eab * fa + ebb * fb + nu * djb + qb) * shrink
+    ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) + ja - ia - (kappa - 1.0) * ea - qa
+    cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) + jb - ib - (kappa - 1.0) * eb - qb
+    wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
+    wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
+    k[2] = -wa - omega * x[3]
+    k[3] = -wb + omega * x[2]
+    for n in range(branch_gain.shape[0]):
+        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[0], k[1])
+        k[4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
+        k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
+    return ta, tb, jaa, jab, jbb, eaa, eab, ebb
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+def _current_slope(
+    x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time
+):
+    """Slope of the terminal current while the voltage is held, from the rates k at x and the paths' derivatives there."""
+    gs, nu, kappa = base[2], base[4], base[12]
+    qa, qb = (1.0 - nu) * k[2] + nu * k[0], (1.0 - nu) * k[3] + nu * k[1]
+    dja, djb = jaa * qa + jab * qb, jab * qa + jbb * qb
+    pa, pb = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
+    for s in range(stop_gain.shape[0]):
+        if stop_gain[s] != 0.0:
+            naa, nab, nbb, _, _, _ = susceptibility(z[s, 0], z[s, 1], 0.0, 0.0, qa, qb, stop_radius[s, 0])
+            f = stop_gain[s] / abs(stop_radius[s, 0])
+            wide = widened(pa, pb, stop_radius[s, 1])
+            growth = 2.0 * stop_radius[s, 1] * (pa * qa + pb * qb)
+            dja += f * (wide * (naa * qa + nab * qb) + growth * z[s, 0])
+            djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
+    ua, ub = k[0] - k[2], k[1] - k[3]
+    fa, fb = k[0] - kappa * k[2], k[1] - kappa * k[3]
+    qa, qb = branch_current(k, branch_gain, branch_time, EDDY)
+    shrink = 1.0 / (1.0 + base[5] * base[0])
+    da = gs * ((1.0 + base[8]) * ua + base[9] * ub) + eaa * fa + eab * fb + nu * dja + qa
+    db = gs * (base[9] * ua + (1.0 - base[8]) * ub) + eab * fa + ebb * fb + nu * djb + qb
+    return da * shrink, db * shrink
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def _steps_for_legs(out, turn, period, slope_gain, legs, legs_top, legs_knee, fewest, most, wts):
+def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, legs_top, legs_knee, fewest, most):
     """Steps fine enough for the steepest part of the leg curve that the currents may meet in this period."""
     steep = 0.0
     for leg in range(3):
-        i, slope = out[0], out[2]
+        i, slope = ia, slope_a
         if leg > 0:
             side = 0.5 * SQRT3 if leg == 1 else -0.5 * SQRT3
-            i = -0.5 * out[0] + side * out[1]
-            slope = -0.5 * out[2] + side * out[3]
+            i = -0.5 * ia + side * ib
+            slope = -0.5 * slope_a + side * slope_b
         low = max(abs(i) - 1.2 * period * (abs(slope) + turn), 0.0)
-        steep = max(steep, abs(leg_loss(low, legs, legs_top, legs_knee, wts, 2)[1]))
+        steep = max(steep, abs(leg_loss(low, legs, legs_top, legs_knee)[1]))
     return max(fewest, min(most, int(steep * slope_gain * period / 0.3) + 1))
 
 
@@ -169,76 +175,81 @@ def propagate(
     """Trajectory of one segment from `initial_state` (psi_s, psi_R).
 
     `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,) and
-    `phase_factor` (n, 3) known functions of time. Returns states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal
-    current (2, n), its slope after and before each sample (2, n), and rotor current (2, n).
+    `phase_factor` (n, 3) known functions of time; curves as cells (intervals, 4), those without any size empty. Returns
+    states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal current (2, n), its slope after and before each sample
+    (2, n), and rotor current (2, n).
     """
     samples = voltage_a.shape[0]
-    branches = branch_gain.shape[0]
     stops = stop_gain.shape[0]
-    order = 4 + 2 * branches
+    order = 4 + 2 * branch_gain.shape[0]
     states = np.zeros((samples + 1, order))
     stop_states = np.zeros((samples + 1, stops, 2))
     current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
     slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
-    x, y, k = np.zeros(order), np.zeros(order), np.zeros((4, order))
-    z, z_ref = np.zeros((stops, 2)), np.zeros(2)
-    wts, out = np.zeros((5, 8)), np.zeros(4)
-    legs_now = np.zeros(legs.shape[0])
+    x, y, k, total = np.zeros(order), np.zeros(order), np.zeros(order), np.zeros(order)
+    z = np.zeros((stops, 2))
     nu, rs, r_r = base[4], base[0], base[1]
     x[0:4] = initial_state
-    z_ref[0] = (1.0 - nu) * x[2] + nu * x[0]
-    z_ref[1] = (1.0 - nu) * x[3] + nu * x[1]
-    has_legs = bool(np.any(legs != 0.0) or np.any(legs_link != 0.0))
-    last_a = 0.0
-    last_b = 0.0
+    has_link = legs_link.shape[0] > 0
+    has_legs = has_link or legs.shape[0] > 0
+    legs_now = legs_link.copy() if has_link else legs
+    last_a = last_b = 0.0
     for t in range(samples):
-        now_a = voltage_a[t] * voltage_factor[t]
-        now_b = voltage_b[t] * voltage_factor[t]
-        for c in range(legs.shape[0]):
-            legs_now[c] = legs[c] + link_factor[t] * legs_link[c]
+        now_a, now_b = voltage_a[t] * voltage_factor[t], voltage_b[t] * voltage_factor[t]
+        if has_link and (t == 0 or link_factor[t] != link_factor[t - 1]):
+            blend(legs, legs_link, link_factor[t], legs_now)
         ru, rv, rw = rs * phase_factor[t, 0], rs * phase_factor[t, 1], rs * phase_factor[t, 2]
-        rr = r_r * rotor_factor[t]
-        om = omega_rad_per_s[t]
+        rr, om = r_r * rotor_factor[t], omega_rad_per_s[t]
+        steps, h = 1, period
+        step, stage = 0, -1
         states[t] = x
         stop_states[t] = z
-        # the state at the sample still belongs to the voltage of the period before
-        _slope(
-            x, k, 0, last_a, last_b, ru, rv, rw, rr, om, base, legs_now, iron, leak, has_legs, legs_top, legs_knee,
-            iron_top, leak_top, stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
-        )
-        for c in range(2):
-            current[c, t] = out[c]
-            slope_before[c, t] = out[2 + c]
-            rotor_current[c, t] = -k[0, 2 + c] / rr
-        steps = substeps
-        if has_legs:
-            turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
-            steps = _steps_for_legs(
-                out, turn, period, base[2], legs_now, legs_top, legs_knee, substeps, crossing_substeps, wts
+        from_a, from_b = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
+        while step < steps:
+            # stage -1: the state at the sample still belongs to the voltage of the period before
+            if stage < 1:
+                y[:] = x
+            pa, pb = (1.0 - nu) * y[2] + nu * y[0], (1.0 - nu) * y[3] + nu * y[1]
+            ma, mb = _memory_current(pa, pb, pa - from_a, pb - from_b, z, stop_gain, stop_radius)
+            va, vb = (last_a, last_b) if stage < 0 else (now_a, now_b)
+            ia, ib, jaa, jab, jbb, eaa, eab, ebb = _rates(
+                y, k, va, vb, ru, rv, rw, rr, om, base, legs_now, has_legs, legs_top, legs_knee, iron, iron_top, leak,
+                leak_top, ma, mb, branch_gain, branch_time,
             )
-        h = period / steps
-        for step in range(steps):
-            for stage in range(4):
-                f = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
-                for c in range(order):
-                    y[c] = x[c] if stage == 0 else x[c] + f * k[stage - 1, c]
-                _slope(
-                    y, k, stage, now_a, now_b, ru, rv, rw, rr, om, base, legs_now, iron, leak, has_legs, legs_top,
-                    legs_knee, iron_top, leak_top, stop_gain, stop_radius, z, z_ref, branch_gain, branch_time, wts, out,
+            if step == 0 and stage < 1:
+                da, db = _current_slope(
+                    y, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time
                 )
-                if stage == 0 and step == 0:
-                    slope_after[0, t] = out[2]
-                    slope_after[1, t] = out[3]
+                if stage < 0:
+                    current[0, t], current[1, t] = ia, ib
+                    slope_before[0, t], slope_before[1, t] = da, db
+                    rotor_current[0, t], rotor_current[1, t] = -k[2] / rr, -k[3] / rr
+                    steps = substeps
+                    if has_legs:
+                        turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
+                        steps = _steps_for_legs(
+                            ia, ib, da, db, turn, period, base[2], legs_now, legs_top, legs_knee, substeps, crossing_substeps
+                        )
+                    h = period / steps
+                    stage = 0
+                    continue
+                slope_after[0, t], slope_after[1, t] = da, db
+            # classical Runge-Kutta: weights 1 2 2 1
+            weight = h / 3.0 if 0 < stage < 3 else h / 6.0
+            ahead = h if stage == 2 else 0.5 * h
             for c in range(order):
-                x[c] += h / 6.0 * (k[0, c] + 2.0 * k[1, c] + 2.0 * k[2, c] + k[3, c])
-            pa = (1.0 - nu) * x[2] + nu * x[0]
-            pb = (1.0 - nu) * x[3] + nu * x[1]
-            for s in range(stops):
-                z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], pa - z_ref[0], pb - z_ref[1], stop_radius[s, 0])
-            z_ref[0] = pa
-            z_ref[1] = pb
-        last_a = now_a
-        last_b = now_b
+                total[c] = weight * k[c] + (total[c] if stage > 0 else 0.0)
+                y[c] = x[c] + ahead * k[c]
+            stage += 1
+            if stage == 4:
+                for c in range(order):
+                    x[c] += total[c]
+                pa, pb = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
+                for s in range(stops):
+                    z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], pa - from_a, pb - from_b, stop_radius[s, 0])
+                from_a, from_b = pa, pb
+                step, stage = step + 1, 0
+        last_a, last_b = now_a, now_b
     states[samples] = x
     stop_states[samples] = z
     return states, stop_states, current, slope_after, slope_before, rotor_current

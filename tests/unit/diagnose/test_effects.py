@@ -205,6 +205,36 @@ def test_sensitivities_beside_eddy_paths_are_exact(nominal, setting, symbol):
     assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
 
 
+INSIDE = [
+    "dead_time", "dc_link_sag", "dc_link_ripple", "magnetizing_saturation", "magnetic_hysteresis", "remanence", "leakage_saturation",
+    "rotor_skin_effect", "iron_loss", "stator_heating", "rotor_heating", "shaft_motion", "inductance_anisotropy",
+    "resistance_anisotropy",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def crowded(nominal, setting):
+    """A machine with every effect inside it at once, small, and its derivatives in the second segment."""
+    own = setting.record.segments[1].uid
+    terms = tuple(t for name in INSIDE for t in CATALOGUE[name].terms(setting) if t.segment in (-1, own))
+    only_bars = [t.effect != "iron_loss" or t.symbol == "conductance" for t in terms]
+    values = tuple((0.02 + 0.01 * (k % 3)) * t.step * used for k, (t, used) in enumerate(zip(terms, only_bars, strict=True)))
+    model = Model(nominal.nominal, terms, values)
+    return model, predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
+
+
+@pytest.mark.parametrize("name", ["", *INSIDE])
+def test_sensitivities_beside_every_other_effect_are_exact(crowded, setting, name):
+    """No effect's push may go where only another's belongs: a turning shaft is no voltage that feeds the bars' branches."""
+    model, jacobian = crowded
+    rows = [4 + k for k, t in enumerate(model.terms) if t.effect == name] if name else range(4)
+    for row in list(rows)[:6]:
+        slope = central_slope(model, setting, row, 1e-3)
+        size = np.sqrt(np.mean(slope**2))
+        about = model.terms[row - 4].symbol if row > 3 else row
+        assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) <= 0.02 * size, (about, size)
+
+
 @pytest.mark.parametrize("symbol", ["leakage_cos", "leakage_sin", "magnetizing_cos", "magnetizing_sin", "split"])
 def test_sensitivities_of_tilted_inductances_hold_with_flux_from_the_segment_before(nominal, setting, symbol):
     """What is left of that flux tilts with the open machine's rate, and the cage's resistance by the share of the leakage."""
