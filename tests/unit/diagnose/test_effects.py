@@ -217,8 +217,11 @@ def crowded(nominal, setting):
     """A machine with every effect inside it at once, small, and its derivatives in the second segment."""
     own = setting.record.segments[1].uid
     terms = tuple(t for name in INSIDE for t in CATALOGUE[name].terms(setting) if t.segment in (-1, own))
-    only_bars = [t.effect != "iron_loss" or t.symbol == "conductance" for t in terms]
-    values = tuple((0.02 + 0.01 * (k % 3)) * t.step * used for k, (t, used) in enumerate(zip(terms, only_bars, strict=True)))
+    strong, none = {"rotor_skin_effect": 10.0}, [t.effect == "iron_loss" and t.symbol != "conductance" for t in terms]
+    values = tuple(
+        (0.02 + 0.01 * (k % 3)) * t.step * strong.get(t.effect, 1.0) * (not left_out)
+        for k, (t, left_out) in enumerate(zip(terms, none, strict=True))
+    )
     model = Model(nominal.nominal, terms, values)
     return model, predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
 
