@@ -24,6 +24,8 @@ CURVES = {
 }
 MOST_KNOTS = 25
 """A curve of more knots than this is not refined again."""
+FINER_SHARE = 2e-3
+"""Of what is not explained, so much must go with finer knots: beside a cause that lacks, no curve need be right to the last digit."""
 SAME_RATIO = 0.05
 """L_sigma over L_M is taken anew where it has moved by more than this part of itself."""
 
@@ -69,7 +71,9 @@ def with_finer_curves(
             layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
             there = replace(setting, layout=layout)
             model = _on_finer(current.model, kind, getattr(setting.layout, name), finer, there)
-            wanted = current.chi2 - required_chi2(len(model.terms) - len(current.model.terms))
+            unexplained = current.chi2 - float(current.normal.count.sum())
+            least = max(required_chi2(len(model.terms) - len(current.model.terms)), FINER_SHARE * unexplained)
+            wanted = current.chi2 - least
             trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
             report(f"  {name} on twice the knots: gained {current.chi2 - trial.chi2:.4g}")
             if trial.chi2 > wanted:

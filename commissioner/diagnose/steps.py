@@ -64,6 +64,7 @@ class Steps:
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
+        self.tried: tuple[Fit | None, dict[str, Fit]] = (None, {})
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in self.record.segments]) ** 2)))
@@ -155,10 +156,7 @@ class Steps:
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
             wanted = max(self._guard(losses, score.name), self.threshold(score.numbers))
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
-            trial = fit(
-                current.model.with_terms(CATALOGUE[score.name].terms(self.setting)), self.record, self.layout, self.noise,
-                wanted_chi2=current.chi2 - to_beat,
-            )
+            trial = self._tried(current, score.name, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
             is_sound = is_plausible(trial.model, score.name, self.setting)
@@ -172,6 +170,16 @@ class Steps:
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
         return None if best is None or self._is_crumb(current, best[2]) else (best[1], best[2])
+
+    def _tried(self, current: Fit, name: str, wanted_chi2: float) -> Fit:
+        """The refit with one more cause, made once from the same fit: lines looked for meanwhile concern only their own causes."""
+        if self.tried[0] is not current:
+            self.tried = (current, {})
+        known = self.tried[1]
+        if name not in known or not known[name].has_converged or name in LINES.values():
+            terms = CATALOGUE[name].terms(self.setting)
+            known[name] = fit(current.model.with_terms(terms), self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
+        return known[name]
 
     def _is_crumb(self, current: Fit, trial: Fit) -> bool:
         """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
