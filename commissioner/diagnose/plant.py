@@ -12,9 +12,10 @@ from scipy.linalg import expm
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.model import Layout, Model, Term
+from commissioner.diagnose.pushes import tilted
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.spline import cells_of
-from commissioner.diagnose.tangent import sensitivities, tilted
+from commissioner.diagnose.tangent import sensitivities
 from commissioner.diagnose.terminals import sense
 from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying
 
