@@ -109,7 +109,7 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
         )
         return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
-        va, vb, *drive, period, _substeps(model, layout, segment), layout.crossing_substeps, *machine, start
+        va, vb, *drive, period, _substeps(model, layout, segment, asked), layout.crossing_substeps, *machine, start
     )
     return _Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
 
@@ -262,13 +262,16 @@ def _taylor_order(rate_times_step: float) -> int:
     return order
 
 
-def _substeps(model: Model, layout: Layout, segment: Segment) -> int:
-    """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode)."""
+def _substeps(model: Model, layout: Layout, segment: Segment, asked: Sequence[Term]) -> int:
+    """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode); below 2.5, where a second
+
+    path is asked for that has no size yet: its voltage must be stable.
+    """
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
-    branches = _at_work(kinds.BRANCH, model, ())
-    if branches:
-        rate = max(rate, 0.5 / float(np.abs(layout.branch_time_s[branches]).min()))
+    for terms, share in (((), 0.5), (asked, 0.1)):
+        times = np.abs(layout.branch_time_s[_at_work(kinds.BRANCH, model, terms)])
+        rate = max(rate, share / float(times.min(initial=np.inf)))
     if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
     return int(layout.substeps * np.clip(np.ceil(rate * segment.period_s / 0.25), 1, 40))

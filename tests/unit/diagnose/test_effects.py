@@ -205,6 +205,16 @@ def test_sensitivities_beside_eddy_paths_are_exact(nominal, setting, symbol):
     assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
 
 
+def test_second_paths_much_faster_than_the_sampling_can_be_asked_for_beside_a_dead_time(nominal, setting):
+    """Their voltages would run away in Runge-Kutta steps of a period: 16 us against 200 us."""
+    legs = CATALOGUE["dead_time"].terms(setting)
+    model = Model(nominal.nominal, legs, tuple(0.1 for _ in legs))
+    asked = CATALOGUE["rotor_skin_effect"].terms(setting)
+    fast = replace(setting.layout, branch_time_s=setting.layout.branch_time_s / 10.0)
+    jacobian = predict(model, setting.record, 1, fast, wanted=asked).jacobian
+    assert np.isfinite(jacobian).all() and np.abs(jacobian[4:]).max() < 100.0 * np.abs(jacobian[:4]).max()
+
+
 INSIDE = [
     "dead_time", "dc_link_sag", "dc_link_ripple", "magnetizing_saturation", "magnetic_hysteresis", "remanence", "leakage_saturation",
     "rotor_skin_effect", "iron_loss", "stator_heating", "rotor_heating", "shaft_motion", "inductance_anisotropy",
