@@ -69,10 +69,11 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
     ]
     record = Record(tuple(kept), facts)
     clipped = _clip_report(recordings, limits, facts)
-    refusal, more = _judge(record, holes, clipped, steps)
+    tones = excited_lines(record)
+    refusal, more = _judge(record, tones, holes, clipped, steps)
     sentences.extend(more)
     return record, Audit(
-        tuple(sentences), clipped, steps, tuple(holes), tuple(excited_lines(record)),
+        tuple(sentences), clipped, steps, tuple(holes), tuple(tones),
         tuple(sorted({s.axis_deg for s in kept})), refusal,
     )
 
@@ -259,7 +260,7 @@ def _bridge(segment: Segment, period: float) -> Segment:
 
 
 def excited_lines(record: Record) -> list[float]:
-    """Frequencies the command excites, Hz: spectral peaks within 60 dB of the largest, merged over segments."""
+    """Frequencies the command excites, Hz: spectral peaks within 40 dB of the largest, merged over segments."""
     found: list[float] = []
     for segment in record.segments:
         v = segment.voltage_axis_v - segment.voltage_axis_v.mean()
@@ -278,7 +279,8 @@ def excited_lines(record: Record) -> list[float]:
 
 
 def _judge(
-    record: Record, holes: Sequence[tuple[int, float, int]], clipped: dict[str, float], steps: Sequence[float]
+    record: Record, tones: Sequence[float], holes: Sequence[tuple[int, float, int]], clipped: dict[str, float],
+    steps: Sequence[float],
 ) -> tuple[str | None, list[str]]:
     out: list[str] = []
     if not record.segments:
@@ -299,7 +301,7 @@ def _judge(
         return refusal, out
     if max(steps, default=0.0) > 0:
         out.append(f"currents come in steps of {max(steps) * 1e3:.3g} mA.")
-    if len(excited_lines(record)) == 1:
+    if len(tones) == 1:
         out.append(
             "a single tone is excited: it carries two numbers per axis, so linear causes cannot be told from the "
             "machine's own parameters; only distortion can be named."

@@ -172,14 +172,25 @@ class Steps:
         return None if best is None or self._is_crumb(current, best[2]) else (best[1], best[2])
 
     def _tried(self, current: Fit, name: str, wanted_chi2: float) -> Fit:
-        """The refit with one more cause, made once from the same fit: lines looked for meanwhile concern only their own causes."""
+        """The refit with one more cause; lines looked for meanwhile concern only their own causes."""
+        known = self._known(current)
+        if name not in known or not known[name].has_converged or name in LINES.values():
+            model = current.model.with_terms(CATALOGUE[name].terms(self.setting))
+            known[name] = fit(model, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
+        return known[name]
+
+    def _without(self, current: Fit, name: str) -> Fit:
+        """The refit with one cause less."""
+        known = self._known(current)
+        if f"without {name}" not in known:
+            known[f"without {name}"] = fit(current.model.without(name), self.record, self.layout, self.noise)
+        return known[f"without {name}"]
+
+    def _known(self, current: Fit) -> dict[str, Fit]:
+        """What was fitted from here already: a search that looks again begins where it was."""
         if self.tried[0] is not current:
             self.tried = (current, {})
-        known = self.tried[1]
-        if name not in known or not known[name].has_converged or name in LINES.values():
-            terms = CATALOGUE[name].terms(self.setting)
-            known[name] = fit(current.model.with_terms(terms), self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
-        return known[name]
+        return self.tried[1]
 
     def _is_crumb(self, current: Fit, trial: Fit) -> bool:
         """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
@@ -219,7 +230,7 @@ class Steps:
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
             if holds_place or loss < 10.0 * wanted or not is_plausible(current.model, name, self.setting):
-                trial = fit(current.model.without(name), self.record, self.layout, self.noise)
+                trial = self._without(current, name)
                 is_idle = trial.chi2 - current.chi2 < wanted or not is_plausible(current.model, name, self.setting)
                 # what was left runs away alone: better an implausible cause than no model
                 if is_idle and np.isfinite(trial.chi2):

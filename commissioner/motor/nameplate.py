@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from commissioner.motor.circuit import InverseGamma
 
@@ -43,7 +43,9 @@ class Nameplate:
         return self.rated_voltage_v / (math.sqrt(3.0) * self.rated_current_a)
 
 
-RATED_VALUES = tuple(f.name for f in fields(Nameplate))[:6]
+RATED_VALUES = (
+    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
+)  # fmt: skip
 """The numbers that every plate states, by their names here and in a recording; pole pairs follow from them."""
 
 
