@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.effect import Sizes
 from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
 from commissioner.diagnose.guards import is_plausible, loss_without
 from commissioner.diagnose.leftover import Leftover
@@ -112,9 +113,13 @@ def alternatives(
 def _moved(here: Model, there: Model, names: Sequence[str], setting: Setting) -> dict[str, dict[str, float]]:
     out = {}
     for name in names:
-        old, new = (CATALOGUE[name].sizes(setting, one.of(name)) for one in (here, there))
+        old, new = (_sizes(one, name, setting) for one in (here, there))
         out[name] = {key: new[key][0] - old[key][0] for key in old if key in new}
     return out
+
+
+def _sizes(model: Model, name: str, setting: Setting) -> Sizes:
+    return CATALOGUE[name].sizes(replace(setting, nominal=model.nominal), model.of(name))
 
 
 def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tuple[float, float, str]]:
@@ -123,22 +128,21 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
     free = np.flatnonzero(found.model.is_free)
     covariance = np.zeros((4 + len(terms), 4 + len(terms)))
     covariance[np.ix_(free, free)] = inverse(found.normal.total_gram[np.ix_(free, free)])
-    mine = [k for k, t in enumerate(terms) if t.effect == name and 4 + k in free]
-    sizes = CATALOGUE[name].sizes(setting, found.model.of(name))
+    # some sizes are relative to the machine's own numbers
+    rows = np.array([0, 1, 2, 3, *(4 + k for k, t in enumerate(terms) if t.effect == name and 4 + k in free)])
+    sizes = _sizes(found.model, name, setting)
     out = {}
     slopes: dict[str, list[float]] = {key: [] for key in sizes}
-    for k in mine:
-        h = 0.5 * float(np.sqrt(max(covariance[4 + k, 4 + k], 1e-20)))
-        theta = found.model.theta
-        theta = theta.copy()
-        theta[4 + k] += h
-        moved = CATALOGUE[name].sizes(setting, found.model.moved(theta).of(name))
+    for row in rows:
+        h = 0.5 * float(np.sqrt(max(covariance[row, row], 1e-20)))
+        theta = found.model.theta.copy()
+        theta[row] += h
+        moved = _sizes(found.model.moved(theta), name, setting)
         for key in sizes:
             slopes[key].append((moved[key][0] - sizes[key][0]) / h)
-    rows = np.array([4 + k for k in mine])
     for key, (value, unit) in sizes.items():
         slope = np.array(slopes[key])
-        variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope) if rows.size else 0.0
+        variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope)
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
     if CATALOGUE[name].course:
         first = next(iter(sizes))

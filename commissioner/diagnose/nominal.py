@@ -171,5 +171,4 @@ def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:
     layout, flux = layout_for(record, nominal.model)
     record, lines = add_channels(record, nominal.model, layout, noise)
-    leakage_h = nominal.model.nominal[2]
-    return record, layout, Setting(record, layout, flux, record.facts.current_peak_a * leakage_h, leakage_h, lines)
+    return record, layout, Setting(record, layout, flux, record.facts.current_peak_a * nominal.model.nominal[2], nominal.model.nominal, lines)

@@ -115,7 +115,7 @@ def search(
         fitted, layout = settled(fitted, whole.record, layout, noise)
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
-        whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, leakage_h=fitted.model.nominal[2]
+        whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
     )
     return Found(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,

@@ -128,14 +128,11 @@ def _leakage(sizes: Numbers, values: Numbers, setting: Setting, model: Model) ->
 
 
 def _skin(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
-    """R_R(f_N)/R_R(0) - 1 of the branches beside R_R, and the corner that carries most of it."""
+    """The rise at rated frequency, and the corner that carries most of it."""
     rated = float(setting.facts.metadata.get("rated_frequency_hz", 50.0))
     branches, times = _branches(model, setting), setting.layout.branch_time_s
-    admittance = 1.0 / model.nominal[1] + branches / (1.0 + 2j * np.pi * rated * times)
-    together = 1.0 / model.nominal[1] + (admittance - 1.0 / model.nominal[1]).sum()
-    rise = float((1.0 / together).real * (1.0 / model.nominal[1] + branches.sum()) - 1.0)
     corner = 1.0 / (2.0 * np.pi * float(branches @ times) / max(float(branches.sum()), 1e-12))
-    return {"size": rise, "corner": corner / rated}
+    return {"size": sizes["resistance_rise_at_rated_frequency"], "corner": corner / rated}
 
 
 def _phases(symbol: str) -> Translate:

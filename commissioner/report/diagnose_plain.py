@@ -66,7 +66,7 @@ PLAIN: Mapping[str, Plain] = {
         is_normal=True,
     ),
     "rotor_skin_effect": Plain(
-        "The rotor's resistance rises with frequency (skin effect in the bars)",
+        "The rotor's resistance rises by {size} with frequency (skin effect in the bars)",
         "Every cage does this, large ones most. At running slip the low-frequency value counts.",
         "Do not enter a rotor resistance from a locked-rotor test at mains frequency: it is too high.", is_normal=True,
     ),

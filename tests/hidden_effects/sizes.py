@@ -135,7 +135,7 @@ def _heating(effect: Effect, plant: Plant, sizes: Sizes, peak_a: float) -> Pair:
 COMPARED: dict[str, Compare] = {
     "dead_time": _leg, "device_drop": _leg, "dc_link_sag": _scaled(1.0), "dc_link_ripple": _ripple,
     "sampling_delay": _scaled(1e6), "sensor_lag": _scaled(1e6), "magnetizing_saturation": _saturation,
-    "magnetic_hysteresis": _hysteresis, "leakage_saturation": _leakage, "iron_loss": _conductance,
+    "magnetic_hysteresis": _hysteresis, "leakage_saturation": _leakage, "iron_loss": _conductance, "rotor_skin_effect": _scaled(1.0),
     "stator_heating": _heating, "sensor_offset": _offset, "sensor_gain_mismatch": _gain, "sensor_nonlinearity": _sensor,
     "mains_pickup": _mains, "clock_drift": _clock, "shaft_motion": _motion, "inductance_anisotropy": _inductance,
     "resistance_anisotropy": _resistance, "cable_capacitance": _scaled(1e9), "quantization": _scaled(1.0),

@@ -27,7 +27,8 @@ class Setting:
     iron_flux_wb: float
     leakage_flux_wb: float
     """Largest fluxes of iron and leakage path that the fitted machine reaches."""
-    leakage_h: float
+    nominal: tuple[float, float, float, float]
+    """R_s, R_R, L_sigma and L_M of the fitted machine."""
     lines_hz: Mapping[str, float]
 
     @property

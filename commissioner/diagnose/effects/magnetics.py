@@ -114,7 +114,7 @@ def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     The path's own inductance is L_sigma with the stator current's leakage, (1 + L_sigma/L_M) L_sigma with the rotor's.
     """
     layout, flux = setting.layout, setting.leakage_flux_wb
-    own_h = setting.leakage_h * (1.0 + (0.5 + values.get("split", 0.0)) * layout.leak_ratio)
+    own_h = setting.nominal[2] * (1.0 + (0.5 + values.get("split", 0.0)) * layout.leak_ratio)
     weights = listed(values, "curve", layout.leak_vectors.shape[0])
     growth = own_h * spline_value(layout.leak_vectors, weights, layout.leak_top_wb, flux)
     return {"inductance_drop": (growth / (1.0 + growth), "1"), "at_current_a": (flux / own_h * (1.0 + growth), "A")}
@@ -141,7 +141,12 @@ def leakage_saturation(setting: Setting) -> tuple[Term, ...]:
 
 
 def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"branch_conductance_s": (float(sum(values.values())), "S")}
+    """R_R(f_N) / R_R(0) - 1 of the branches beside R_R."""
+    rated = float(setting.facts.metadata.get("rated_frequency_hz", 50.0))
+    branches = listed(values, "branch", setting.layout.branch_time_s.size)
+    slow = 1.0 / setting.nominal[1] + branches.sum()
+    fast = 1.0 / setting.nominal[1] + (branches / (1.0 + 2j * np.pi * rated * setting.layout.branch_time_s)).sum()
+    return {"resistance_rise_at_rated_frequency": (float((1.0 / fast).real * slow - 1.0), "1")}
 
 
 @effect(

@@ -43,7 +43,7 @@ def setting_of(model, **about):
     record, _ = prepare([recording(currents=currents, **about)])
     layout, flux = layout_for(record, model)
     record, lines = add_channels(record, model, layout, WHITE)
-    return Setting(record, layout, flux, record.facts.current_peak_a * model.nominal[2], model.nominal[2], lines)
+    return Setting(record, layout, flux, record.facts.current_peak_a * model.nominal[2], model.nominal, lines)
 
 
 @pytest.fixture(scope="session")

@@ -172,6 +172,17 @@ def test_the_leg_loss_reads_as_dead_time_in_microseconds(setting):
     assert sizes["time_us"] == (pytest.approx(volts / (5000.0 * 540.0) * 1e6), "us")
 
 
+def test_a_bar_that_shares_the_current_reads_as_the_rise_of_the_rotor_resistance(nominal, setting):
+    """One branch g / (1 + s T) beside 1 / R_R: Re of the parallel impedance at 50 Hz, over that at rest."""
+    terms = CATALOGUE["rotor_skin_effect"].terms(setting)
+    g, corner = 0.1, 1.0 / setting.layout.branch_time_s[2] / (2.0 * np.pi)
+    rise, unit = size("rotor_skin_effect", setting, branch_2=g)["resistance_rise_at_rated_frequency"]
+    r = nominal.nominal[1]
+    parallel = 1.0 / (1.0 / r + g / (1.0 + 50.0j / corner))
+    assert rise == pytest.approx(parallel.real * (1.0 / r + g) - 1.0, rel=1e-9) and unit == "1"
+    assert {t.symbol for t in terms} >= {"branch_2"} and 0.0 < rise < r * g
+
+
 def test_effects_the_data_cannot_show_have_no_numbers(nominal):
     from tests.unit.diagnose.conftest import setting_of
 
