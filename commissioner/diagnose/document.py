@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from commissioner.diagnose.causes import Cause
+from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.effects.effect import PLACES, Sizes
 from commissioner.diagnose.points_diagnosis import PointsDiagnosis
-from commissioner.diagnose.search import Found
 from commissioner.motor.circuit import Quantity
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
@@ -66,39 +62,6 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "alternatives": dict(cause.rivals.items()),
         "found_by": "audit" if cause.from_audit else "fit",
     }
-
-
-def detection_limits(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
-    """Smallest size of each effect that these data would have shown: the first of its sizes, at its most visible shape."""
-    screening = found.first_screening
-    out: dict[str, dict[str, dict[str, float | str]]] = {}
-    scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)
-    for name, score in screening.scores.items():
-        sizes = CATALOGUE[name].sizes
-        none = dict.fromkeys((t.symbol for t in score.terms), 0.0)
-        steps = [{**none, t.symbol: t.step} for t in score.terms]
-        alone = [_comparable(sizes(found.setting, step)) for step in steps]
-        counts = [k for k, items in enumerate(alone) if any(value for _, (value, _) in items)]
-        if not counts:
-            continue
-        columns = np.array(screening.columns[name])[counts]
-        powers, shapes = np.linalg.eigh(screening.projected[np.ix_(columns, columns)])
-        if powers[-1] <= 0.0:
-            continue
-        theta = shapes[:, -1] * np.sqrt(score.threshold / (scale * powers[-1]))
-        theta = theta if theta.sum() >= 0.0 else -theta
-        terms = [score.terms[k] for k in counts]
-        found_sizes = sizes(found.setting, {t.symbol: x * t.step for t, x in zip(terms, theta, strict=True)})
-        key, (value, unit) = max(_comparable(found_sizes), key=lambda item: abs(item[1][0]))
-        if np.isfinite(value) and value != 0.0:
-            out[name] = {key: {"value": abs(float(value)), "unit": unit}}
-    return out
-
-
-def _comparable(sizes: Sizes) -> list[tuple[str, tuple[float, str]]]:
-    """The size that measures the effect: the first that does not say where it acts; of several sensors each one's."""
-    measures = [item for item in sizes.items() if item[0] not in PLACES]
-    return [item for item in measures if item[0].split("_")[0] == measures[0][0].split("_")[0]]
 
 
 def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:

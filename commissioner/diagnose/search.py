@@ -53,6 +53,8 @@ class Found:
     """Causes that would gain, but too little to matter: what they gain in chi2."""
     gains: dict[str, float] = field(default_factory=dict)
     losses: tuple[Loss, ...] = ()
+    material_chi2: float = 0.0
+    """A cause that gains less is too small to matter."""
     is_complete: bool = True
     """False: the time allowed was over before nothing more passed the rules."""
 
@@ -119,7 +121,7 @@ def search(
     )
     return Found(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
-        whole.below, losses_of(fitted, accepted), losses, go_on(),
+        whole.below, losses_of(fitted, accepted), losses, whole.material_chi2, go_on(),
     )
 
 

@@ -117,7 +117,7 @@ def not_found(document: Document) -> Section:
     apart = {c["name"] for c in document["causes"]} | {n for c in document["causes"] for n in c["equivalent"]}
     apart |= {u["name"] for u in document.get("uncertain", ())}
     rows = [(spoken(k), limit_words(document, k), coded(DECIDES.get(k, ""))) for k in document["detection_limits"] if k not in apart]
-    caption = "Smallest size that these data show when it is the only cause there."
+    caption = "Smallest size that these data show beside the named causes."
     title = "Looked for and not found" if is_finished(document) else "Not found yet, and not all looked for"
     return Section(title, [Table(("looked for", "smallest detectable", "what would show it better"), rows, caption=caption)])
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import diagnose
 from tests.hidden_effects.another_hand import Machine, recorded
 from tests.hidden_effects.cases import class_of
@@ -45,8 +46,21 @@ def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbo
     seen, names = named(Machine(**about))
     assert len(names) == 1 and any(class_of(name) & found for found in names.values()), (seen.reason, names)
     assert seen.left.sigma < 0.1
+    limits = detection_limits(seen.found)
+    for cause in (c for c in seen.causes if not c.from_audit):
+        key, limit = next(iter(limits[cause.name].items()))
+        assert limit["value"] < max(abs(cause.sizes[key][0]), 1e-12), (cause.name, limit)
     if symbol:
         assert seen.causes[0].sizes[symbol][0] == pytest.approx(size, rel=0.01)
+
+
+@pytest.mark.campaign
+def test_a_cause_is_seen_from_about_its_stated_limit_on():
+    limits = detection_limits(named(Machine())[0].found)
+    offset_a, gain = (limits[n][key]["value"] for n, key in (("sensor_offset", "offset_w_a"), ("sensor_gain_mismatch", "gain_w_over_u")))
+    for times, is_seen in ((0.5, False), (2.0, True)):
+        assert ("sensor_offset" in named(Machine(offsets_a=(0.0, 0.0, times * offset_a)))[1]) is is_seen
+        assert ("sensor_gain_mismatch" in named(Machine(gains=(1.0, 1.0, 1.0 + times * gain)))[1]) is is_seen
 
 
 @pytest.mark.campaign
