@@ -217,7 +217,5 @@ def sensitivities(
                     moved[group:end], rate[group:end], fed[group:end], step, push, amp, cage, cage_push, at, memory,
                     force, terminal, rotor, out[:, group:end, start:stop],
                 )
-        for table in (before, now, secant):
-            table[0] = table[last - 1]
         at[:, 0] = at[:, last - 1]
         amp[0], cage[0] = amp[last - 1], cage[last - 1]

@@ -75,6 +75,19 @@ def _memory_current(pa, pb, moved_a, moved_b, z, stop_gain, stop_radius):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
+    """(6), (7) from the current (ca, cb) into the cage, into k from 2 on; k[0:2] is d psi_s/dt."""
+    wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
+    wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
+    k[2] = -wa - omega * x[3]
+    k[3] = -wb + omega * x[2]
+    for n in range(branch_time.shape[0]):
+        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[0], k[1])
+        k[4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
+        k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
 def _rates(
     x, k, va, vb, ru, rv, rw, rr, omega, base, legs, has_legs, legs_top, legs_knee, iron, iron_top, leak, leak_top,
     ma, mb, branch_gain, branch_time,
@@ -113,14 +126,7 @@ def _rates(
     qa, qb = branch_current(x, branch_gain, branch_time, ROTOR)
     ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) + ja - ia - (kappa - 1.0) * ea - qa
     cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) + jb - ib - (kappa - 1.0) * eb - qb
-    wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
-    wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
-    k[2] = -wa - omega * x[3]
-    k[3] = -wb + omega * x[2]
-    for n in range(branch_gain.shape[0]):
-        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[0], k[1])
-        k[4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
-        k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
+    _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time)
     return ta, tb, jaa, jab, jbb, eaa, eab, ebb
 
 
@@ -305,14 +311,7 @@ def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
     qa, qb = branch_current(x, branch_gain, branch_time, ROTOR)
     ca -= qa
     cb -= qb
-    wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
-    wb = rr * (base[7] * ca + (1.0 - base[6]) * cb)
-    k[2] = -wa - omega * x[3]
-    k[3] = -wb + omega * x[2]
-    for n in range(branch_gain.shape[0]):
-        fed_a, fed_b = (wa, wb) if branch_time[n] > 0.0 else (k[0], k[1])
-        k[4 + 2 * n] = (fed_a - x[4 + 2 * n]) / abs(branch_time[n])
-        k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
+    _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
