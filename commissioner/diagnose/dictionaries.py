@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import lsq_linear
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE, Setting
@@ -22,6 +24,11 @@ CURVES = {
     kinds.IRON_CURVE: ("iron_vectors", even_vectors), kinds.LEAKAGE_CURVE: ("leak_vectors", even_vectors),
     kinds.LEGS_LINK: ("legs_vectors", odd_vectors), kinds.LEGS: ("legs_vectors", odd_vectors),
 }
+RANGES = {
+    kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")
+}
+GRID = 200
+"""Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
 """A curve of more knots than this is not refined again."""
 FINER_SHARE = 2e-3
@@ -31,31 +38,80 @@ SAME_RATIO = 0.05
 
 
 def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
-    """New dictionary ranges where the improved model reaches other fluxes (curves start again from zero), closer time
+    """The fit in dictionaries that follow it."""
+    model, there = respread(current.model, setting)
+    if there is setting:
+        return current, setting
+    again = begun(model, there, noise)
+    return (again, there) if np.isfinite(again.chi2) else (current, setting)
 
-    constants where a second path acts, and the ratio of the inductances as it is now.
+
+def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
+    """The model in new dictionary ranges where it reaches other fluxes, with closer time constants where a second path acts,
+
+    and the ratio of the inductances as it is now.
     """
-    layout, record, model = setting.layout, setting.record, current.model
-    flux, _ = largest_fluxes(record, model, layout)
-    fresh = with_ranges(layout, flux, setting.facts.current_peak_a * model.nominal[2])
+    layout = setting.layout
+    reached = largest_fluxes(setting.record, model, layout)
+    fresh, flux = with_ranges(layout, reached[0], setting.facts.current_peak_a * model.nominal[2]), reached[0]
     iron, leak = fresh.iron_top_wb / layout.iron_top_wb, fresh.leak_top_wb / layout.leak_top_wb
     if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
         fresh, flux = layout, setting.iron_flux_wb
     else:
-        model = without_curves(model)
+        model = carried_over(model, layout, reached, fresh)
     ratio = leak_ratio(model)
     if abs(ratio - layout.leak_ratio) > SAME_RATIO * ratio:
         fresh = replace(fresh, leak_ratio=ratio)
     if layout.branch_time_s is BRANCH_TIME_S and model.has_kind(kinds.BRANCH):
         fresh = replace(fresh, branch_time_s=closer_branches(model, layout.branch_time_s))
     if fresh is layout:
-        return current, setting
+        return model, setting
     there = replace(setting, layout=fresh, iron_flux_wb=flux)
     for name in sorted({t.effect for t in model.terms if t.kind == kinds.BRANCH}):
         terms = CATALOGUE[name].terms(there)
         model = model.with_terms([t for t in terms if t.symbol not in model.of(name)])
-    again = fit(model, record, fresh, noise)
-    return (again, there) if np.isfinite(again.chi2) else (current, setting)
+    return model, there
+
+
+def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
+    """The fit that begins with the model's curves and loops as they are or at zero, whichever is nearer."""
+    starts = [model] if (flat := without_curves(model)).values == model.values else [model, flat]
+    if len(starts) > 1:
+        starts.sort(key=lambda m: fit(m, setting.record, setting.layout, noise, rounds=0).chi2)
+    return fit(starts[0], setting.record, setting.layout, noise)
+
+
+def carried_over(model: Model, layout: Layout, reached: tuple[float, float], fresh: Layout) -> Model:
+    """The model with its curves and loops in the dictionaries of `fresh`. Curves go straight on beyond the iron's and the
+
+    leakage's fluxes `reached` (Wb): what a coefficient says there, no data said. Loops keep their heights at the nearest radius.
+    """
+    values = list(model.values)
+    for (kind, (vectors, top)), flux in zip(RANGES.items(), reached, strict=True):
+        rows = [k for k, t in enumerate(model.terms) if t.kind == kind]
+        if any(values[k] for k in rows):
+            old, end = _splines(getattr(layout, vectors), getattr(layout, top)), min(flux, getattr(layout, top))
+            new, grid = _splines(getattr(fresh, vectors), getattr(fresh, top)), np.linspace(0.0, getattr(fresh, top), GRID)
+            weights = np.array([values[k] for k in rows])
+            straight = np.maximum(grid - end, 0.0) * (old(end, 1) @ weights)
+            bounds = [[getattr(model.terms[k], side) for k in rows] for side in ("lower", "upper")]
+            mapped = lsq_linear(new(grid), old(np.minimum(grid, end)) @ weights + straight, np.array(bounds)).x
+            values = [float(mapped[rows.index(k)]) if k in rows else v for k, v in enumerate(values)]
+    loops = {t.index: k for k, t in enumerate(model.terms) if t.kind == kinds.STOP}
+    for k in loops.values():
+        values[k] = 0.0
+    for index, k in loops.items():
+        radius, rate = layout.stop_radius_wb[index]
+        alike = {n: r for n, r in enumerate(fresh.stop_radius_wb) if r[0] * radius > 0.0 and (r[1] > 0.0) == (rate > 0.0)}
+        there = min(alike, key=lambda n: abs(np.log(alike[n][0] / radius)))
+        values[loops[there]] += model.values[k] * (rate / alike[there][1] if rate else 1.0)
+    return replace(model, values=tuple(values))
+
+
+def _splines(vectors: Array, top: float) -> BSpline:
+    """The curves of a dictionary, one for each vector, of a flux from 0 to `top`."""
+    intervals = vectors.shape[1] - 3
+    return BSpline(top / intervals * np.arange(-3, intervals + 4), vectors.T, 3)
 
 
 def with_finer_curves(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from commissioner.diagnose.dictionaries import begun, carried_over, respread
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import guard_of_lost_samples, losses_of
@@ -22,13 +23,15 @@ from commissioner.diagnose.nominal import (
 )
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
-from commissioner.diagnose.settle import settled, without_curves
+from commissioner.diagnose.settle import settled
 from commissioner.diagnose.steps import Report, Steps, surely_left
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
 MENDED = 3
 """Rounds of putting lost samples right and fitting again."""
+MENDED_AT_ONCE = 0.5
+"""A round that leaves more of the misfit than this is the last: what remains is not made by lost samples."""
 MENDED_SHARE, MENDED_LEAST_SHARE = 0.7, 0.3
 """Of the misfit that the noise's doubt cannot make, and at the least of all of it, so much must be gone with them."""
 UNKNOWN_SIGMA, UNKNOWN_SHARE = 0.1, 0.05
@@ -78,26 +81,31 @@ def search(
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
     record, layout, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
-    model = nominal.model
+    start = nominal
+    seen: Steps | None = None
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
     regrouped: set[frozenset[str]] = set()
     is_hopeless = False
     for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
         part = record if samples == record.samples else record.beginning(samples)
-        whole = Steps(replace(setting, record=part), noise, names, report, record, go_on)
-        whole.regrouped = regrouped
-        start = fit(model, part, layout, noise)
+        here = replace(setting, record=part)
+        if seen is None or not accepted:
+            start = fit(start.model, part, layout, noise)
+        else:
+            start, here = _on_more(seen, start.model, accepted, here, noise)
         if not np.isfinite(start.chi2):
             # what fitted the smaller part runs away beyond it
-            start, accepted = fit(nominal.model, part, layout, noise), ()
+            start, accepted, here = fit(nominal.model, part, layout, noise), (), replace(setting, record=part)
+        whole = Steps(here, noise, names, report, record, go_on)
+        whole.regrouped = regrouped
         if accepted or part is record:
             start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
         fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
         is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal, noise)
         first, record, regrouped = first or whole.first, whole.full, whole.regrouped
-        setting = replace(setting, record=record, lines_hz=whole.setting.lines_hz)
-        model = without_curves(_completed(fitted.model, accepted, setting))
+        setting, start = replace(setting, record=record, lines_hz=whole.setting.lines_hz), fitted
+        seen = whole
     if accepted and losses:
         unmended = _with_the_losses(whole.record, raw, fitted, whole.layout, noise)
         if unmended is not None:
@@ -147,8 +155,11 @@ def _mended(
         trial = fit(better.model, again, layout, noise, rounds=6, tolerance=1.0)
         if trial.chi2 >= better.chi2:
             break
+        is_slow = _excess(trial) > MENDED_AT_ONCE * _excess(better)
         mended, better, losses = again, trial, seen
-    excess, left = (f.chi2 - f.normal.count.sum() for f in (current, better))
+        if is_slow:
+            break
+    excess, left = _excess(current), _excess(better)
     # what a noise measured too low adds to both
     doubt = noise.uncertainty * float(current.normal.count.sum())
     stays = max(left - doubt, 0.0) > (1.0 - MENDED_SHARE) * max(excess - doubt, 0.0)
@@ -156,6 +167,10 @@ def _mended(
         return record, current, ()
     report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
     return mended, better, losses
+
+
+def _excess(one: Fit) -> float:
+    return one.chi2 - float(one.normal.count.sum())
 
 
 def _with_the_losses(
@@ -170,6 +185,15 @@ def _with_the_losses(
     masked = float(trial.normal.count.sum() - fitted.normal.count.sum())
     gain = trial.chi2 - fitted.chi2 - 3.0 * max(masked, 0.0)
     return (record, trial) if gain < guard_of_lost_samples(fitted) else None
+
+
+def _on_more(seen: Steps, model: Model, accepted: Sequence[str], setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
+    """The accepted causes of a part fitted to more of the record, in dictionaries spread over the fluxes reached there."""
+    layout = seen.layout
+    there = replace(setting, layout=layout, iron_flux_wb=seen.setting.iron_flux_wb)
+    reached = largest_fluxes(seen.record, model, layout)
+    wider, there = respread(carried_over(_completed(model, accepted, there), layout, reached, layout), there)
+    return begun(wider, there, noise), there
 
 
 def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model:

@@ -19,7 +19,8 @@ SIDES = (0.0, 0.5, 1.0)
 NEAR = 0.1
 
 
-SETTLED_SAMPLES = 160_000
+SETTLED_SAMPLES, PLACED_SAMPLES = 160_000, 45_000
+"""On so many, loops are settled and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
 
@@ -70,7 +71,7 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
     hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment.
     """
-    started, part = on_part(current, record, layout, noise, SETTLED_SAMPLES)
+    started, part = on_part(current, record, layout, noise, PLACED_SAMPLES)
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
