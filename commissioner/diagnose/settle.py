@@ -69,13 +69,15 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The best fit of those that begin with the iron on the rotor's side of the leakage, between, and on the stator's.
 
     Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
-    hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment.
+    hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment; a side
+    must gain what one number costs.
     """
     started, part = on_part(current, record, layout, noise, PLACED_SAMPLES)
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
-            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=best.chi2)
+            wanted = best.chi2 - float(np.log(best.normal.count.sum()))
+            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=wanted)
             if trial.chi2 < best.chi2:
                 best = trial
     if part is record:

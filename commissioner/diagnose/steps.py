@@ -179,11 +179,12 @@ class Steps:
             known[name] = fit(model, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
         return known[name]
 
-    def _without(self, current: Fit, name: str) -> Fit:
-        """The refit with one cause less."""
+    def _without(self, current: Fit, name: str, wanted_chi2: float) -> Fit:
+        """The refit with one cause less; given up where it cannot reach `wanted_chi2`."""
         known = self._known(current)
         if f"without {name}" not in known:
-            known[f"without {name}"] = fit(current.model.without(name), self.record, self.layout, self.noise)
+            less = current.model.without(name)
+            known[f"without {name}"] = fit(less, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
         return known[f"without {name}"]
 
     def _known(self, current: Fit) -> dict[str, Fit]:
@@ -229,9 +230,10 @@ class Steps:
             wanted = max(self._guard(losses, name), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
-            if holds_place or loss < 10.0 * wanted or not is_plausible(current.model, name, self.setting):
-                trial = self._without(current, name)
-                is_idle = trial.chi2 - current.chi2 < wanted or not is_plausible(current.model, name, self.setting)
+            is_sound = is_plausible(current.model, name, self.setting)
+            if holds_place or loss < 10.0 * wanted or not is_sound:
+                trial = self._without(current, name, current.chi2 + wanted if is_sound else np.inf)
+                is_idle = trial.chi2 - current.chi2 < wanted or not is_sound
                 # what was left runs away alone: better an implausible cause than no model
                 if is_idle and np.isfinite(trial.chi2):
                     self.report(f"  dropped {name}")
