@@ -20,7 +20,7 @@ from commissioner.diagnose.evidence import (
     sizes_with_spread,
 )
 from commissioner.diagnose.fit import on_part
-from commissioner.diagnose.guards import SAME_ORDER, loss_without
+from commissioner.diagnose.guards import SAME_ORDER, shows
 from commissioner.diagnose.leftover import Leftover
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.search import EXPLORED, Found
@@ -30,8 +30,6 @@ COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.1
 """Named as a cause: steps beyond a share of the rated peak current that make a hundredth of the noise power."""
 TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
-SHOWN_BY_A_PART = 0.3
-"""Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
 DELAY_OR_LAG_TIE = 1e-5
@@ -106,8 +104,8 @@ def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence
         if len(out) == len(asked):
             break
         fitted, part = on_part(found.fit, record, layout, noise, samples)
-        share = SHOWN_BY_A_PART * part.samples / record.samples
-        shown = [n for n in asked if n not in out and (part is record or loss_without(fitted, n) > share * found.gains[n])]
+        share = part.samples / record.samples
+        shown = [n for n in asked if n not in out and (part is record or shows(fitted, share, n, found.gains[n]))]
         if shown:
             setting = setting_for(found.setting, part)
             out |= alternatives(fitted, found.accepted, part, layout, setting, noise, record.samples, excluded, shown)

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 TIE_CHI2 = 10.0
 ALTERNATIVE_SHARE = 0.9
 """An alternative is refitted only if it promises this share of the cause's own gain, or of what that one promises."""
+ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
+"""Of a cause's gain: so well is a model without it fitted, and a rival that cannot lose less is not fitted to the last digit."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,10 @@ def alternatives(
     """For every accepted cause that is `asked` about: what of the rest (but for `excluded`) takes its place."""
     out: dict[str, dict[str, Rival]] = {}
     for name in asked:
-        without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=1.0)
+        enough = max(ROUGHLY * loss_without(found, name), 1.0)
+        without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=enough)
         gain = without.chi2 - found.chi2
+        wanted = found.chi2 + max(NEARLY_A_TIE * gain, TIE_CHI2)
         absent = [n for n in CATALOGUE if n not in accepted and n not in excluded]
         screening = screen(without.model, record, layout, noise, setting, [*absent, name])
         # where the way to a cause bends, its own promise falls short as its rivals' do
@@ -102,7 +106,8 @@ def alternatives(
         for score in [s for s in screening.ranked() if s.name != name][:3]:
             if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
-            trial = fit(without.model.with_terms(CATALOGUE[score.name].terms(setting)), record, layout, noise)
+            model = without.model.with_terms(CATALOGUE[score.name].terms(setting))
+            trial = fit(model, record, layout, noise, wanted_chi2=wanted)
             if is_plausible(trial.model, score.name, setting):
                 loss = (trial.chi2 - found.chi2) * whole / record.samples
                 rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], setting))

@@ -55,6 +55,8 @@ LEAST_BESIDE = 800.0
 MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
 """Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
 CLOCK_RATES = ("drift", "wander_cos", "wander_sin")
+SHOWN_BY_A_PART = 0.3
+"""Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_SLOPE_LOST = 0.25
 """A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
 
@@ -144,6 +146,11 @@ def loss_without(current: Fit, name: str) -> float:
     mine, information = current.information_of(name)
     value = current.model.theta[mine]
     return max(float(value @ information @ value), 0.0)
+
+
+def shows(part: Fit, share: float, name: str, gain: float) -> bool:
+    """Whether an effect that gains so much on the whole is seen as well on a part that is this share of it."""
+    return loss_without(part, name) > SHOWN_BY_A_PART * share * gain
 
 
 def effects_of(model: Model) -> tuple[str, ...]:

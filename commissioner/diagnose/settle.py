@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, on_part
+from commissioner.diagnose.guards import loss_without, shows
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
@@ -69,10 +70,13 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The best fit of those that begin with the iron on the rotor's side of the leakage, between, and on the stator's.
 
     Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
-    hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment; a side
-    must gain what one number costs.
+    hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment where that
+    shows the iron as well; a side must gain what one number costs.
     """
     started, part = on_part(current, record, layout, noise, PLACED_SAMPLES)
+    share = part.samples / record.samples
+    if not all(shows(started, share, n, loss_without(current, n)) for n in _placed_effects(current.model)):
+        started, part = current, record
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
@@ -84,7 +88,7 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
         return best
     if abs(_side(best.model) - _side(current.model)) <= NEAR:
         return current
-    return min(current, fit(best.model, record, layout, noise), key=lambda f: f.chi2)
+    return min(current, fit(best.model, record, layout, noise, wanted_chi2=current.chi2), key=lambda f: f.chi2)
 
 
 def without_curves(model: Model) -> Model:
@@ -92,6 +96,10 @@ def without_curves(model: Model) -> Model:
     curves = (kinds.IRON_CURVE, kinds.LEAKAGE_CURVE, kinds.STOP)
     values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
     return replace(model, values=values)
+
+
+def _placed_effects(model: Model) -> set[str]:
+    return {t.effect for t in model.terms if t.kind == kinds.NU}
 
 
 def _side(model: Model) -> float:
