@@ -86,32 +86,29 @@ def carried_over(model: Model, layout: Layout, reached: tuple[float, float], fre
 
     leakage's fluxes `reached` (Wb): what a coefficient says there, no data said. Loops keep their heights at the nearest radius.
     """
-    values = list(model.values)
-    for (kind, (vectors, top)), flux in zip(RANGES.items(), reached, strict=True):
+    values = np.array(model.values)
+    for (kind, names), flux in zip(RANGES.items(), reached, strict=True):
         rows = [k for k, t in enumerate(model.terms) if t.kind == kind]
-        if any(values[k] for k in rows):
-            old, end = _splines(getattr(layout, vectors), getattr(layout, top)), min(flux, getattr(layout, top))
-            new, grid = _splines(getattr(fresh, vectors), getattr(fresh, top)), np.linspace(0.0, getattr(fresh, top), GRID)
-            weights = np.array([values[k] for k in rows])
-            straight = np.maximum(grid - end, 0.0) * (old(end, 1) @ weights)
-            bounds = [[getattr(model.terms[k], side) for k in rows] for side in ("lower", "upper")]
-            mapped = lsq_linear(new(grid), old(np.minimum(grid, end)) @ weights + straight, np.array(bounds)).x
-            values = [float(mapped[rows.index(k)]) if k in rows else v for k, v in enumerate(values)]
+        if values[rows].any():
+            (old, top), (new, fresh_top) = (_splines(*(getattr(one, name) for name in names)) for one in (layout, fresh))
+            end, grid = min(flux, top), np.linspace(0.0, fresh_top, GRID)
+            curve = (old(np.minimum(grid, end)) + np.maximum(grid - end, 0.0)[:, None] * old(end, 1)) @ values[rows]
+            bounds = np.array([(model.terms[k].lower, model.terms[k].upper) for k in rows]).T
+            values[rows] = lsq_linear(new(grid), curve, bounds).x
     loops = {t.index: k for k, t in enumerate(model.terms) if t.kind == kinds.STOP}
-    for k in loops.values():
-        values[k] = 0.0
+    values[list(loops.values())] = 0.0
     for index, k in loops.items():
         radius, rate = layout.stop_radius_wb[index]
         alike = {n: r for n, r in enumerate(fresh.stop_radius_wb) if r[0] * radius > 0.0 and (r[1] > 0.0) == (rate > 0.0)}
         there = min(alike, key=lambda n: abs(np.log(alike[n][0] / radius)))
         values[loops[there]] += model.values[k] * (rate / alike[there][1] if rate else 1.0)
-    return replace(model, values=tuple(values))
+    return replace(model, values=tuple(values.tolist()))
 
 
-def _splines(vectors: Array, top: float) -> BSpline:
+def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
     """The curves of a dictionary, one for each vector, of a flux from 0 to `top`."""
     intervals = vectors.shape[1] - 3
-    return BSpline(top / intervals * np.arange(-3, intervals + 4), vectors.T, 3)
+    return BSpline(top / intervals * np.arange(-3, intervals + 4), vectors.T, 3), top
 
 
 def with_finer_curves(

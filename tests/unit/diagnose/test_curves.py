@@ -1,4 +1,4 @@
-"""Splines on twice the knots, and lines seen once a stronger cause is known."""
+"""Splines on twice the knots and over wider ranges, loops of other radii, and lines seen once a stronger cause is known."""
 
 from dataclasses import replace
 
@@ -7,7 +7,10 @@ import pytest
 from scipy.interpolate import BSpline
 
 from commissioner.diagnose.channels import with_clearer_lines
-from commissioner.diagnose.model import even_vectors, odd_vectors, with_halved_intervals
+from commissioner.diagnose.dictionaries import carried_over
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.model import Model, even_vectors, odd_vectors, with_halved_intervals
+from commissioner.diagnose.nominal import with_ranges
 from tests.unit.diagnose.conftest import WHITE
 
 
@@ -25,6 +28,50 @@ def test_a_curve_is_the_same_on_twice_the_knots(make, intervals):
     at = np.linspace(0.0, 1.0, 401)
     assert np.abs(curve_of(fine, halved, at) - curve_of(coarse, weights, at)).max() < 1e-12
     assert halved.min() > -1e-12, "a curve that never falls has no negative rise on the finer knots"
+
+
+def carried(setting, name, wider, reached, seed=3):
+    """A model of that cause with random numbers, and the same in dictionaries whose ranges are `wider` times as large."""
+    layout, random = setting.layout, np.random.default_rng(seed)
+    terms = tuple(t for t in CATALOGUE[name].terms(setting) if t.symbol != "split")
+    model = Model((1.0, 1.0, 0.01, 0.2), terms, tuple(random.random(len(terms))))
+    fresh = with_ranges(layout, wider * layout.iron_top_wb / 1.08, wider * layout.leak_top_wb / 1.2)
+    return model, fresh, carried_over(model, layout, (reached, reached), fresh)
+
+
+@pytest.mark.parametrize(("name", "vectors", "top"), [
+    ("magnetizing_saturation", "iron_vectors", "iron_top_wb"), ("leakage_saturation", "leak_vectors", "leak_top_wb"),
+])  # fmt: skip
+@pytest.mark.parametrize("wider", [0.9, 1.0, 1.3])
+def test_a_curve_carried_over_is_the_same_where_it_was_seen_and_straight_beyond(setting, name, vectors, top, wider):
+    old_top = getattr(setting.layout, top)
+    reached = 0.8 * old_top
+    model, fresh, there = carried(setting, name, wider, reached)
+    at = np.linspace(0.0, min(wider, 1.0) * old_top, 201)
+
+    def curve(layout, one):
+        return curve_of(getattr(layout, vectors), np.array(one.values), at / getattr(layout, top))
+
+    old, new = curve(setting.layout, model), curve(fresh, there)
+    seen = at <= reached
+    assert np.abs(new - old)[seen].max() < 0.01 * old[seen].max()
+    rise = (old[seen][-1] - old[seen][-2]) / (at[1] - at[0])
+    straight = old[seen][-1] + rise * (at[~seen] - at[seen][-1])
+    assert new[~seen] == pytest.approx(straight, rel=0.01), "beyond what was reached no coefficient is believed"
+    assert np.abs(old[~seen] - straight).max() > 0.01 * straight.max()
+
+
+@pytest.mark.parametrize("wider", [1.0, 1.3, 4.0])
+def test_loops_carried_over_keep_their_current(setting, wider):
+    model, fresh, there = carried(setting, "magnetic_hysteresis", wider, 1.0)
+    flux, radii = 0.7 * setting.iron_flux_wb, np.array([setting.layout.stop_radius_wb, fresh.stop_radius_wb])
+
+    def height(one, rates):
+        return np.where(rates > 0.0, rates * flux**2, 1.0) @ np.array(one.values)
+
+    assert height(there, radii[1, :, 1]) == pytest.approx(height(model, radii[0, :, 1]), rel=1e-12)
+    mean = [np.abs(radii[k, :6, 0]) @ np.array(one.values)[:6] / np.sum(one.values[:6]) for k, one in enumerate((model, there))]
+    assert mean[1] == pytest.approx(mean[0], rel=0.35), "each at a radius near its own"
 
 
 def with_ripple(setting, frequency_hz):
