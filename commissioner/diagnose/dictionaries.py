@@ -17,7 +17,7 @@ from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import BRANCH_TIME_S, largest_fluxes, leak_ratio, with_ranges
 from commissioner.diagnose.screen import required_chi2
-from commissioner.diagnose.settle import closer_branches, without_curves
+from commissioner.diagnose.settle import CLOSER, closer_branches, with_closer_loops, without_curves
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -27,6 +27,8 @@ CURVES = {
 RANGES = {
     kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")
 }
+SAME_RADII = 2.0
+"""Loops that act keep their radii where the flux reached changes by less than this."""
 GRID = 200
 """Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
@@ -55,6 +57,9 @@ def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     reached = largest_fluxes(setting.record, model, layout)
     fresh, flux = with_ranges(layout, reached[0], setting.facts.current_peak_a * model.nominal[2]), reached[0]
     iron, leak = fresh.iron_top_wb / layout.iron_top_wb, fresh.leak_top_wb / layout.leak_top_wb
+    if model.has_kind(kinds.STOP):
+        scale = 1.0 if 1.0 / SAME_RADII < iron < SAME_RADII else iron
+        fresh = replace(fresh, stop_radius_wb=layout.stop_radius_wb * np.array([scale, scale**-2.0]))
     if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
         fresh, flux = layout, setting.iron_flux_wb
     else:
@@ -82,9 +87,9 @@ def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
 
 
 def carried_over(model: Model, layout: Layout, reached: tuple[float, float], fresh: Layout) -> Model:
-    """The model with its curves and loops in the dictionaries of `fresh`. Curves go straight on beyond the iron's and the
+    """The model with its curves in the dictionaries of `fresh`: as they are up to the iron's and the leakage's fluxes `reached`
 
-    leakage's fluxes `reached` (Wb): what a coefficient says there, no data said. Loops keep their heights at the nearest radius.
+    (Wb) and straight on beyond, where no data said what a coefficient says.
     """
     values = np.array(model.values)
     for (kind, names), flux in zip(RANGES.items(), reached, strict=True):
@@ -95,13 +100,6 @@ def carried_over(model: Model, layout: Layout, reached: tuple[float, float], fre
             curve = (old(np.minimum(grid, end)) + np.maximum(grid - end, 0.0)[:, None] * old(end, 1)) @ values[rows]
             bounds = np.array([(model.terms[k].lower, model.terms[k].upper) for k in rows]).T
             values[rows] = lsq_linear(new(grid), curve, bounds).x
-    loops = {t.index: k for k, t in enumerate(model.terms) if t.kind == kinds.STOP}
-    values[list(loops.values())] = 0.0
-    for index, k in loops.items():
-        radius, rate = layout.stop_radius_wb[index]
-        alike = {n: r for n, r in enumerate(fresh.stop_radius_wb) if r[0] * radius > 0.0 and (r[1] > 0.0) == (rate > 0.0)}
-        there = min(alike, key=lambda n: abs(np.log(alike[n][0] / radius)))
-        values[loops[there]] += model.values[k] * (rate / alike[there][1] if rate else 1.0)
     return replace(model, values=tuple(values.tolist()))
 
 
@@ -124,15 +122,33 @@ def with_finer_curves(
             layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
             there = replace(setting, layout=layout)
             model = _on_finer(current.model, kind, getattr(setting.layout, name), finer, there)
-            unexplained = current.chi2 - float(current.normal.count.sum())
-            least = max(required_chi2(len(model.terms) - len(current.model.terms)), FINER_SHARE * unexplained)
-            wanted = current.chi2 - least
+            wanted = current.chi2 - _least_gain(current, len(model.terms))
             trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
             report(f"  {name} on twice the knots: gained {current.chi2 - trial.chi2:.4g}")
             if trial.chi2 > wanted:
                 break
             current, setting = trial, there
     return current, setting
+
+
+def with_closer_radii(
+    current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None]
+) -> tuple[Fit, Setting]:
+    """Loops of radii beside those that act, if that gains what their numbers cost: iron of one radius between two of the
+
+    dictionary's leaves a tenth of its gain.
+    """
+    model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
+    wanted = current.chi2 - _least_gain(current, len(model.terms))
+    trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
+    report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
+    return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
+
+
+def _least_gain(current: Fit, numbers: int) -> float:
+    """What a model of so many numbers must gain over the present one."""
+    unexplained = current.chi2 - float(current.normal.count.sum())
+    return max(required_chi2(max(numbers - len(current.model.terms), 1)), FINER_SHARE * unexplained)
 
 
 def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Setting) -> Model:

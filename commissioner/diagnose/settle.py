@@ -52,10 +52,10 @@ def _with_price(one: Fit) -> float:
 
 
 def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model, Layout]:
-    """Memory operators of `ratio` times smaller and larger radii beside each that acts; those that do not act are gone."""
+    """The model with memory operators of `ratio` times smaller and larger radii beside each that acts."""
     loops = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if t.kind == kinds.STOP]
     radii = [layout.stop_radius_wb[t.index] for t, _ in loops]
-    for radius, rate in radii.copy():
+    for radius, rate in [layout.stop_radius_wb[t.index] for t, v in loops if v]:
         for wanted in (radius / ratio, radius * ratio):
             if all(r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii):
                 radii.append(np.array([wanted, rate]))

@@ -13,7 +13,7 @@ import numpy as np
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import LINES, with_clearer_lines
-from commissioner.diagnose.dictionaries import following, with_finer_curves
+from commissioner.diagnose.dictionaries import following, with_closer_radii, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, as_a_lag, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
@@ -122,6 +122,8 @@ class Steps:
             current = self.with_new_dictionaries(self.with_new_flux_before(current))
             of = {t.kind for t in CATALOGUE[name].terms(self.setting)}
             current, self.setting = with_finer_curves(current, self.setting, self.noise, self.report, of)
+            if kinds.STOP in of:
+                current, self.setting = with_closer_radii(current, self.setting, self.noise, self.report)
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = set(dropped)
 
