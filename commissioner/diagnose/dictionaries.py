@@ -27,8 +27,8 @@ CURVES = {
 RANGES = {
     kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")
 }
-SAME_RADII = 2.0
-"""Loops that act keep their radii where the flux reached changes by less than this."""
+CLOSER_SHARE = 0.5
+"""Loops of closer radii must make so much of what is left."""
 GRID = 200
 """Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
@@ -49,17 +49,16 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
 
 
 def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
-    """The model in new dictionary ranges where it reaches other fluxes, with closer time constants where a second path acts,
+    """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay), with closer time
 
-    and the ratio of the inductances as it is now.
+    constants where a second path acts, and the ratio of the inductances as it is now.
     """
     layout = setting.layout
     reached = largest_fluxes(setting.record, model, layout)
     fresh, flux = with_ranges(layout, reached[0], setting.facts.current_peak_a * model.nominal[2]), reached[0]
     iron, leak = fresh.iron_top_wb / layout.iron_top_wb, fresh.leak_top_wb / layout.leak_top_wb
-    if model.has_kind(kinds.STOP):
-        scale = 1.0 if 1.0 / SAME_RADII < iron < SAME_RADII else iron
-        fresh = replace(fresh, stop_radius_wb=layout.stop_radius_wb * np.array([scale, scale**-2.0]))
+    if layout.stop_radius_wb.shape != fresh.stop_radius_wb.shape:
+        fresh = replace(fresh, stop_radius_wb=layout.stop_radius_wb)
     if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
         fresh, flux = layout, setting.iron_flux_wb
     else:
@@ -134,12 +133,13 @@ def with_finer_curves(
 def with_closer_radii(
     current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None]
 ) -> tuple[Fit, Setting]:
-    """Loops of radii beside those that act, if that gains what their numbers cost: iron of one radius between two of the
+    """Loops of radii beside those that act, if they make most of what is left: iron of one radius between two of the
 
-    dictionary's leaves a tenth of its gain.
+    dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
-    wanted = current.chi2 - _least_gain(current, len(model.terms))
+    left = current.chi2 - float(current.normal.count.sum())
+    wanted = current.chi2 - max(_least_gain(current, len(model.terms)), CLOSER_SHARE * left)
     trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
     report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
     return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
