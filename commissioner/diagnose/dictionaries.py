@@ -138,8 +138,7 @@ def with_closer_radii(
     dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
-    left = current.chi2 - float(current.normal.count.sum())
-    wanted = current.chi2 - max(_least_gain(current, len(model.terms)), CLOSER_SHARE * left)
+    wanted = current.chi2 - max(_least_gain(current, len(model.terms)), CLOSER_SHARE * current.normal.unexplained)
     trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
     report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
     return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
@@ -147,8 +146,7 @@ def with_closer_radii(
 
 def _least_gain(current: Fit, numbers: int) -> float:
     """What a model of so many numbers must gain over the present one."""
-    unexplained = current.chi2 - float(current.normal.count.sum())
-    return max(required_chi2(max(numbers - len(current.model.terms), 1)), FINER_SHARE * unexplained)
+    return max(required_chi2(max(numbers - len(current.model.terms), 1)), FINER_SHARE * current.normal.unexplained)
 
 
 def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Setting) -> Model:

@@ -51,6 +51,11 @@ class Normal:
     def total_chi2(self) -> float:
         return float(self.chi2.sum())
 
+    @property
+    def unexplained(self) -> float:
+        """Chi2 above what the noise makes, which is 1 for every sample."""
+        return self.total_chi2 - float(self.count.sum())
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -227,7 +232,7 @@ def fit(
         return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)
     dull = 0
     for done in range(rounds):
-        unexplained = normal.total_chi2 - float(normal.count.sum())
+        unexplained = normal.unexplained
         enough = max(tolerance, TRIFLE * unexplained)
         low, high = limits(model, layout)
         theta = model.theta

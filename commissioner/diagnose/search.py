@@ -155,11 +155,11 @@ def _mended(
         trial = fit(better.model, again, layout, noise, rounds=6, tolerance=1.0)
         if trial.chi2 >= better.chi2:
             break
-        is_slow = _excess(trial) > MENDED_AT_ONCE * _excess(better)
+        is_slow = trial.normal.unexplained > MENDED_AT_ONCE * better.normal.unexplained
         mended, better, losses = again, trial, seen
         if is_slow:
             break
-    excess, left = _excess(current), _excess(better)
+    excess, left = current.normal.unexplained, better.normal.unexplained
     # what a noise measured too low adds to both
     doubt = noise.uncertainty * float(current.normal.count.sum())
     stays = max(left - doubt, 0.0) > (1.0 - MENDED_SHARE) * max(excess - doubt, 0.0)
@@ -167,10 +167,6 @@ def _mended(
         return record, current, ()
     report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
     return mended, better, losses
-
-
-def _excess(one: Fit) -> float:
-    return one.chi2 - float(one.normal.count.sum())
 
 
 def _with_the_losses(

@@ -48,7 +48,12 @@ def settled(current: Fit, record: Record, layout: Layout, noise: Noise) -> tuple
 
 def _with_price(one: Fit) -> float:
     """Chi2 and ln(samples) for every number: what Schwarz' criterion compares."""
-    return one.chi2 + float(np.log(one.normal.count.sum())) * len(one.model.terms)
+    return one.chi2 + _price(one) * len(one.model.terms)
+
+
+def _price(one: Fit) -> float:
+    """What one number must gain: ln(samples)."""
+    return float(np.log(one.normal.count.sum()))
 
 
 def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model, Layout]:
@@ -80,8 +85,7 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
-            wanted = best.chi2 - float(np.log(best.normal.count.sum()))
-            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=wanted)
+            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=best.chi2 - _price(best))
             if trial.chi2 < best.chi2:
                 best = trial
     if part is record:
@@ -137,7 +141,7 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
         return current
     low, high = limits(current.model, layout)
     gram, slope, theta = current.normal.total_gram, current.normal.total_slope, current.model.theta
-    price = float(np.log(current.normal.count.sum()))
+    price = _price(current)
 
     def loss_without(idle: list[list[int]]) -> float:
         """Chi2 above the present one with the `idle` numbers at zero and everything else free, linear about the fit."""
