@@ -24,6 +24,10 @@ DULL, DULL_ROUNDS = 5e-4, 3
 """A fit that gained less than this share of what the noise does not explain, so often in a row, creeps along a valley: enough."""
 PATIENCE = 10.0
 """A fit that must gain so much goes on while this many times its next step's promise would get it there."""
+TOLERANCE_OF_A_NUMBER = 0.02
+"""Chi2 per number that a fit may leave: each takes 1 from noise alone, so that it lies a seventh of its spread from the optimum."""
+LEAST_EIGENVALUE = 1e-11
+"""Of the largest: below it is rounding."""
 SLICE = 12 * 1024
 """Samples whitened at once in white noise: a multiple of every block a screening averages over."""
 
@@ -188,24 +192,41 @@ def _whole(good: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:
-    """Minimise |r - J d|^2 + damping |diag J'J d|^2 within bounds, from the normal equations."""
+    """Minimise |r - J d|^2 + damping |diag J'J d|^2 within bounds, from the normal equations.
+
+    Numbers without bounds are eliminated first: an active set is sought among the few that have some.
+    """
     scale = np.sqrt(np.diag(gram))
     scale = np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-150))
-    scaled = gram / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(scaled + damping * np.eye(scale.shape[0]))
-    keep = values > 1e-11 * values[-1]
-    root = (np.sqrt(values[keep])[:, None]) * vectors[:, keep].T
-    target = (vectors[:, keep].T @ (slope / scale)) / np.sqrt(values[keep])
-    low, high = lower * scale, upper * scale
-    free = np.linalg.lstsq(root, target, rcond=None)[0]
-    if np.all(free >= low) and np.all(free <= high):
-        return np.asarray(free / scale)
-    low = np.minimum(low, 0.0)
-    high = np.maximum(high, 0.0)
-    pinned = high - low < 1e-12
-    high = np.where(pinned, low + 1e-9, high)
-    solution = lsq_linear(root, target, (low, high), method="bvls", max_iter=200).x
-    return np.asarray(solution / scale)
+    scaled = gram / np.outer(scale, scale) + damping * np.eye(scale.shape[0])
+    target, low, high = slope / scale, lower * scale, upper * scale
+    root, wanted = _square_root(scaled, target)
+    step: Array = root.T @ (wanted / (root * root).sum(axis=1))
+    if np.all(step >= low) and np.all(step <= high):
+        return step / scale
+    has_bounds = np.isfinite(low) | np.isfinite(high)
+    held, loose = np.flatnonzero(has_bounds), np.flatnonzero(~has_bounds)
+    onto = np.linalg.pinv(scaled[np.ix_(loose, loose)], rcond=LEAST_EIGENVALUE, hermitian=True)
+    cross = scaled[np.ix_(loose, held)]
+    root, wanted = _square_root(
+        scaled[np.ix_(held, held)] - cross.T @ onto @ cross, target[held] - cross.T @ (onto @ target[loose])
+    )
+    low, high = np.minimum(low[held], 0.0), np.maximum(high[held], 0.0)
+    high = np.where(high - low < 1e-12, low + 1e-9, high)
+    step[held] = lsq_linear(root, wanted, (low, high), method="bvls", max_iter=200).x
+    step[loose] = onto @ (target[loose] - cross @ step[held])
+    return step / scale
+
+
+def _square_root(gram: Array, slope: Array) -> tuple[Array, Array]:
+    """Rows, orthogonal to one another, and what they should give: |rows d - wanted|^2 is d' gram d - 2 d' slope but for a constant.
+
+    What the data do not tell is left out.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > LEAST_EIGENVALUE * values[-1]
+    root = np.sqrt(values[keep])
+    return root[:, None] * vectors[:, keep].T, (vectors[:, keep].T @ slope) / root
 
 
 def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
@@ -221,12 +242,14 @@ def fit(
     model: Model, record: Record, layout: Layout, noise: Noise, rounds: int = 12, tolerance: float = 0.3,
     report: Callable[[str], None] | None = None, wanted_chi2: float = np.inf,
 ) -> Fit:
-    """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance, or
+    """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance (or a
 
-    less than a trifle of what the noise does not explain: a model that lacks a cause need not fit to the last digit. Gives
-    up where `wanted_chi2` is out of reach. A start that runs away on this record comes back with an infinite chi2.
+    share of what the numbers would take from noise alone), or less than a trifle of what the noise does not explain: a model
+    that lacks a cause need not fit to the last digit. Gives up where `wanted_chi2` is out of reach. A start that runs away on
+    this record comes back with an infinite chi2.
     """
     damping = 1e-9
+    tolerance = max(tolerance, TOLERANCE_OF_A_NUMBER * (4 + len(model.terms)))
     normal = normal_equations(model, record, layout, model.terms, noise)
     if not np.isfinite(normal.total_gram).all():
         return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)

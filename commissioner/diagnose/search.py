@@ -122,7 +122,7 @@ def search(
             fitted, accepted, last = whole.run(again, accepted)
     layout = whole.layout
     if not _leaves(UNKNOWN_SIGMA, fitted, nominal, noise):
-        fitted, layout = settled(fitted, whole.record, layout, noise)
+        fitted, layout = settled(fitted, whole.record, layout, noise, is_placed=whole.placed == frozenset(accepted))
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
         whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal

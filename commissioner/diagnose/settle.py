@@ -26,13 +26,13 @@ CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
 
 
-def settled(current: Fit, record: Record, layout: Layout, noise: Noise) -> tuple[Fit, Layout]:
-    """The last fit and its dictionaries: iron on its side, loops of the radii they have, no idle numbers.
+def settled(current: Fit, record: Record, layout: Layout, noise: Noise, *, is_placed: bool) -> tuple[Fit, Layout]:
+    """The last fit and its dictionaries: iron on its side (unless `is_placed` beside the same causes already), loops of the radii
 
-    All that is found on the first part of every segment, and fitted to the whole once.
+    they have, no idle numbers. All that is found on the first part of every segment, and fitted to the whole once.
     """
     started, part = on_part(current, record, layout, noise, SETTLED_SAMPLES)
-    if current.model.has_kind(kinds.NU):
+    if current.model.has_kind(kinds.NU) and not is_placed:
         started = placed(started, part, layout, noise)
     best, fine = without_idle_numbers(started, part, layout, noise), layout
     for ratio in CLOSER:

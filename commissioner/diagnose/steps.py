@@ -64,6 +64,7 @@ class Steps:
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
+        self.placed: frozenset[str] = frozenset()
         self.tried: tuple[Fit | None, dict[str, Fit]] = (None, {})
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
@@ -118,7 +119,7 @@ class Steps:
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
-                current = placed(current, self.record, self.layout, self.noise)
+                current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
             current = self.with_new_dictionaries(self.with_new_flux_before(current))
             of = {t.kind for t in CATALOGUE[name].terms(self.setting)}
             current, self.setting = with_finer_curves(current, self.setting, self.noise, self.report, of)
