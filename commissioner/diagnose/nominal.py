@@ -77,16 +77,19 @@ def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> 
 
 
 def bare_layout(record: Record) -> Layout:
-    """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says."""
+    """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says. The reactance of
+
+    a single slow tone is the magnetizing inductance's for the most part.
+    """
     stator, rotor, leakage, _ = impedance_starts(record)[0]
     total = stator + rotor
     return replace(NO_DICTIONARY, nominal_box=(
-        (0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.2 * leakage, 4.0 * leakage), (leakage, 1e3 * leakage)
+        (0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.02 * leakage, 4.0 * leakage), (0.3 * leakage, 1e3 * leakage)
     ))
 
 
 def nominal_fit(record: Record, noise: Noise) -> Fit:
-    """The four-parameter output-error fit, from the best of three starts."""
+    """The four-parameter output-error fit, from the best of the starts."""
     bare = bare_layout(record)
     fits = [fit(Model(start), record, bare, noise, rounds=15, tolerance=1.0) for start in impedance_starts(record)]
     return min(fits, key=lambda f: f.chi2)
