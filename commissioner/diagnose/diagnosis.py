@@ -23,6 +23,7 @@ from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
 from commissioner.diagnose.fit import Fit, inverse
 from commissioner.diagnose.leftover import Leftover, leftover
+from commissioner.diagnose.model import Layout
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
 from commissioner.diagnose.record import Record
@@ -120,7 +121,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
-        rest, _parameters(found.nominal), _parameters(found.fit), experiment,
+        rest, _parameters(found.nominal, layout), _parameters(found.fit, layout), experiment,
         model_document(found, [*causes, *unsure]), found, split_lines(record), share,
         _remarks(noise, record, found.is_complete, unsure), unsure,
     )
@@ -158,16 +159,15 @@ def _verdict(
     return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
 
 
-def _parameters(one: Fit) -> dict[str, Quantity]:
-    covariance = inverse(one.normal.total_gram)
-    out = {
-        n: Quantity(float(v), float(v * np.sqrt(max(covariance[k, k], 0.0))))
-        for k, (n, v) in enumerate(zip(PARAMETERS, one.model.nominal, strict=True))
-    }
-    r_r, l_m = out[PARAMETERS[1]], out[PARAMETERS[3]]
-    spread = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3]
-    t = l_m.value / r_r.value
-    out["rotor_time_constant_s"] = Quantity(t, float(t * np.sqrt(max(spread, 0.0))))
+def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
+    """Of slow currents, as a drive controls them: what bars displace at the tones is the cause's, not R_R's and L_sigma's."""
+    values, derivatives = one.model.at_rest(layout)
+    covariance = derivatives @ inverse(one.normal.total_gram) @ derivatives.T
+    spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    out = {n: Quantity(float(v), float(s)) for n, v, s in zip(PARAMETERS, values, spreads, strict=True)}
+    shares = np.array([0.0, -1.0 / values[1], 0.0, 1.0 / values[3]])
+    t = float(values[3] / values[1])
+    out["rotor_time_constant_s"] = Quantity(t, t * float(np.sqrt(max(shares @ covariance @ shares, 0.0))))
     return out
 
 

@@ -15,9 +15,9 @@ from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit, normal_equations
 from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import BRANCH_TIME_S, largest_fluxes, leak_ratio, with_ranges
+from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, with_ranges
 from commissioner.diagnose.screen import required_chi2
-from commissioner.diagnose.settle import CLOSER, closer_branches, with_closer_loops, without_curves
+from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -29,6 +29,10 @@ RANGES = {
 }
 CLOSER_SHARE = 0.5
 """Loops of closer radii must make so much of what is left."""
+ACTING_SHARE = 1e-3
+"""Of the strongest second path: a weaker one is idle."""
+SHORTEST_BRANCH_S, LONGEST_BRANCH_S = 5e-5, 0.03
+"""Second paths beyond 3 kHz and below 5 Hz are none."""
 GRID = 200
 """Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
@@ -51,7 +55,7 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
 def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay), with closer time
 
-    constants where a second path acts, and the ratio of the inductances as it is now.
+    constants where a second path acts, and the ratio of the inductances as it is now; the same setting where nothing is new.
     """
     layout = setting.layout
     reached = largest_fluxes(setting.record, model, layout)
@@ -66,11 +70,22 @@ def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     ratio = leak_ratio(model)
     if abs(ratio - layout.leak_ratio) > SAME_RATIO * ratio:
         fresh = replace(fresh, leak_ratio=ratio)
-    if layout.branch_time_s is BRANCH_TIME_S and model.has_kind(kinds.BRANCH):
-        fresh = replace(fresh, branch_time_s=closer_branches(model, layout.branch_time_s))
-    if fresh is layout:
+    there = setting if fresh is layout else replace(setting, layout=fresh, iron_flux_wb=flux)
+    return with_closer_branches(model, there)
+
+
+def with_closer_branches(model: Model, setting: Setting) -> tuple[Model, Setting]:
+    """The model with more second paths, a third of an octave from each that acts, where none is yet."""
+    times = setting.layout.branch_time_s
+    weights = model.sum_kind(kinds.BRANCH, times.size)
+    closer = list(times)
+    for time in np.outer(times[weights > ACTING_SHARE * weights.max(initial=0.0)], 2.0 ** (np.array([-1.0, 1.0]) / 3.0)).ravel():
+        is_near = any(x / time > 0.0 and abs(np.log2(x / time)) <= 1.0 / 6.0 for x in closer)
+        if not is_near and SHORTEST_BRANCH_S < abs(time) < LONGEST_BRANCH_S:
+            closer.append(float(time))
+    if len(closer) == times.size:
         return model, setting
-    there = replace(setting, layout=fresh, iron_flux_wb=flux)
+    there = replace(setting, layout=replace(setting.layout, branch_time_s=np.array(closer)))
     for name in sorted({t.effect for t in model.terms if t.kind == kinds.BRANCH}):
         terms = CATALOGUE[name].terms(there)
         model = model.with_terms([t for t in terms if t.symbol not in model.of(name)])

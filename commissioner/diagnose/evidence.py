@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
+from commissioner.diagnose.exchanges import with_closer_paths
 from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
 from commissioner.diagnose.guards import is_plausible, loss_without
 from commissioner.diagnose.leftover import Leftover
@@ -107,10 +108,12 @@ def alternatives(
             if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
             model = without.model.with_terms(CATALOGUE[score.name].terms(setting))
-            trial = fit(model, record, layout, noise, wanted_chi2=wanted)
-            if is_plausible(trial.model, score.name, setting):
+            trial, there = fit(model, record, layout, noise, wanted_chi2=wanted), replace(setting, layout=layout)
+            if trial.chi2 - found.chi2 > TIE_CHI2:
+                trial, there = with_closer_paths(trial, there, noise, wanted)
+            if is_plausible(trial.model, score.name, there):
                 loss = (trial.chi2 - found.chi2) * whole / record.samples
-                rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], setting))
+                rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], there))
         out[name] = rivals
     return out
 

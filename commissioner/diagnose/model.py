@@ -116,6 +116,10 @@ def with_halved_intervals(vectors: Array, weights: Array, finer: Array) -> Array
     return np.asarray(np.linalg.lstsq(finer.T, halved, rcond=None)[0])
 
 
+MOST_TAKEN = 0.9
+"""Of the conductance of R_R in one step."""
+SKIN_EFFECT = "rotor_skin_effect"
+
 NO_DICTIONARY = Layout(
     1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([[1.0, 0.0]]), np.array([1.0]), 1.0
 )
@@ -146,16 +150,45 @@ class Model:
         return np.array([True] * 4 + [not r for r in rests])
 
     def moved(self, theta: Array) -> Model:
-        nominal = np.exp(theta[:4])
+        """The model at `theta`. Beside rotor branches R_R moves by its conductance: a step that gives the branches what it takes
+
+        from R_R leaves the resistance at rest as it is, however long.
+        """
+        r_s, r_r, l_sigma, l_m = (float(x) for x in np.exp(theta[:4]))
+        if any(t.kind == kinds.BRANCH for t in self.terms):
+            r_r = self.nominal[1] / (1.0 - min(theta[1] - self.theta[1], MOST_TAKEN))
         values = tuple(float(x) * t.step for x, t in zip(theta[4:], self.terms, strict=True))
-        return Model((float(nominal[0]), float(nominal[1]), float(nominal[2]), float(nominal[3])), self.terms, values)
+        return Model((r_s, r_r, l_sigma, l_m), self.terms, values)
+
+    def at_rest(self, layout: Layout) -> tuple[Array, Array]:
+        """The four numbers of slow currents, (4,), which fill the bars, and their derivatives by `theta`, (4, 4 + terms).
+
+        The bars' branches g / (1 + s T) lie beside R_R: their conductance counts in full, and R^2 g T to L_sigma.
+        """
+        rows = [4 + k for k, t in enumerate(self.terms) if t.effect == SKIN_EFFECT]
+        branches = np.array([self.values[k - 4] for k in rows])
+        times = layout.branch_time_s[[self.terms[k - 4].index for k in rows]]
+        steps = np.array([self.terms[k - 4].step for k in rows])
+        own = 1.0 / self.nominal[1]
+        low = 1.0 / (own + branches.sum())
+        delayed = float(branches @ times)
+        derivatives = np.zeros((4, 4 + len(self.terms)))
+        derivatives[[0, 1, 2, 3], [0, 1, 2, 3]] = self.nominal
+        derivatives[1, 1], derivatives[1, rows] = low**2 * own, -(low**2) * steps
+        derivatives[2, 1] = 2.0 * low * delayed * derivatives[1, 1]
+        derivatives[2, rows] = 2.0 * low * delayed * derivatives[1, rows] + low**2 * times * steps
+        return np.array([self.nominal[0], low, self.nominal[2] + low**2 * delayed, self.nominal[3]]), derivatives
 
     def with_terms(self, terms: Sequence[Term]) -> Model:
         return Model(self.nominal, self.terms + tuple(terms), self.values + tuple(t.start for t in terms))
 
     def without(self, effect: str) -> Model:
+        """The model without an effect; R_R gets back what rotor branches had of its conductance."""
         keep = [k for k, t in enumerate(self.terms) if t.effect != effect]
-        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+        r_s, r_r, l_sigma, l_m = self.nominal
+        if effect == SKIN_EFFECT:
+            r_r = 1.0 / (1.0 / r_r + sum(self.of(effect).values()))
+        return Model((r_s, r_r, l_sigma, l_m), tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
 
     def only(self, effects: Sequence[str]) -> Model:
         keep = [k for k, t in enumerate(self.terms) if t.effect in effects]

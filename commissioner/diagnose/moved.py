@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.fit import Fit, inverse
+from commissioner.diagnose.model import Layout
 
 PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 LEAST_SHARE, LEAST_SIGMAS = 0.01, 3.0
@@ -29,24 +30,27 @@ class Moved:
         return self.four_parameters / self.with_causes - 1.0
 
 
-def moved_parameters(nominal: Fit, extended: Fit) -> tuple[Moved, ...]:
-    """Parameters that the accepted causes moved, largest first."""
-    before, after = np.array(nominal.model.nominal), np.array(extended.model.nominal)
-    covariance = inverse(extended.normal.total_gram)
-    error = np.sqrt(np.maximum(np.diag(covariance)[:4], 0.0))
+def moved_parameters(nominal: Fit, extended: Fit, layout: Layout) -> tuple[Moved, ...]:
+    """Parameters of slow currents that the accepted causes moved, largest first."""
+    before = np.array(nominal.model.nominal)
+    after, derivatives = extended.model.at_rest(layout)
+    relative = derivatives / after[:, None]
+    error = np.sqrt(np.maximum(np.diag(relative @ inverse(extended.normal.total_gram) @ relative.T), 0.0))
     apart = np.abs(np.log(before / after))
     causes = list(dict.fromkeys(t.effect for t in extended.model.terms if t.effect))
     if not causes:
         return ()
-    shifts = np.array([np.abs(_shift_without(extended, name)) for name in causes])
+    shifts = np.array([np.abs(relative @ _change_without(extended, name)) for name in causes])
     order = [k for k in np.argsort(-apart) if apart[k] > max(LEAST_SHARE, LEAST_SIGMAS * error[k])]
     return tuple(
         Moved(PARAMETERS[k], float(before[k]), float(after[k]), causes[int(np.argmax(shifts[:, k]))]) for k in order
     )
 
 
-def _shift_without(fitted: Fit, name: str) -> NDArray[np.float64]:
-    """(4,) relative change of the parameters, to first order, when one cause is taken out and the rest re-adjusts."""
+def _change_without(fitted: Fit, name: str) -> NDArray[np.float64]:
+    """(4 + terms,) change of theta, to first order, when one cause is taken out and the rest re-adjusts."""
     gram, mine, others, inner = fitted.set_apart(name)
-    change: NDArray[np.float64] = inner @ gram[np.ix_(others, mine)] @ fitted.model.theta[mine]
-    return change[:4]
+    change = np.zeros(fitted.model.theta.size)
+    change[mine] = -fitted.model.theta[mine]
+    change[others] = inner @ gram[np.ix_(others, mine)] @ fitted.model.theta[mine]
+    return change

@@ -20,9 +20,9 @@ from commissioner.diagnose.record import Record, each_segment
 
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
-CORNERS_HZ, EDDY_CORNERS_HZ = (12.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0), (150.0, 400.0, 1000.0)
-"""Of rotor branches, and of eddy-current paths of the iron."""
-BRANCH_TIME_S = np.r_[1.0, -1.0].repeat((len(CORNERS_HZ), len(EDDY_CORNERS_HZ))) / (2.0 * np.pi * np.r_[CORNERS_HZ, EDDY_CORNERS_HZ])
+CORNERS_HZ, EDDY_CORNERS_HZ = 12.5 * 2.0 ** (2.0 / 3.0 * np.arange(10)), np.array([150.0, 400.0, 1000.0])
+"""Of rotor branches, two thirds of an octave apart, and of eddy-current paths of the iron."""
+BRANCH_TIME_S = 1.0 / (2.0 * np.pi * np.r_[CORNERS_HZ, -EDDY_CORNERS_HZ])
 SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.35

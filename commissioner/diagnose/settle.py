@@ -119,17 +119,6 @@ def _on(model: Model, side: float) -> Model:
     return replace(model, values=tuple(values))
 
 
-def closer_branches(model: Model, branch_time_s: Array) -> Array:
-    """The second paths' time constants, (n,), with more of them a third of an octave from those that act."""
-    weights = model.sum_kind(kinds.BRANCH, branch_time_s.size)
-    acting = branch_time_s[weights > 1e-3 * weights.max(initial=0.0)]
-    out = list(branch_time_s)
-    for time in np.outer(acting, 2.0 ** (np.array([-1.0, 1.0]) / 3.0)).ravel():
-        if all(x / time < 0.0 or abs(np.log2(x / time)) > 1.0 / 6.0 for x in out):
-            out.append(float(time))
-    return np.array(out)
-
-
 def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The fit with those spare numbers only that each gain ln(samples) (G. Schwarz, Ann. Statist. 6(2), 1978).
 

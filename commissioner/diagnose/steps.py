@@ -15,7 +15,7 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import LINES, with_clearer_lines
 from commissioner.diagnose.dictionaries import following, with_closer_radii, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.exchanges import LATE, as_a_lag, large_delay, regrouped
+from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, guard, is_plausible, losses_of, meets_tones
 from commissioner.diagnose.model import Layout
@@ -110,10 +110,10 @@ class Steps:
                 other = None if is_over else self._exchanged(current, accepted)
                 if other is None and not is_over and accepted:
                     clearer = self._with_clearer_lines(current, accepted)
-                    other = None if clearer is None else (clearer, accepted)
+                    other = None if clearer is None else (clearer, accepted, self.setting)
                 if other is None:
                     return current, accepted, screening
-                current, accepted = other
+                current, accepted, self.setting = other
                 continue
             name, current = step
             accepted = (*accepted, name)
@@ -208,7 +208,7 @@ class Steps:
         numbers, gain = sum(t.effect == "sampling_delay" for t in trial.model.terms), current.chi2 - trial.chi2
         return (gain - price(numbers), "sampling_delay", trial) if gain >= self.threshold(numbers) else None
 
-    def _exchanged(self, current: Fit, accepted: tuple[str, ...]) -> tuple[Fit, tuple[str, ...]] | None:
+    def _exchanged(self, current: Fit, accepted: tuple[str, ...]) -> Exchanged | None:
         """Linear causes for others that fit clearly better, each set tried once."""
         mine, late = (frozenset(n for n in accepted if n in names) for names in (LINEAR, LATE))
         if "cable_capacitance" in late and "sensor_lag" in self.names and late not in self.lagging:

@@ -6,7 +6,7 @@ the operating point the diagnosis states.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
             effects[cause.name] = TRANSLATED[cause.name](sizes, model.of(cause.name), setting, model)
     return {
         "nameplate": plate,
-        "machine": {**gamma_machine(_at_rest(model, setting)), "saturation_at_rated_flux": 0.0},
+        "machine": {**gamma_machine(model.at_rest(setting.layout)[0]), "saturation_at_rated_flux": 0.0},
         "power_stage": {"dead_time_s": 0.0, "threshold_v": 0.0, "slope_ohm": 0.0, "link_ripple": 0.0},
         "sensors": {
             "noise_a": 0.0, "bits": 0, "offset_a": [0.0] * 3, "gain": [1.0] * 3, "delay_s": 0.0, "lag_s": 0.0,
@@ -51,7 +51,7 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
     }
 
 
-def gamma_machine(nominal: tuple[float, float, float, float]) -> dict[str, float]:
+def gamma_machine(nominal: Iterable[float]) -> dict[str, float]:
     """Gamma form (R_s, R_r, L_leak, L_s) of the inverse-Gamma set (Slemon 1989): ratio L_s / L_M."""
     r_s, r_r, l_sigma, l_m = nominal
     ratio = (l_m + l_sigma) / l_m
@@ -61,14 +61,6 @@ def gamma_machine(nominal: tuple[float, float, float, float]) -> dict[str, float
 
 def _branches(model: Model, setting: Setting) -> np.ndarray:
     return listed(model.of("rotor_skin_effect"), "branch", setting.layout.branch_time_s.size)
-
-
-def _at_rest(model: Model, setting: Setting) -> tuple[float, float, float, float]:
-    """The four numbers at low frequency: the bar branches in parallel with R_R, their delay part of the leakage."""
-    r_s, r_r, l_sigma, l_m = model.nominal
-    branches = _branches(model, setting)
-    low = 1.0 / (1.0 / r_r + branches.sum())
-    return r_s, low, l_sigma + low**2 * float(branches @ setting.layout.branch_time_s), l_m
 
 
 def _size(key: str, factor: float = 1.0) -> Translate:

@@ -43,5 +43,5 @@ def _moved(seen: Diagnosis) -> list[dict[str, Any]]:
         return []
     return [
         {"parameter": m.parameter, "four_parameters": m.four_parameters, "with_causes": m.with_causes, "cause": m.cause}
-        for m in moved_parameters(seen.found.nominal, seen.found.fit)
+        for m in moved_parameters(seen.found.nominal, seen.found.fit, seen.found.layout)
     ]
