@@ -112,7 +112,10 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     trust = doubt(rest, explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
     causes, unsure = causes_of(found, rest, trust, audit, noise, excluded)
-    total = replace(rest, sigma=float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure]))))
+    # what an unsure cause takes is left as well, yet no more than there was
+    before = float(np.sqrt(max(found.nominal.normal.unexplained, 0.0) / found.nominal.normal.count.sum()))
+    left = float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure])))
+    total = replace(rest, sigma=max(min(left, before), rest.sigma))
     share, rest = explained_share(found, rest, total.sigma), total
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())

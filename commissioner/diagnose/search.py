@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.dictionaries import begun, carried_over, respread
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Fit, fit
+from commissioner.diagnose.fit import Fit, fit, normal_equations
 from commissioner.diagnose.guards import guard_of_lost_samples, losses_of
 from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.model import Layout, Model
@@ -94,9 +94,11 @@ def search(
             start = fit(start.model, part, layout, noise)
         else:
             start, here = _on_more(seen, start.model, accepted, here, noise)
-        if not np.isfinite(start.chi2):
+        if accepted and not start.chi2 < normal_equations(nominal.model, part, layout, (), noise).total_chi2:
             # what fitted the smaller part runs away beyond it
-            start, accepted, here = fit(nominal.model, part, layout, noise), (), replace(setting, record=part)
+            start, here = fit(nominal.model, part, layout, noise), replace(setting, record=part)
+            again = fit(_completed(nominal.model, accepted, here), part, layout, noise)
+            start, accepted = (again, accepted) if again.chi2 < start.chi2 else (start, ())
         whole = Steps(here, noise, names, report, record, go_on)
         whole.regrouped = regrouped
         if accepted or part is record:

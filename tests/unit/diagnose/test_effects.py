@@ -204,11 +204,11 @@ def test_sensitivities_beside_loops_that_widen_with_flux_are_exact(nominal, sett
     assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.02 * np.sqrt(np.mean(slope**2))
 
 
-@pytest.mark.parametrize("symbol", ["conductance", "eddy_7", "eddy_9", "branch_2"])
+@pytest.mark.parametrize("symbol", ["conductance", "eddy_10", "eddy_12", "branch_2"])
 def test_sensitivities_beside_eddy_paths_are_exact(nominal, setting, symbol):
     """Eddy paths carry current at the terminals and lose voltage in R_s; beside them a rotor branch stays one."""
     terms = CATALOGUE["iron_loss"].terms(setting) + CATALOGUE["rotor_skin_effect"].terms(setting)
-    held = {"conductance": 2e-4, "eddy_7": 3e-4, "eddy_9": 5e-4, "branch_2": 0.02}
+    held = {"conductance": 2e-4, "eddy_10": 3e-4, "eddy_12": 5e-4, "branch_2": 0.02}
     model = Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
     row = 4 + [t.symbol for t in terms].index(symbol)
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian[row]
