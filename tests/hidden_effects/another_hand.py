@@ -27,6 +27,11 @@ SEGMENTS = (
 )  # fmt: skip
 """Axis in degrees, level of the tones, bias as a share of the rated peak current."""
 TONES_HZ = (0.67, 3.0, 11.0, 42.0, 123.0, 327.0)
+LAYERS = ((np.arange(8) + 0.5) * np.pi) ** 2
+"""Poles of tanh(x) / x, over the time of diffusion: r_r times the bar's admittance is the sum of 2 / (pole + s bar_s); what lies
+
+beyond the eighth is a conductance alone.
+"""
 SHARE = 0.07
 PAUSE_S = 1.5
 
@@ -61,6 +66,8 @@ class Machine:
     """Of the rated peak current."""
     bar_share: float = 0.0
     """Of the rotor's leakage that a second cage of three times the resistance shunts."""
+    bar_s: float = 0.0
+    """Time of diffusion through a solid bar of constant width, whose impedance is r_r x coth x, x^2 = s bar_s."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
 
 
@@ -112,7 +119,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share, m.bar_s)
 
 
 @njit(cache=True)
@@ -132,8 +139,11 @@ def _leg_loss(current, leg_v, leg_a):
 
 
 @njit(cache=True)
-def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar):
-    """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, and the two states of the filter."""
+def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion):
+    """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
+
+    currents of the bar's layers.
+    """
     own = (1.0 - bar) * l_r
     if iron > 0.0:
         middle = x[2]
@@ -143,13 +153,16 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
             wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee)
             middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8) / l_m)
     i_s, i_r = (x[0] - middle) / l_s, (x[1] - middle) / own
-    d = np.zeros(7, dtype=np.complex128)
+    d = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a) if leg_v > 0.0 else 0.0)
     if bar > 0.0:
         # the cage is two in parallel: a resistance alone, and one in series with the deeper part of the leakage
         deep = x[3] / (bar * l_r)
         d[1] = -3.0 * r_r * (i_r - deep)
         d[3] = -d[1] - 1.5 * r_r * deep
+    elif diffusion > 0.0:
+        d[1] = -r_r * (i_r - x[7:].sum()) / (1.0 - (2.0 / LAYERS).sum())
+        d[7:] = (-2.0 * d[1] / r_r - LAYERS * x[7:]) / diffusion
     else:
         d[1] = -r_r * i_r
     if iron > 0.0:
@@ -164,10 +177,10 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar):
+def _simulated(volts, period, fine, begin, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar, diffusion):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
-    x = np.zeros(7, dtype=np.complex128)
+    x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     late = round(delay / h)
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)
@@ -177,15 +190,15 @@ def _simulated(volts, period, fine, begin, cold, warming, r_r, l_s, l_r, l_m, kn
         r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             memory[at % (late + 1)] = seen
             if step == 0:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
                 v = volts[k]
-                k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+                k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             at += 1
-            k2, seen = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
-            k3, seen = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
-            k4, seen = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar)
+            k2, seen = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k3, seen = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k4, seen = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
     return out
