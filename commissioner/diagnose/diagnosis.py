@@ -95,7 +95,8 @@ def diagnose(
     noise = measure_noise(record)
     if audit.step_a:
         noise = noise.with_converter_step(np.array(audit.step_a))
-    report(f"noise {noise.floor_a * 1e3:.3g} mA rms, from {noise.source}")
+    rms_a = noise.rms_a(max(s.count for s in record.segments), record.facts.sample_period_s)
+    report(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
         found = search(record, noise, excluded=excluded, report=report, check=lambda f, r: check_before_search(f, r, noise), go_on=go_on)

@@ -27,7 +27,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
             "held_out": held.share if held and held.is_measured else None,
             "rmse_before_a": held.rmse_before_a if held else None,
             "rmse_after_a": held.rmse_after_a if held else None,
-            "noise_floor_a": noise.floor_a if noise else None,
+            "noise_floor_a": held.noise_a if held else None,
             "explained_share": seen.explained_share if held else None,
             "structured_error_over_noise": left.sigma if left else None,
         },

@@ -30,13 +30,14 @@ ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Error on segments the fit did not see, rms over phases and samples, A; `share` of the structured error power
+    """Error on segments the fit did not see, and noise, rms over phases and samples, A; `share` of the structured error power
 
     removed there. `is_measured` False with a single segment: then these are in-sample figures.
     """
 
     rmse_before_a: float
     rmse_after_a: float
+    noise_a: float
     share: float
     is_measured: bool
     worst_share: float
@@ -55,12 +56,13 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
         return left[0], left[1], int(segment.is_good.sum()) * record.facts.phases
 
     table = np.array(each_segment(of_segment, record))
-    floor = noise.floor_a**2 * table[:, 2]
+    period = record.facts.sample_period_s
+    floor = np.array([noise.rms_a(s.count, period) ** 2 for s in record.segments]) * table[:, 2]
     removed = table[:, 0] - table[:, 1]
     structured = np.maximum(table[:, 0] - floor, 1e-12 * floor)
     mean = table.sum(axis=0)
     return HeldOut(
-        float(np.sqrt(mean[0] / mean[2])), float(np.sqrt(mean[1] / mean[2])),
+        float(np.sqrt(mean[0] / mean[2])), float(np.sqrt(mean[1] / mean[2])), float(np.sqrt(floor.sum() / mean[2])),
         float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)), many,
         float(np.clip((removed / structured).min(), -1.0, 1.0)),
     )

@@ -53,8 +53,17 @@ class Noise:
 
     @property
     def floor_a(self) -> float:
-        """Root mean square over the phases."""
+        """Root mean square over the phases, of coloured noise at its white end."""
         return float(np.sqrt(np.mean(self.sigma_a**2)))
+
+    def rms_a(self, samples: int, period_s: float) -> float:
+        """Root mean square over the phases and so many samples in a row, slow noise included."""
+        power = self.weights(samples, period_s) ** 2
+        both_sides = np.full(power.shape[1], 2.0)
+        both_sides[0] = 1.0
+        if samples % 2 == 0:
+            both_sides[-1] = 1.0
+        return float(np.sqrt(np.mean(power @ both_sides) / samples))
 
     def with_converter_step(self, step_a: Array) -> Noise:
         """What coarse steps hide from the noise's measurement is added: the rounding error of a signal that moves is step^2/12

@@ -14,7 +14,7 @@ from commissioner.report.folded import folded
 from commissioner.report.page import Picture, Section, picture
 
 
-def where(document: Document, left: Residuals, has_causes: bool, noise_a: float) -> Section:
+def where(document: Document, left: Residuals, has_causes: bool) -> Section:
     """Error over current, voltage, flux, slope; over time and axis."""
     after = " Blue: what is left with the named causes; it should lie on zero." if has_causes else ""
     shade = " Shaded: the range that noise alone leaves (19 of 20 cases)." if figures.shade_is_visible(left, has_causes) else (
@@ -25,7 +25,7 @@ def where(document: Document, left: Residuals, has_causes: bool, noise_a: float)
         "every cause, so these shapes are a hint and no proof; the names come from trying every cause of the catalogue.",
         picture(figures.over_quantities(left, has_causes), f"Error over current, voltage, flux and how fast the current changes.{shade} "
                 "A steep step at zero current is the inverter's; curves that differ between plus and minus come from a sensor or a DC bias."),
-        picture(figures.over_time_and_axis(left, has_causes, noise_a), "Size of the error over time and for each tested axis. A rise "
+        picture(figures.over_time_and_axis(left, has_causes, document["gain"]["noise_floor_a"]), "Size of the error over time and for each tested axis. A rise "
                 "that goes on from test to test is warming or a drifting clock; unequal axes are unequal sensors or an unequal machine."),
     ])
 

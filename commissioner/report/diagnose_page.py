@@ -27,7 +27,7 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
         alike = look_alikes(seen.found.first_screening, seen.found.accepted)
         parts += [
             *sections.causes(document), *sections.uncertain_names(document), *sections.next_test(document),
-            evidence.where(document, left, has, seen.noise.floor_a), evidence.frequencies(left, has, tones),
+            evidence.where(document, left, has), evidence.frequencies(left, has, tones),
             sections.not_found(document), sections.parameters(document), evidence.for_experts(document, left, has, alike),
         ]
     parts.append(Section("The data", [*(document["audit"] or ("Nothing unusual was found in the file.",))]))
