@@ -12,6 +12,10 @@ from commissioner.diagnose.points_diagnosis import PointsDiagnosis
 from commissioner.motor.circuit import Quantity
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
+OF_RECORDINGS = (
+    "resistance, leakage and time constant of the rotor are those of slow currents; a sensor's full scale is twice the rated peak "
+    "current; the shaft's speed is electrical"
+)
 
 
 def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
@@ -21,7 +25,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
         "verdict": seen.verdict.value,
         "reason": seen.reason,
         "kind": "recording",
-        "convention": CONVENTION,
+        "convention": f"{CONVENTION}; {OF_RECORDINGS}",
         "causes": [_cause(c) for c in seen.causes],
         "gain": {
             "held_out": held.share if held and held.is_measured else None,

@@ -125,7 +125,7 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
     Memory operators and second paths cannot be negative, so that noise in the idle ones would add up to a size that is not
     there; a wander that is none takes from the drift, an alternation from the delay.
     """
-    spare = _spare(current.model)
+    spare = _spare(current.model, record)
     if not spare:
         return current
     low, high = limits(current.model, layout)
@@ -145,7 +145,11 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
     idle = [group for group in spare if not theta[group].any()]
     loss = loss_without(idle)
     while len(idle) < len(spare):
-        least, weakest = min((loss_without([*idle, group]), group) for group in spare if group not in idle)
+        # of several that stand for one another the many go first
+        _, least, weakest = min(
+            (left - price * len(group), left, group)
+            for group in spare if group not in idle for left in [loss_without([*idle, group])]
+        )
         if least - loss > price * len(weakest):
             break
         idle, loss = [*idle, weakest], least
@@ -157,8 +161,15 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
     return fit(Model(current.model.nominal, terms, values), record, layout, noise)
 
 
-def _spare(model: Model) -> list[list[int]]:
-    """Rows of theta that may as well be zero: each memory operator and second path, and what only refines a clock, a delay or a lag."""
+def _spare(model: Model, record: Record) -> list[list[int]]:
+    """Rows of theta that may as well be zero: each memory operator and second path; what only refines a clock, a delay or a lag;
+
+    and of what a segment may begin with, the flux that is left there anew, or what it inherits.
+    """
     rows = list(enumerate(model.terms, 4))
-    refining = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY, kinds.LAG)]
-    return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in refining if group]
+    groups = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY, kinds.LAG)]
+    inheriting = {s.uid for s in record.segments if np.any(s.flux_before_wb)}
+    left_anew = [k for k, t in rows if t.effect == "remanence" and t.segment in inheriting]
+    if left_anew:
+        groups += [left_anew, [k for k, t in rows if t.kind == kinds.CARRY]]
+    return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in groups if group]
