@@ -103,26 +103,34 @@ class _Mending:
     def put_skips_right(self, *, begins_anywhere: bool) -> list[Loss]:
         """Skips of the current channel alone move no state of the machine: the whole staircase of them is found at once.
 
-        Not taken where a delay that drifts evenly explains as much.
+        Where it `begins_anywhere`, none from the start as well: then the segment's whole current may be early beside the others'.
         """
+        found = [x for x in map(self._skips_right, {begins_anywhere, False}) if x is not None]
+        if not found:
+            return []
+        _, self.segment, losses, self.predicted_a, self.chi2 = max(found, key=lambda x: x[0])
+        return losses
+
+    def _skips_right(self, begins_anywhere: bool) -> tuple[float, Segment, list[Loss], Array, float] | None:
+        """Gain and repair of the staircase; none where a delay that drifts evenly explains as much."""
         segment, sigma = self.segment, self.noise.sigma_a[:, None]
         predicted = np.ascontiguousarray(self.predicted_a / sigma)
         seen = np.ascontiguousarray(np.where(segment.is_good, segment.currents_a / sigma, np.nan))
         shifts = _staircase(seen, predicted, LEAST_GAIN, begins_anywhere)
+        before = np.r_[shifts[0] if begins_anywhere else 0, shifts[:-1]]
         repaired, losses = segment, []
-        for at in np.flatnonzero(np.diff(shifts)) + 1:
-            n, where = int(shifts[at] - shifts[at - 1]), int(at + shifts[at - 1] - shifts[0])
+        for at in np.flatnonzero(shifts - before):
+            n, where = int(shifts[at] - before[at]), int(at + before[at] - before[0])
             if where + n >= segment.count - 2:
                 break
             losses.append(Loss(segment.number, float(segment.time_s[at]), n, "current samples"))
             repaired = _shifted(repaired, where, n)
         if not losses or _drifts_evenly(seen, predicted, shifts):
-            return []
+            return None
         there, chi2 = self._judge(repaired)
-        if self._gain(repaired, chi2) < max(LEAST_GAIN * len(losses), LEAST_SHARE * self.excess):
-            return []
-        self.segment, self.predicted_a, self.chi2 = repaired, there, chi2
-        return losses
+        gain = self._gain(repaired, chi2)
+        is_enough = gain >= max(LEAST_GAIN * len(losses), LEAST_SHARE * self.excess)
+        return (gain, repaired, losses, there, chi2) if is_enough else None
 
     def put_one_right(self) -> Loss | None:
         """The one event whose repair gains most, if it gains enough."""
@@ -146,7 +154,7 @@ class _Mending:
 def _staircase(seen, predicted, price, begins_anywhere):  # type: ignore[no-untyped-def]
     """(n,) samples by which each one seen is early: the least sum of squares plus `price` per step up (Viterbi).
 
-    It begins at none, or, where it `begins_anywhere`, counts from where it begins.
+    It counts from none, and may step up before the first sample, or, where it `begins_anywhere`, from where it begins.
     """
     phases, count = seen.shape
     cost = np.zeros(2 * MOST_SKIPPED + 1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.fit import fit
 from commissioner.diagnose.lost import mend
@@ -43,6 +44,23 @@ def test_many_skips_of_the_current_channel_are_found_at_once(nominal, setting, i
     assert np.abs(np.sort(found) - at).max() <= 12  # samples; where the current is at its crest, a skip hardly shows
     left = mended.segments[1].currents_a - predict(nominal, mended, 1, setting.layout).currents_a
     assert np.std(left[:, mended.segments[1].is_good]) < 1.15 * NOISE_A
+
+
+@pytest.mark.parametrize("phases", [2, 3])
+def test_samples_lost_before_the_first_one_of_a_segment_are_found(nominal, setting, phases):
+    """The command begins at once, so that the whole current of one segment is early beside the others'; one more is lost later."""
+    source = recording(axes=(0.0, 60.0, 120.0, 0.0, 0.0))
+    since = source.time_s % 2.2  # s, from the start of the segment
+    command = sum(volts * np.sin(2.0 * np.pi * hz * since) for hz, volts in ((2.3, 14.0), (41.9, 20.0), (331.7, 30.0)))
+    begun = replace(source, voltage_axis_v=command)
+    record, _ = prepare([begun])
+    rows = [predict(nominal, record, k, setting.layout).currents_a for k in range(5)]
+    rows[1], rows[3] = skipped(rows[1], [0, 0]), skipped(rows[3], [3000])
+    currents = np.concatenate(rows, axis=1)
+    u, v, w = currents + NOISE_A * np.random.default_rng(3).standard_normal(currents.shape)
+    seen = diagnose([replace(begun, current_u_a=u, current_v_a=v, current_w_a=w if phases == 3 else None)])
+    assert [c.name for c in seen.causes] == ["lost_samples"] and seen.verdict.value == "explained"
+    assert [(x.segment, x.samples) for x in seen.found.losses] == [(1, 2), (3, 1)]
 
 
 @pytest.mark.parametrize("ppm", [100.0, 300.0])
