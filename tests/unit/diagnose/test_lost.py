@@ -100,3 +100,43 @@ def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, s
     losses = _mended(record, current, setting.layout, low, lambda _: None)[2]
     assert sum(x.samples for x in losses) == held.size
     assert _mended(record, current, setting.layout, replace(low, uncertainty=0.0), lambda _: None)[2] == ()
+
+
+
+def with_spikes(rows, random):
+    """Six samples of one phase each, and one of two in a row, that stand out by 15 and more times the noise."""
+    at, phase = random.integers(100, rows.shape[1] - 100, 6), random.integers(0, 3, 6)
+    rows[phase, at] += NOISE_A * random.choice([-15.0, 15.0, 30.0], 6)
+    rows[1, 9500:9502] += 30.0 * NOISE_A
+
+
+def with_holds_and_spikes(rows, random):
+    with_spikes(rows, random)
+    held = np.array([2000, 8000, 8400])
+    rows[:, held] = rows[:, held - 1]
+
+
+def with_heavy_tails(rows, random):
+    """Student's noise of three degrees of freedom beside the normal one: a few samples of a recording are 15 times its rms."""
+    rows += NOISE_A * random.standard_t(3.0, rows.shape)
+
+
+@pytest.mark.parametrize(("change", "held"), [(with_spikes, 0), (with_heavy_tails, 0), (with_holds_and_spikes, 3)])
+@pytest.mark.parametrize("phases", [2, 3])
+def test_of_samples_that_stand_out_only_those_are_lost_that_repeat_others(nominal, setting, change, held, phases):
+    record, random = record_with(nominal, setting, lambda k, rows: rows), np.random.default_rng(11)
+    rows = np.concatenate([s.currents_a for s in record.segments], axis=1)
+    change(rows, random)
+    seen = diagnose([replace(recording(currents=rows), current_w_a=rows[2] if phases == 3 else None)])
+    assert [c.name for c in seen.causes] == ["lost_samples"] * bool(held)
+    assert {(x.samples, x.way) for x in seen.found.losses} <= {(1, "held value")} and len(seen.found.losses) == held
+    assert len(seen.found.spikes) > 2 and any("spikes" in remark for remark in seen.remarks)
+    assert seen.verdict.value == ("explained" if held else "nothing_significant")
+
+
+def test_a_value_held_for_long_is_lost_throughout(nominal, setting):
+    record = record_with(nominal, setting, lambda k, rows: rows)
+    rows = np.concatenate([s.currents_a for s in record.segments], axis=1)
+    rows[:, 8000:8008] = rows[:, [7999]]
+    seen = diagnose([recording(currents=rows)])
+    assert [(x.samples, x.way) for x in seen.found.losses] == [(1, "held value")] * 8 and seen.found.spikes == ()
