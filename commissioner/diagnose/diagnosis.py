@@ -26,7 +26,6 @@ from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
-from commissioner.diagnose.record import Record
 from commissioner.diagnose.refusals import Refused, check_before_search, check_one_state
 from commissioner.diagnose.search import Found, search
 from commissioner.diagnose.split import Split, split_lines
@@ -127,7 +126,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
         rest, _parameters(found.nominal, layout), _parameters(found.fit, layout), experiment,
         model_document(found, [*causes, *unsure]), found, split_lines(record), share,
-        _remarks(noise, record, found.is_complete, unsure), unsure,
+        _remarks(noise, found, unsure), unsure,
     )
 
 
@@ -183,17 +182,22 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
     return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")
 
 
-def _remarks(noise: Noise, record: Record, is_complete: bool, unsure: Sequence[Cause]) -> tuple[str, ...]:
-    out = [] if is_complete else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
+def _remarks(noise: Noise, found: Found, unsure: Sequence[Cause]) -> tuple[str, ...]:
+    out = [] if found.is_complete else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
     if unsure:
         names = ", ".join(f"{c.name} ({c.strength_sigma:.2g} times the noise)" for c in unsure)
         out.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {names}.")
+    if found.spikes:
+        out.append(
+            "Single samples stand out by more than noise of this size makes (spikes, or noise with heavy tails): "
+            f"{len(found.spikes)} are left out. None is lost: time goes on beside them."
+        )
     if not noise.is_known:
         out.append(
             "No repeated segment, no repeated period, no zero-voltage stretch and no third sensor: the noise had to be "
             "taken from quiet frequencies of the same record. Broadband structure would be counted as noise, so "
             "`explained` means no line is left, and confidences are lowered. Repeat one segment to measure the noise."
         )
-    if len({round(s.axis_deg % 180.0, 3) for s in record.segments}) < 2:
+    if len({round(s.axis_deg % 180.0, 3) for s in found.record.segments}) < 2:
         out.append("One axis only: anisotropy cannot be told from the machine's own L_sigma and resistances.")
     return tuple(out)

@@ -1,7 +1,8 @@
 """Samples lost without a gap in the time stamps: found by their jump in delay, then put right in the data.
 
 Three ways to lose one: the current channel skips (all later currents come early), whole rows vanish (command and current
-both skip), or a value is held. Each is tried where a scan points; the one that mends the segment's error is kept.
+both skip), or a value is held. Each is tried where a scan points; the one that mends the segment's error is kept. A sample
+that stands out and holds no other's value is a spike, as noise with heavy tails has them: left out, and no loss.
 """
 
 from __future__ import annotations
@@ -28,9 +29,14 @@ LEAST_GAIN = 80.0
 LEAST_SHARE = 0.03
 LEAST_JUMP = 0.7
 """Samples by which the delay must seem to jump: several jumps in a segment do not add up to a whole number anywhere."""
-SPIKE = 9.0
+STANDS_OUT = 9.0
+"""Times the usual jump of the residual from one sample to the next: worth a trial."""
 MOST_IN_A_ROW = 3
 MOST_SKIPPED = 24
+SPIKE = "spike"
+"""The way of an event in which no sample was lost."""
+MOST_BETWEEN_ALIKE = 16.0
+"""Chi2 of two or three phases that hold one current twice: from noise alone, one of a thousand has more."""
 START = 50
 """Samples in which a pulse is flux left from before, not a loss."""
 
@@ -44,13 +50,18 @@ class Loss:
     samples: int
     way: str
 
+    @property
+    def is_spike(self) -> bool:
+        """One sample stands out, and none is lost."""
+        return self.way == SPIKE
+
 
 def mend(
     record: Record, model: Model, layout: Layout, noise: Noise, *, is_first: bool
 ) -> tuple[Record, tuple[Loss, ...]]:
-    """The record with unmarked losses masked and re-aligned, and the list of them. `is_first`: the model was fitted to data
+    """The record with unmarked losses masked and re-aligned, spikes masked, and the list of them. `is_first`: the model was
 
-    with all their losses, and is right in their middle rather than at the start.
+    fitted to data with all their losses, and is right in their middle rather than at the start.
     """
 
     def of_segment(k: int) -> tuple[Segment, list[Loss]]:
@@ -103,26 +114,34 @@ class _Mending:
     def put_skips_right(self, *, begins_anywhere: bool) -> list[Loss]:
         """Skips of the current channel alone move no state of the machine: the whole staircase of them is found at once.
 
-        Not taken where a delay that drifts evenly explains as much.
+        Where it `begins_anywhere`, none from the start as well: then the segment's whole current may be early beside the others'.
         """
+        found = [x for x in map(self._skips_right, {begins_anywhere, False}) if x is not None]
+        if not found:
+            return []
+        _, self.segment, losses, self.predicted_a, self.chi2 = max(found, key=lambda x: x[0])
+        return losses
+
+    def _skips_right(self, begins_anywhere: bool) -> tuple[float, Segment, list[Loss], Array, float] | None:
+        """Gain and repair of the staircase; none where a delay that drifts evenly explains as much."""
         segment, sigma = self.segment, self.noise.sigma_a[:, None]
         predicted = np.ascontiguousarray(self.predicted_a / sigma)
         seen = np.ascontiguousarray(np.where(segment.is_good, segment.currents_a / sigma, np.nan))
         shifts = _staircase(seen, predicted, LEAST_GAIN, begins_anywhere)
+        before = np.r_[shifts[0] if begins_anywhere else 0, shifts[:-1]]
         repaired, losses = segment, []
-        for at in np.flatnonzero(np.diff(shifts)) + 1:
-            n, where = int(shifts[at] - shifts[at - 1]), int(at + shifts[at - 1] - shifts[0])
+        for at in np.flatnonzero(shifts - before):
+            n, where = int(shifts[at] - before[at]), int(at + before[at] - before[0])
             if where + n >= segment.count - 2:
                 break
             losses.append(Loss(segment.number, float(segment.time_s[at]), n, "current samples"))
             repaired = _shifted(repaired, where, n)
         if not losses or _drifts_evenly(seen, predicted, shifts):
-            return []
+            return None
         there, chi2 = self._judge(repaired)
-        if self._gain(repaired, chi2) < max(LEAST_GAIN * len(losses), LEAST_SHARE * self.excess):
-            return []
-        self.segment, self.predicted_a, self.chi2 = repaired, there, chi2
-        return losses
+        gain = self._gain(repaired, chi2)
+        is_enough = gain >= max(LEAST_GAIN * len(losses), LEAST_SHARE * self.excess)
+        return (gain, repaired, losses, there, chi2) if is_enough else None
 
     def put_one_right(self) -> Loss | None:
         """The one event whose repair gains most, if it gains enough."""
@@ -131,7 +150,7 @@ class _Mending:
         slope = np.gradient(self.predicted_a, axis=1)
         best: tuple[float, Segment, Loss, Array, float] | None = None
         for at in _suspects(residual, slope, segment, self.model, self.noise):
-            for repaired, loss in _repairs(segment, at):
+            for repaired, loss in self._repairs(at):
                 there, chi2 = self._judge(repaired)
                 gain = self._gain(repaired, chi2)
                 if gain > max(LEAST_GAIN, LEAST_SHARE * self.excess) and (best is None or gain > best[0]):
@@ -141,12 +160,40 @@ class _Mending:
         _, self.segment, loss, self.predicted_a, self.chi2 = best
         return loss
 
+    def _repairs(self, at: int) -> Iterator[tuple[Segment, Loss]]:
+        segment = self.segment
+        for near in (at, at - 1, at + 1):
+            if not 2 <= near < segment.count - MOST_IN_A_ROW - 2:
+                continue
+            time = float(segment.time_s[near])
+            without = segment.is_good.copy()
+            without[near] = False
+            way = "held value" if self._is_held(near) else SPIKE
+            yield replace(segment, is_good=without), Loss(segment.number, time, 1, way)
+            for n in range(1, MOST_IN_A_ROW + 1):
+                yield _shifted(segment, near, n), Loss(segment.number, time, n, "current samples")
+                yield _inserted(segment, near, n), Loss(segment.number, time, n, "whole rows")
+
+    def _is_held(self, at: int) -> bool:
+        """Whether all phases repeat an earlier current that is no spike itself, or are zero: what stands in a lost one's place."""
+        seen = self.segment.currents_a
+        error = seen - self.predicted_a
+        first = at
+        while first > max(at - MOST_EVENTS, 1) and self._is_alike(seen[:, first], seen[:, first - 1]):
+            first -= 1
+        repeats = first < at and self._is_alike(error[:, first], error[:, first - 1])
+        return repeats or self._is_alike(seen[:, at], np.zeros(seen.shape[0]))
+
+    def _is_alike(self, a: Array, b: Array) -> bool:
+        """Whether the noise of two samples makes what lies between them."""
+        return float((((a - b) / self.noise.sigma_a) ** 2).sum()) < 2.0 * MOST_BETWEEN_ALIKE
+
 
 @njit(cache=True, nogil=True)
 def _staircase(seen, predicted, price, begins_anywhere):  # type: ignore[no-untyped-def]
     """(n,) samples by which each one seen is early: the least sum of squares plus `price` per step up (Viterbi).
 
-    It begins at none, or, where it `begins_anywhere`, counts from where it begins.
+    It counts from none, and may step up before the first sample, or, where it `begins_anywhere`, from where it begins.
     """
     phases, count = seen.shape
     cost = np.zeros(2 * MOST_SKIPPED + 1)
@@ -197,7 +244,7 @@ def _suspects(residual: Array, slope: Array, segment: Segment, model: Model, noi
     scale = np.maximum(1.4826 * np.median(jump[:, good], axis=1, keepdims=True) / 0.9, 1.2 * noise.sigma_a[:, None])
     score = np.where(good, (jump / scale).max(axis=0), 0.0)
     at = int(np.argmax(score))
-    if score[at] > SPIKE:
+    if score[at] > STANDS_OUT:
         yield at + 1
     step = _delay_step(residual / noise.sigma_a[:, None], slope / noise.sigma_a[:, None])
     if step is not None:
@@ -241,19 +288,6 @@ def _delay_step(residual: Array, slope: Array) -> int | None:
     samples = after[inside][at] / max(float(power[inside][at]), 1e-12)
     is_jump = abs(samples) >= LEAST_JUMP
     return at + 20 if gain[at] > LEAST_GAIN and is_jump else None
-
-
-def _repairs(segment: Segment, at: int) -> Iterator[tuple[Segment, Loss]]:
-    for near in (at, at - 1, at + 1):
-        if not 2 <= near < segment.count - MOST_IN_A_ROW - 2:
-            continue
-        time = float(segment.time_s[near])
-        held = segment.is_good.copy()
-        held[near] = False
-        yield replace(segment, is_good=held), Loss(segment.number, time, 1, "held value")
-        for n in range(1, MOST_IN_A_ROW + 1):
-            yield _shifted(segment, near, n), Loss(segment.number, time, n, "current samples")
-            yield _inserted(segment, near, n), Loss(segment.number, time, n, "whole rows")
 
 
 def _shifted(segment: Segment, at: int, n: int) -> Segment:

@@ -56,6 +56,8 @@ class Found:
     """Causes that would gain, but too little to matter: what they gain in chi2."""
     gains: dict[str, float] = field(default_factory=dict)
     losses: tuple[Loss, ...] = ()
+    spikes: tuple[Loss, ...] = ()
+    """Samples that stand out alone: masked as well, and no loss."""
     material_chi2: float = 0.0
     """A cause that gains less is too small to matter."""
     is_complete: bool = True
@@ -131,7 +133,8 @@ def search(
     )
     return Found(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
-        whole.below, losses_of(fitted, accepted), losses, whole.material_chi2, go_on(),
+        whole.below, losses_of(fitted, accepted), tuple(x for x in losses if not x.is_spike),
+        tuple(x for x in losses if x.is_spike), whole.material_chi2, go_on(),
     )
 
 
@@ -143,7 +146,7 @@ def _leaves(sigma: float, fitted: Fit, nominal: Fit, noise: Noise) -> bool:
 def _mended(
     record: Record, current: Fit, layout: Layout, noise: Noise, report: Report, least: float = 0.0
 ) -> tuple[Record, Fit, tuple[Loss, ...]]:
-    """Unmarked losses put right until a better fit shows no more of them; none where most of the misfit stays, or where they
+    """Unmarked losses put right, and spikes left out, until a better fit shows no more; none where most of the misfit stays, or where they
 
     gain less than `least`. A cause that is not in the model yet, like the kinks of a dead time, can look like many small losses.
     """
@@ -167,7 +170,8 @@ def _mended(
     stays = max(left - doubt, 0.0) > (1.0 - MENDED_SHARE) * max(excess - doubt, 0.0)
     if not losses or stays or excess - left < max(least, MENDED_LEAST_SHARE * excess):
         return record, current, ()
-    report(f"{sum(x.samples for x in losses)} unmarked lost samples put right")
+    spikes = sum(x.is_spike for x in losses)
+    report(f"{sum(x.samples for x in losses) - spikes} unmarked lost samples put right, {spikes} spikes left out")
     return mended, better, losses
 
 

@@ -11,7 +11,7 @@ from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.leftover import leftover
 from commissioner.diagnose.noise import measure_noise
 from commissioner.diagnose.plant import predict
-from tests.unit.diagnose.conftest import recording
+from tests.unit.diagnose.conftest import NOMINAL, PERIOD_S, recording
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,33 @@ def test_what_no_motor_at_rest_can_answer_is_refused_by_name(plain, reason):
         seen = diagnose([REFUSED[reason](plain)])
     assert seen.verdict.value == "refused"
     assert reason in seen.reason
+
+
+TONES_HZ = {"three": (2.3, 41.9, 331.7), "high": (331.7,), "with a direct part": (0.0, 331.7)}
+LATE_S = {"at once": 0.0, "150 us": 150e-6, "two periods": 2.0 * PERIOD_S}
+
+
+def answered(tones_hz, late_s=0.0):
+    """The steady answer of the conftest machine to tones of 1 A each, read late; at the highest 45 ohm of reactance beside 5.9 of resistance."""
+    source = recording(axes=(0.0,))
+    r_s, r_r, l_sigma, l_m = NOMINAL
+    t = source.time_s
+    volts, amps = np.zeros((2, t.size))
+    for hz in tones_hz:
+        s = 2j * np.pi * hz
+        impedance = r_s + s * l_sigma + r_r * s * l_m / (r_r + s * l_m)
+        volts += (impedance * np.exp(s * t)).real
+        amps += np.exp(s * (t - late_s)).real
+    rows = np.array([1.0, -0.5, -0.5])[:, None] * amps
+    return replace(source, voltage_axis_v=volts, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])
+
+
+@pytest.mark.parametrize("late", LATE_S)
+@pytest.mark.parametrize("tones", TONES_HZ)
+def test_a_current_read_late_is_not_taken_for_one_of_the_wrong_sign(tones, late):
+    seen = answered(TONES_HZ[tones], LATE_S[late])
+    assert prepare([seen])[1].refusal is None
+    assert "against the voltage" in prepare([scaled(seen, -1.0, -1.0, -1.0)])[1].refusal
 
 
 ODD = {
