@@ -68,6 +68,8 @@ class Machine:
     """Of the rotor's leakage that a second cage of three times the resistance shunts."""
     bar_s: float = 0.0
     """Time of diffusion through a solid bar of constant width, whose impedance is r_r x coth x, x^2 = s bar_s."""
+    left_wb: complex = 0.0
+    """Flux of the open rotor's current, at the stator, when each segment begins."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
 
 
@@ -96,7 +98,7 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
     for k, (axis, level, bias) in enumerate(SEGMENTS):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
-        seen = _simulated(volt * along, PERIOD_S, FINE, begin, *_numbers(machine))
+        seen = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), *_numbers(machine))
         t = begin + np.arange(volt.size) * PERIOD_S
         phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
         hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
@@ -177,10 +179,11 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar, diffusion):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar, diffusion):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
+    x[0], x[1], x[2] = left, left * (l_m + l_r) / l_m, left
     late = round(delay / h)
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)

@@ -64,6 +64,14 @@ def test_a_solid_bar_is_never_called_iron_loss_alone(diffusion_s):
     assert seen.left.sigma < 0.1
 
 
+def test_flux_left_before_every_segment_has_its_size_where_none_is_carried_over():
+    """Every segment's own flux and what it inherits from the one before stand for one another: the fewest numbers that do are kept."""
+    seen, names = named(Machine(left_wb=0.02 + 0.008j))
+    assert set(names) == {"remanence"}
+    value, spread, _ = seen.causes[0].sizes["flux_wb"]
+    assert value == pytest.approx(abs(0.02 + 0.008j), abs=4.0 * spread) and spread < 0.02 * value
+
+
 @pytest.mark.campaign
 def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
     machine = Machine(bar_s=2e-2)
