@@ -106,7 +106,7 @@ def alternatives(
         for score in [s for s in screening.ranked() if s.name != name][:3]:
             if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
-            model = without.model.with_terms(CATALOGUE[score.name].terms(setting))
+            model = without.model.with_terms(score.form)
             trial = fit(model, record, layout, noise, wanted_chi2=wanted)
             if is_plausible(trial.model, score.name, setting):
                 loss = (trial.chi2 - found.chi2) * whole / record.samples

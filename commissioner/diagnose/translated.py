@@ -188,7 +188,8 @@ def _clock(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> E
     wander = values.get("wander_sin", 0.0)
     if abs(wander) > abs(sizes["drift_ppm"]):
         return {"size": -wander, "shape": "wandering"}
-    return {"size": -sizes["drift_ppm"]}
+    runs_on = abs(values.get("running", 0.0)) > abs(values.get("drift", 0.0))
+    return {"size": -sizes["drift_ppm"], "runs_on": float(runs_on)}
 
 
 TRANSLATED: dict[str, Translate] = {
