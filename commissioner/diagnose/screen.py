@@ -120,7 +120,9 @@ def score(
     left = slope[active:] - reduced.T @ (root @ slope[free])
     power = np.diag(gram)[active:]
     is_visible = np.diag(projected) > np.maximum(VISIBLE * power, 1e-6)
-    columns, scores, at = {}, {}, 0
+    columns: dict[str, tuple[int, ...]] = {}
+    scores: dict[str, Score] = {}
+    at = 0
     for name, terms in candidates.items():
         places = {t.symbol: at + k for k, t in enumerate(terms)}
         at += len(terms)
