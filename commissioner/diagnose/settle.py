@@ -26,6 +26,7 @@ CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
 REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,)}
 """Indices of the numbers that only refine a clock, a delay or a lag."""
+WARMING = frozenset({"stator_heating", "rotor_heating"})
 
 
 def settled(current: Fit, record: Record, layout: Layout, noise: Noise, *, is_placed: bool) -> tuple[Fit, Layout]:
@@ -171,7 +172,11 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 
 def _spare(model: Model) -> list[list[int]]:
-    """Rows of theta that may as well be zero: each memory operator and second path, and what only refines a clock, a delay or a lag."""
+    """Rows of theta that may as well be zero: each memory operator, second path and course of heat, and what only refines a clock,
+
+    a delay or a lag.
+    """
     rows = list(enumerate(model.terms, 4))
     refining = [[k for k, t in rows if t.kind == kind and t.index in refined] for kind, refined in REFINING.items()]
-    return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in refining if group]
+    alone = [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH) or t.effect in WARMING]
+    return alone + [group for group in refining if group]
