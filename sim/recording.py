@@ -133,7 +133,7 @@ def _sample(
 ) -> Columns:
     """What the logger writes down of one segment."""
     n, period = stretch.command_v.size, plant.control_period_s
-    places = _sampling_places(n, plant, s, random, period)
+    places = _sampling_places(n, plant, s, random, period, stretch.start_s)
     noise = _noise(scenario.document.get("noise", {}), (n, 3), random)
     cable = _cable_current(stretch, s, period)
     t = stretch.start_s + np.arange(n) * period
@@ -167,7 +167,9 @@ def _sense_rows(points, places, t, noise, cable, s, out):
             out[k, phase] = convert(seen, s[at.S_LSB_A])
 
 
-def _sampling_places(n: int, plant: Plant, s: np.ndarray, random: np.random.Generator, period: float) -> np.ndarray:
+def _sampling_places(
+    n: int, plant: Plant, s: np.ndarray, random: np.random.Generator, period: float, start_s: float
+) -> np.ndarray:
     """When each current sample was really taken (in control periods): delay, clock drift, lost current samples."""
     k = np.arange(n, dtype=float)
     places = k - s[at.S_DELAY] / period
@@ -177,6 +179,8 @@ def _sampling_places(n: int, plant: Plant, s: np.ndarray, random: np.random.Gene
     if clock is not None:
         wander = np.sin(2.0 * math.pi * k / max(n, 1)) if clock.shape == "wandering" else 1.0
         places += np.cumsum(np.full(n, 1e-6 * clock.size) * wander)
+        if clock.details.get("runs_on", 0.0):  # not set anew with every segment
+            places += 1e-6 * clock.size * start_s / period
     if lost is not None and lost.shape != "whole_rows":
         for where in random.integers(n // 10, n - n // 10, round(lost.size)):
             if lost.shape == "held":

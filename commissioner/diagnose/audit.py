@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +63,7 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
     if len(kept) < len(segments):
         sentences.append(f"{len(segments) - len(kept)} stretches shorter than {SHORTEST_STRETCH} samples are left out.")
     kept = [
-        Segment(s.number, s.file, s.axis_deg, s.time_s, s.voltage_axis_v, s.currents_a, s.is_good, s.link_ratio,
-                s.starts_at_rest, k)
-        for k, s in enumerate(kept)
+        replace(s, uid=k, age_s=float(s.time_s[0] - recordings[s.file].time_s[0])) for k, s in enumerate(kept)
     ]
     record = Record(tuple(kept), facts)
     clipped = _clip_report(recordings, limits, facts)

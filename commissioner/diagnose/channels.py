@@ -19,7 +19,15 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segmen
 
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.001, 0.01, 0.1)
-HEAT_LEAK_S = 20.0
+HEAT_LEAKS_S = {"": np.inf, "_20s": 20.0, "_6s": 6.0}
+"""Time constants (s) with which heat leaks away, by how the names end: in sums of these every course with one of 5 s or more is
+
+there to 1 % of its power, from 20 s on to 0.03 %."""
+STATOR_HEAT = (*(f"{kind}{leak}" for kind in ("own", "mean") for leak in HEAT_LEAKS_S), "time", "settling")
+CAGE_HEAT = tuple(f"rotor_heat{kind}" for kind in (*HEAT_LEAKS_S, "_time", "_settling"))
+"""Warmth that is carried over from segment to segment: of the windings by their own loss or the mean of the three, and of the cage."""
+FRESH_STATOR_HEAT, FRESH_CAGE_HEAT = "fresh", "rotor_heat_fresh"
+"""Of a motor that cools in the pauses, whatever the time stamps say."""
 SETTLED = 4.0
 """Thermal time constants in a recording, for a temperature that settles within it."""
 SPEED_KNOTS_S, MOST_SPEED_KNOTS = 0.4, 40
@@ -128,42 +136,49 @@ def _three_phases(segment: Segment) -> Array:
 
 
 def _heat(record: Record, rotor: Sequence[Array]) -> Named:
-    """Doses in minutes at rated current, carried over segments: own phase, mean of phases, own phase with a leak, plain time
+    """Doses in minutes at rated current, carried over segments: own phase, and mean of phases, each with every leak; plain time
 
-    and time towards a settled temperature (to the same end as the mean), rotor, rotor in plain and in settling time.
+    and time towards a settled temperature (to the same end as the mean); own phase since the segment's start; the same of the rotor.
     """
-    period, rated = record.facts.sample_period_s, record.facts.rated_current_peak_a / np.sqrt(2.0)
-    own, leaky, cage = np.zeros(3), np.zeros(3), 0.0
-    last_time, last_file = None, -1
-    decay = float(np.exp(-period / HEAT_LEAK_S))
+    rates = [_heat_rates(record, s, current) for s, current in zip(record.segments, rotor, strict=True)]
+    doses = [_doses(record, rates, leak) for leak in HEAT_LEAKS_S.values()]
+    ends = {s.file: dose[:, -1] for s, dose in zip(record.segments, doses[0], strict=True)}
     out = []
-    for segment, rotor_current in zip(record.segments, rotor, strict=True):
-        if segment.file != last_file:
-            own, leaky, cage, last_time = np.zeros(3), np.zeros(3), 0.0, None
-        if last_time is not None:
-            leaky = leaky * np.exp(-max(segment.time_s[0] - last_time, 0.0) / HEAT_LEAK_S)
-        rate = _three_phases(segment) ** 2 / rated**2 * period / 60.0
-        rotor_rate = (rotor_current**2).sum(axis=0) / (2.0 * rated**2) * period / 60.0
-        dose = own[:, None] + np.cumsum(rate, axis=1) - rate
-        leak = np.stack([
-            lfilter([1.0], [1.0, -decay], rate[p], zi=[decay * leaky[p]])[0] - rate[p] for p in range(3)
-        ])
-        cage_dose = cage + np.cumsum(rotor_rate) - rotor_rate
-        mean = np.repeat(dose.mean(axis=0)[None], 3, axis=0)
+    for segment, rate, *here in zip(record.segments, rates, *doses, strict=True):
         since = _since_start(record, segment)
         settling = np.expm1(-SETTLED * since) / np.expm1(-SETTLED)
-        time, settling = (np.repeat(x[None], 3, axis=0) for x in (since, settling))
-        out.append(np.vstack([dose, mean, leak, time, settling, cage_dose[None], time[:1], settling[:1]]).T)
-        own, leaky, cage = dose[:, -1], leak[:, -1], float(cage_dose[-1])
-        last_time, last_file = float(segment.time_s[-1]), segment.file
-    for file in {s.file for s in record.segments}:
-        rows = [k for k, s in enumerate(record.segments) if s.file == file]
-        for column, of in ((slice(9, 15), slice(3, 6)), (slice(16, 18), slice(15, 16))):
-            scale = float(out[rows[-1]][-1, of].mean())
-            for k in rows:
-                out[k][:, column] *= scale
-    names = tuple(f"heat_{kind}_{p}" for kind in ("own", "mean", "leaky", "time", "settling") for p in "uvw")
-    return (*names, "rotor_heat", "rotor_heat_time", "rotor_heat_settling"), out
+        fresh = np.cumsum(rate, axis=1) - rate
+        end = ends[segment.file]
+        windings = [
+            *(dose[:3] for dose in here), *(np.repeat(dose[:3].mean(axis=0)[None], 3, axis=0) for dose in here),
+            *(np.repeat(end[:3].mean() * x[None], 3, axis=0) for x in (since, settling)), fresh[:3],
+        ]
+        cage = [*(dose[3] for dose in here), end[3] * since, end[3] * settling, fresh[3]]
+        out.append(np.vstack([*windings, *cage]).T)
+    names = tuple(f"heat_{kind}_{p}" for kind in (*STATOR_HEAT, FRESH_STATOR_HEAT) for p in "uvw")
+    return (*names, *CAGE_HEAT, FRESH_CAGE_HEAT), out
+
+
+def _heat_rates(record: Record, segment: Segment, rotor_current: Array) -> Array:
+    """(4, n) minutes at rated current that each sample adds: by the loss of every phase, and of the cage."""
+    power = np.vstack([_three_phases(segment) ** 2, 0.5 * (rotor_current**2).sum(axis=0)])
+    return np.asarray(2.0 * power / record.facts.rated_current_peak_a**2 * record.facts.sample_period_s / 60.0)
+
+
+def _doses(record: Record, rates: Sequence[Array], leak_s: float) -> list[Array]:
+    """Heat at every sample from those before it: d dose/dt = rate - dose / leak, over the segments of a file and their pauses."""
+    stays = float(np.exp(-record.facts.sample_period_s / leak_s))
+    out: list[Array] = []
+    before: Segment | None = None
+    held = np.zeros(0)
+    for segment, rate in zip(record.segments, rates, strict=True):
+        is_first = before is None or before.file != segment.file
+        pause = 0.0 if before is None else max(float(segment.time_s[0] - before.time_s[-1]), 0.0)
+        held = np.zeros(rate.shape[0]) if is_first else held * np.exp(-pause / leak_s)
+        dose, _ = lfilter([1.0], [1.0, -stays], rate, axis=1, zi=held[:, None])
+        out.append(dose - rate)
+        before, held = segment, dose[:, -1]
+    return out
 
 
 def _since_start(record: Record, segment: Segment) -> Array:

@@ -109,7 +109,7 @@ def alternatives(
         for score in [s for s in screening.ranked() if s.name != name][:3]:
             if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
                 continue
-            model = without.model.with_terms(CATALOGUE[score.name].terms(setting))
+            model = without.model.with_terms(score.form)
             trial, there = fit(model, record, layout, noise, wanted_chi2=wanted), replace(setting, layout=layout)
             if trial.chi2 - found.chi2 > TIE_CHI2:
                 trial, there = with_closer_paths(trial, there, noise, wanted)

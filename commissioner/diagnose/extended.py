@@ -15,8 +15,10 @@ import numpy as np
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
-FORMAT = 3
-"""2: a lag is its sum and its shape, no longer two time constants. 3: tilts of L_sigma and L_M are what they become together."""
+FORMAT = 4
+"""2: a lag is its sum and its shape, no longer two time constants. 3: tilts of L_sigma and L_M are what they become together.
+
+4: heat leaks away with more time constants, and the channels behind it have moved."""
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ LEAST_BESIDE = 800.0
 """Lost samples must gain at least so much beside accepted causes."""
 MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
 """Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
-CLOCK_RATES = ("drift", "wander_cos", "wander_sin")
+CLOCK_RATES = ("drift", "wander_cos", "wander_sin", "running")
 SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_SLOPE_LOST = 0.25

@@ -88,7 +88,7 @@ def _blank(facts: Facts, segments: Sequence[tuple[float, Array]]) -> Record:
         n = voltage.shape[0]
         out.append(Segment(
             number, 0, axis, np.asarray(start + np.arange(n) * facts.sample_period_s, dtype=np.float64), voltage, np.zeros((3, n)),
-            np.ones(n, dtype=bool), np.ones(n), True, number,
+            np.ones(n, dtype=bool), np.ones(n), True, number, age_s=start,
         ))
         start += n * facts.sample_period_s + PAUSE_S
     return Record(tuple(out), replace(facts, phases=3))

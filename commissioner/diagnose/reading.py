@@ -117,8 +117,9 @@ def _delays(segment: Segment) -> Array:
 def clock_courses(segment: Segment) -> Array:
     """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
 
-    and fro within it (cosine and sine).
+    and fro within it (cosine and sine); and constant from the start of the recording, of a clock that runs on over segments.
     """
     elapsed = segment.time_s - segment.time_s[0]
     turn = 2.0 * np.pi / max(segment.count * segment.period_s, 1e-9)
-    return np.stack([elapsed, np.sin(turn * elapsed) / turn, (1.0 - np.cos(turn * elapsed)) / turn])
+    wander = np.sin(turn * elapsed) / turn, (1.0 - np.cos(turn * elapsed)) / turn
+    return np.stack([elapsed, *wander, segment.age_s + elapsed])

@@ -40,6 +40,8 @@ class Segment:
     uid: int = 0
     flux_before_wb: tuple[float, float] = (0.0, 0.0)
     """Rotor flux (alpha, beta) at the end of the segment before, of which a part may be left at the start."""
+    age_s: float = 0.0
+    """Time of the first sample since the first one of its file."""
 
     @cached_property
     def period_s(self) -> float:
@@ -67,7 +69,7 @@ class Segment:
         return Segment(
             self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
             self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
-            self.flux_before_wb,
+            self.flux_before_wb, self.age_s,
         )
 
 

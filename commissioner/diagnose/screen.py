@@ -7,7 +7,7 @@ with the nuisance directions rejected (M. Basseville, I. Nikiforov, INRIA RR-443
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ def required_chi2(numbers: int) -> float:
 class Score:
     """What an effect promises to first order: gain `delta_chi2` and `step` in theta units.
 
-    `limit` is the size of the first quantity that would just be found.
+    `limit` is the size of the first quantity that would just be found. `form`: all numbers to be tried, seen or not.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Score:
     numbers: int
     step: Array
     terms: tuple[Term, ...]
+    form: tuple[Term, ...] = ()
 
     @property
     def threshold(self) -> float:
@@ -119,16 +120,20 @@ def score(
     left = slope[active:] - reduced.T @ (root @ slope[free])
     power = np.diag(gram)[active:]
     is_visible = np.diag(projected) > np.maximum(VISIBLE * power, 1e-6)
-    columns, scores, at = {}, {}, 0
+    columns: dict[str, tuple[int, ...]] = {}
+    scores: dict[str, Score] = {}
+    at = 0
     for name, terms in candidates.items():
-        every = range(at, at + len(terms))
+        places = {t.symbol: at + k for k, t in enumerate(terms)}
         at += len(terms)
-        kept = tuple(k for k in every if is_visible[k])
-        if not kept:
-            continue
-        columns[name] = kept
-        own = [terms[k - every.start] for k in kept]
-        scores[name] = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting, times)
+        for form in CATALOGUE[name].forms(terms):
+            own = [t for t in form if is_visible[places[t.symbol]]]
+            kept = tuple(places[t.symbol] for t in own)
+            if not kept:
+                continue
+            one = _score(name, own, projected[np.ix_(kept, kept)], left[list(kept)], setting, times)
+            if name not in scores or one.net > scores[name].net:
+                scores[name], columns[name] = replace(one, form=form), kept
     return Screening(scores, projected, left, columns, normal, times)
 
 

@@ -199,8 +199,10 @@ def _on_more(seen: Steps, model: Model, accepted: Sequence[str], setting: Settin
 
 
 def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model:
-    """The model with every number of its effects: on a part of the data some were invisible."""
+    """The model with every number of its effects (in the form they have): on a part of the data some were invisible."""
     nuisance = tuple(t for t in model.terms if not t.effect)
-    terms = nuisance + tuple(t for name in accepted for t in CATALOGUE[name].terms(setting))
+    terms = nuisance + tuple(
+        t for name in accepted for t in CATALOGUE[name].form_of(model.of(name), CATALOGUE[name].terms(setting))
+    )
     known = {(t.effect, t.symbol): v for t, v in zip(model.terms, model.values, strict=True)}
     return Model(model.nominal, terms, tuple(known.get((t.effect, t.symbol), t.start) for t in terms))

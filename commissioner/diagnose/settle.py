@@ -24,6 +24,9 @@ SETTLED_SAMPLES, PLACED_SAMPLES = 160_000, 45_000
 """On so many, loops are settled and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
+REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,)}
+"""Indices of the numbers that only refine a clock, a delay or a lag."""
+WARMING = frozenset({"stator_heating", "rotor_heating"})
 
 
 def settled(current: Fit, record: Record, layout: Layout, noise: Noise, *, is_placed: bool) -> tuple[Fit, Layout]:
@@ -162,14 +165,15 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 
 def _spare(model: Model, record: Record) -> list[list[int]]:
-    """Rows of theta that may as well be zero: each memory operator and second path; what only refines a clock, a delay or a lag;
+    """Rows of theta that may as well be zero: each memory operator, second path and course of heat; what only refines a clock, a
 
-    and of what a segment may begin with, the flux that is left there anew, or what it inherits.
+    delay or a lag; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
     """
     rows = list(enumerate(model.terms, 4))
-    groups = [[k for k, t in rows if t.kind == kind and t.index > 0] for kind in (kinds.CLOCK, kinds.DELAY, kinds.LAG)]
+    alone = [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH) or t.effect in WARMING]
+    groups = [[k for k, t in rows if t.kind == kind and t.index in refined] for kind, refined in REFINING.items()]
     inheriting = {s.uid for s in record.segments if np.any(s.flux_before_wb)}
     left_anew = [k for k, t in rows if t.effect == "remanence" and t.segment in inheriting]
     if left_anew:
         groups += [left_anew, [k for k, t in rows if t.kind == kinds.CARRY]]
-    return [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH)] + [group for group in groups if group]
+    return alone + [group for group in groups if group]

@@ -22,7 +22,7 @@ from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import with_flux_before
 from commissioner.diagnose.record import Record
-from commissioner.diagnose.screen import Screening, price, required_chi2, screen
+from commissioner.diagnose.screen import Score, Screening, price, required_chi2, screen
 from commissioner.diagnose.settle import placed
 
 MOST_CAUSES = 6
@@ -159,7 +159,7 @@ class Steps:
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
             wanted = max(self._guard(losses, score.name), self.threshold(score.numbers))
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
-            trial = self._tried(current, score.name, current.chi2 - to_beat)
+            trial = self._tried(current, score, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
             is_sound = is_plausible(trial.model, score.name, self.setting)
@@ -174,11 +174,11 @@ class Steps:
                 best = (net, score.name, trial)
         return None if best is None or self._is_crumb(current, best[2]) else (best[1], best[2])
 
-    def _tried(self, current: Fit, name: str, wanted_chi2: float) -> Fit:
+    def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
         """The refit with one more cause; lines looked for meanwhile concern only their own causes."""
-        known = self._known(current)
+        known, name = self._known(current), score.name
         if name not in known or not known[name].has_converged or name in LINES.values():
-            model = current.model.with_terms(CATALOGUE[name].terms(self.setting))
+            model = current.model.with_terms(score.form)
             known[name] = fit(model, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
         return known[name]
 

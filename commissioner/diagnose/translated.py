@@ -13,6 +13,7 @@ import numpy as np
 
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.effects.effect import listed, spline_value
+from commissioner.diagnose.effects.magnetics import warming
 from commissioner.diagnose.model import Model
 
 PLATE = (
@@ -21,6 +22,8 @@ PLATE = (
 )  # fmt: skip
 FULL_SCALE = 3.0
 """Sensor range of the scenario over the rated peak current; half again what the diagnosis calls full scale."""
+ADIABATIC_S = 1e6
+"""Time constant of heat that does not leak away."""
 ROOT_AT_HALF, SIM_RANGE = 0.577, FULL_SCALE / 2.0
 
 Numbers = Mapping[str, float]
@@ -78,6 +81,12 @@ def _sag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Ent
     lags = [1e-3 * float(symbol[4:-2]) for symbol in values]
     mean = float(np.average(lags, weights=[max(v, 1e-12) for v in values.values()]))
     return {"size": sizes["sag_at_rated_power"], "time_constant_s": mean}
+
+
+def _heat(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    """All of the heat with the one leak that bends its course as they do together."""
+    rise, leak = warming(setting, values)
+    return {"size": rise, "time_constant_s": 1.0 / max(leak, 1.0 / ADIABATIC_S)}
 
 
 def _lag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
@@ -180,7 +189,8 @@ def _clock(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> E
     wander = values.get("wander_sin", 0.0)
     if abs(wander) > abs(sizes["drift_ppm"]):
         return {"size": -wander, "shape": "wandering"}
-    return {"size": -sizes["drift_ppm"]}
+    runs_on = abs(values.get("running", 0.0)) > abs(values.get("drift", 0.0))
+    return {"size": -sizes["drift_ppm"], "runs_on": float(runs_on)}
 
 
 TRANSLATED: dict[str, Translate] = {
@@ -189,7 +199,7 @@ TRANSLATED: dict[str, Translate] = {
     "sensor_lag": _lag, "magnetizing_saturation": _saturation,
     "magnetic_hysteresis": _hysteresis, "remanence": _remanence, "leakage_saturation": _leakage,
     "rotor_skin_effect": _skin, "iron_loss": _size("conductance_ms", 1e-3),
-    "stator_heating": _size("rise_per_minute_at_rated_current"), "rotor_heating": _size("rise_per_minute_at_rated_current"),
+    "stator_heating": _heat, "rotor_heating": _heat,
     "sensor_offset": _phases("offset"), "sensor_drift": _phases("drift"), "sensor_gain_mismatch": _phases("gain"),
     "sensor_nonlinearity": _sensor, "quantization": _size("step_a"),
     "clipping": lambda sizes, values, setting, model: {

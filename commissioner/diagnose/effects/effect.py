@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,11 @@ class Setting:
         return len({round(s.axis_deg % 180.0, 3) for s in self.record.segments})
 
     @property
+    def spans_segments(self) -> bool:
+        """Whether some segment is recorded after another, by the time stamps of one file."""
+        return any(s.age_s > 0.0 for s in self.record.segments)
+
+    @property
     def link_varies(self) -> bool:
         ratios = [float(np.mean(s.link_ratio)) for s in self.record.segments]
         return max(ratios) > 1.05 * min(ratios)
@@ -62,16 +67,31 @@ class Effect:
     split_by: str
     course: str = ""
     """What the names of numbers begin with that together are one free function of time: all one, it is one."""
+    either: tuple[tuple[str, ...], ...] = ()
+    """Sets of its numbers' names of which but one is at work."""
+
+    def forms(self, terms: Sequence[Term]) -> tuple[tuple[Term, ...], ...]:
+        """The sets of these numbers that may be at work together."""
+        if not self.either:
+            return (tuple(terms),)
+        sets = (tuple(t for t in terms if t.symbol in names) for names in self.either)
+        return tuple(s for s in sets if s)
+
+    def form_of(self, symbols: Collection[str], terms: Sequence[Term]) -> tuple[Term, ...]:
+        """Of the sets of these numbers the one that has most of these names."""
+        return max(self.forms(terms), key=lambda form: sum(t.symbol in symbols for t in form), default=())
+
 
 
 def effect(
     name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
     split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes], course: str = "",
+    either: tuple[tuple[str, ...], ...] = (),
 ) -> Callable[[Callable[[Setting], tuple[Term, ...]]], Effect]:
     """Turns the function that lists an effect's terms into its catalogue entry."""
 
     def enter(terms: Callable[[Setting], tuple[Term, ...]]) -> Effect:
-        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course)
+        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course, either)
         object.__setattr__(entry, "__doc__", terms.__doc__)
         return entry
 

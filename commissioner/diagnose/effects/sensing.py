@@ -224,20 +224,28 @@ def mains_pickup(setting: Setting) -> tuple[Term, ...]:
 
 def _clock_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     wander = float(np.hypot(values.get("wander_cos", 0.0), values.get("wander_sin", 0.0)))
-    drift = values.get("drift", 0.0)
+    drift = values.get("drift", 0.0) + values.get("running", 0.0)
     sizes = {"drift_ppm": (drift, "ppm"), "wander_ppm": (wander, "ppm")}
     return sizes if abs(drift) >= wander else dict(reversed(sizes.items()))
 
 
+RESTARTS, RUNS_ON = ("drift", "wander_cos", "wander_sin"), ("running",)
+"""A clock that is set anew with every segment, and one that is not."""
+
+
 @effect(
     "clock_drift", "Current and voltage clocks that run apart", sign=0, family="drifting", sizes=_clock_sizes,
-    signature="a delay that grows with time within the segment",
+    either=(RESTARTS, RUNS_ON),
+    signature="a delay that grows with time within the segment, or over the whole recording",
     confounders=("stator_heating", "lost_samples"), source="i(t - eps t), eps in ppm; crystal tolerance",
     split_by="a longer segment",
 )
 def clock_drift(setting: Setting) -> tuple[Term, ...]:
-    """eps [ppm] from the start of each segment, and a rate that wanders."""
-    symbols = ("drift", "wander_cos", "wander_sin")
+    """eps [ppm] from the start of each segment, and a rate that wanders; or from the start of the recording: a clock that runs
+
+    on while the next segment is prepared.
+    """
+    symbols = RESTARTS + (RUNS_ON if setting.spans_segments else ())
     return tuple(Term("clock_drift", symbol, "ppm", CLOCK, k, 0.01, -2e4, 2e4) for k, symbol in enumerate(symbols))
 
 

@@ -55,9 +55,10 @@ EXACT = {"sampling_delay", "sensor_lag", "sensor_offset", "iron_loss", "inductan
 """Of these, those that both sides also solve alike."""
 
 
-def found(name, setting):
+def found(name, setting, numbers=None):
     terms = CATALOGUE[name].terms(setting)
-    values = tuple(VALUES[name].get(t.symbol, 0.0) for t in terms)
+    numbers = numbers or VALUES[name]
+    values = tuple(numbers.get(t.symbol, 0.0) for t in terms)
     model = Model(NOMINAL, terms, values)
     sizes = {k: (v, 0.0, u) for k, (v, u) in CATALOGUE[name].sizes(setting, model.of(name)).items()}
     cause = SimpleNamespace(name=name, sizes=sizes)
@@ -100,6 +101,17 @@ def test_the_file_keeps_the_model_and_the_simulator_translates_it(name, setting)
     effect = np.sqrt(np.mean((ours - nominal) ** 2))
     assert effect > 1e-4 * np.abs(nominal).max()
     assert np.sqrt(np.mean((theirs - ours) ** 2)) < (0.01 if name in EXACT else 0.1 if name in EQUAL else 0.55) * effect
+
+
+def test_a_clock_that_runs_on_does_so_on_both_sides(setting):
+    document = json.loads(json.dumps(model_document(*found("clock_drift", setting, {"running": 15.0}))))
+    columns = simulated(document)
+    theirs = np.stack([columns[f"current_{p}_a"] for p in "uvw"])
+    ours, nominal = played(document, setting, columns), played(plain(document), setting, columns)
+    last = slice(2 * theirs.shape[1] // 3, None)
+    effect = np.sqrt(np.mean((ours - nominal)[:, last] ** 2))
+    assert effect > 4.0 * np.sqrt(np.mean((ours - nominal)[:, : theirs.shape[1] // 3] ** 2))
+    assert np.sqrt(np.mean((theirs - ours)[:, last] ** 2)) < 0.1 * effect
 
 
 def test_the_model_without_effects_is_the_plain_motor_on_both_sides(setting):
