@@ -68,10 +68,25 @@ def search(
     record: Record, noise: Noise, *, excluded: Sequence[str] = (), report: Report = lambda _: None,
     check: Callable[[Fit, Record], None] | None = None, go_on: Callable[[], bool] = lambda: True,
 ) -> Found:
-    """Accepted causes of the whole record: explored on a part, confirmed and completed on all of it.
+    """Accepted causes of the whole record. Where lost samples were put right first and much is left, another cause may have looked
+
+    like them: sought again in the data as they came.
 
     `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
     """
+    found = _searched(record, noise, excluded, report, check, go_on)
+    if not found.losses or not _leaves(UNKNOWN_SIGMA, found.fit, found.nominal, noise):
+        return found
+    report("much is left beside lost samples: sought again in the data as they came")
+    other = _searched(record, noise, (*excluded, "lost_samples"), report, None, go_on)
+    return other if other.fit.normal.unexplained < found.fit.normal.unexplained else found
+
+
+def _searched(
+    record: Record, noise: Noise, excluded: Sequence[str], report: Report, check: Callable[[Fit, Record], None] | None,
+    go_on: Callable[[], bool],
+) -> Found:
+    """Explored on a part, confirmed and completed on all of the record."""
     part, bare = record.beginning(EXPLORED[0]), bare_layout(record)
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     losses: tuple[Loss, ...] = ()
