@@ -18,7 +18,7 @@ from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
 
 Array = NDArray[np.float64]
-SAG_LAGS_S = (0.001, 0.01, 0.1)
+SAG_LAGS_S = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
 HEAT_LEAKS_S = {"": np.inf, "_20s": 20.0, "_6s": 6.0}
 """Time constants (s) with which heat leaks away, by how the names end: in sums of these every course with one of 5 s or more is
 
@@ -189,18 +189,23 @@ def _since_start(record: Record, segment: Segment) -> Array:
 
 
 def _sag(record: Record) -> Named:
-    """Minus lagged electrical power over rated power; the command of a sample acts on the current until the next."""
-    period, out = record.facts.sample_period_s, []
-    for segment in record.segments:
-        current = segment.axis_current_a
-        over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
-        power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
-        columns = []
-        for lag in SAG_LAGS_S:
-            a = 1.0 - float(np.exp(-period / lag))
-            columns.append(-lfilter([a], [1.0, a - 1.0], power))
-        out.append(np.stack(columns, axis=1))
-    return tuple(f"sag_{lag * 1e3:.0f}ms" for lag in SAG_LAGS_S), out
+    """Minus lagged electrical power over rated power."""
+    out = [-np.stack([lagged_power(record, s, lag) for lag in SAG_LAGS_S], axis=1) for s in record.segments]
+    return tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S), out
+
+
+def lagged_power(record: Record, segment: Segment, lag_s: float) -> Array:
+    """Mean over each period, (n,), of the electrical power over rated power behind a lag; the command of a sample acts on the
+
+    current until the next.
+    """
+    current = segment.axis_current_a
+    over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
+    power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
+    periods = record.facts.sample_period_s / lag_s
+    arrives = -float(np.expm1(-periods))
+    before = lfilter([0.0, arrives], [1.0, arrives - 1.0], power)
+    return np.asarray(power + (before - power) * arrives / periods)
 
 
 def _hats(record: Record) -> Named:

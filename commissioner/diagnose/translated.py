@@ -13,6 +13,7 @@ import numpy as np
 
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.effects.effect import listed, spline_value
+from commissioner.diagnose.effects.inverter import sagging
 from commissioner.diagnose.effects.magnetics import warming
 from commissioner.diagnose.model import Model
 
@@ -77,10 +78,9 @@ def _legs(half_over_knee: float) -> Translate:
 
 
 def _sag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
-    """All of the sag through its mean lag (symbols `sag_10ms`)."""
-    lags = [1e-3 * float(symbol[4:-2]) for symbol in values]
-    mean = float(np.average(lags, weights=[max(v, 1e-12) for v in values.values()]))
-    return {"size": sizes["sag_at_rated_power"], "time_constant_s": mean}
+    """All of the sag through the one lag that comes nearest."""
+    size, lag = sagging(setting, values)
+    return {"size": size, "time_constant_s": lag}
 
 
 def _heat(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:

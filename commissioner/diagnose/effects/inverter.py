@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.channels import SAG_LAGS_S, lagged_power
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
 from commissioner.diagnose.kinds import CABLE
 from commissioner.diagnose.model import Term
+
+Array = NDArray[np.float64]
+SAG_SAMPLES = 4000
+"""Of every segment, on which a sag of several lags is read as one of a single lag."""
 
 
 def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -65,8 +72,35 @@ def device_drop(setting: Setting) -> tuple[Term, ...]:
     return _legs("device_drop", kinds.LEGS, setting) if setting.link_varies else ()
 
 
+def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float]:
+    """Sag at rated power and time constant (s) of the one lag whose loss of voltage comes nearest to the sum of these, but for a
+
+    constant: that only scales the four numbers, so that several lags in place of one between them have any sum.
+    """
+    record = setting.record
+    first = [s.first(SAG_SAMPLES) for s in record.segments]
+    weight = np.concatenate([s.voltage_axis_v for s in first])
+    course = np.concatenate([
+        sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
+    ])
+
+    def one(log_lag: float) -> Array:
+        return -np.concatenate([lagged_power(record, s, float(np.exp(log_lag))) for s in first])
+
+    def nearest(log_lag: float) -> tuple[Array, float]:
+        table = np.stack([one(log_lag), np.ones(course.size)], axis=1) * weight[:, None]
+        found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
+        return found, float(np.linalg.norm(weight * course - table @ found))
+
+    tried = np.log(SAG_LAGS_S)
+    at = int(np.argmin([nearest(x)[1] for x in tried]))
+    ends = tried[max(at - 1, 0)], tried[min(at + 1, tried.size - 1)]
+    best = float(minimize_scalar(lambda x: nearest(x)[1], bounds=ends, method="bounded", options={"xatol": 1e-3}).x)
+    return max(float(nearest(best)[0][0]), 0.0), float(np.exp(best))
+
+
 def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"sag_at_rated_power": (float(sum(values.values())), "1")}
+    return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
 
 
 @effect(
@@ -77,7 +111,7 @@ def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="record the DC-link voltage, or repeat at another amplitude",
 )
 def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
-    """Relative loss of voltage at rated power, k >= 0, through first-order lags of 1, 10 and 100 ms (a dictionary)."""
+    """Relative loss of voltage at rated power, k >= 0, through first-order lags of 0.3 to 100 ms (a dictionary)."""
     names = [n for n in setting.record.channel_names if n.startswith("sag_")]
     return tuple(
         Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
