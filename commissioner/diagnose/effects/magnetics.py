@@ -94,12 +94,21 @@ def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
     return (*loops, _split("magnetic_hysteresis"))
 
 
+SAME_FLUX = 0.2
+"""Of their mean: fluxes left before the segments that differ by less are one."""
+
+
 def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    """The one flux that is left before every segment (their mean), or the largest."""
     pairs: dict[str, list[float]] = {}
     for name, value in values.items():
         pairs.setdefault(name.rpartition("_")[2], []).append(value)
-    largest = max((float(np.linalg.norm(p)) for p in pairs.values() if len(p) == 2), default=0.0)
-    return {"flux_wb": (largest, "Wb")}
+    vectors = np.array([p for p in pairs.values() if len(p) == 2]).reshape(-1, 2)
+    mean = vectors.mean(axis=0) if vectors.size else np.zeros(2)
+    apart = np.linalg.norm(vectors - mean, axis=1).max(initial=0.0)
+    is_one = apart < SAME_FLUX * np.linalg.norm(mean)
+    size = np.linalg.norm(mean) if is_one else np.linalg.norm(vectors, axis=1).max(initial=0.0)
+    return {"flux_wb": (float(size), "Wb")}
 
 
 @effect(
