@@ -68,6 +68,9 @@ class Machine:
     """Of the rotor's leakage that a second cage of three times the resistance shunts."""
     bar_s: float = 0.0
     """Time of diffusion through a solid bar of constant width, whose impedance is r_r x coth x, x^2 = s bar_s."""
+    sag: float = 0.0
+    """Share of the voltage that is missing at rated power, behind a lag of `sag_s`."""
+    sag_s: float = 0.01
     left_wb: complex = 0.0
     """Flux of the open rotor's current, at the stator, when each segment begins."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
@@ -121,7 +124,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.bar_share, m.bar_s)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s)
 
 
 @njit(cache=True)
@@ -175,11 +178,11 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
         d[5] = x[6]
         d[6] = turn * turn * (i_s - x[5]) - math.sqrt(2.0) * turn * x[6]
     seen = x[4] if lag > 0.0 else (x[5] if turn > 0.0 else i_s)
-    return d, seen
+    return d, seen, i_s
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, bar, diffusion):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, sag, sag_s, bar, diffusion):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -189,19 +192,23 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
     out = np.zeros(n, dtype=np.complex128)
     at = 0
     v = 0.0j
+    load = 0.0
     for k in range(n):
         r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             memory[at % (late + 1)] = seen
             if step == 0:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
-                v = volts[k]
-                k1, seen = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+                v = volts[k] * (1.0 - sag * load)
+                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             at += 1
-            k2, seen = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
-            k3, seen = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
-            k4, seen = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            if sag > 0.0:
+                load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - load)
+                v = volts[k] * (1.0 - sag * load)
     return out
