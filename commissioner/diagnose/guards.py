@@ -8,6 +8,7 @@ import numpy as np
 
 from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.sensing import RESTARTS, RUNS_ON
 from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.reading import clock_courses
@@ -54,7 +55,7 @@ LEAST_BESIDE = 800.0
 """Lost samples must gain at least so much beside accepted causes."""
 MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
 """Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
-CLOCK_RATES = ("drift", "wander_cos", "wander_sin", "running")
+CLOCK_RATES = RESTARTS + RUNS_ON
 SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LEAST_SLOPE_LOST = 0.25

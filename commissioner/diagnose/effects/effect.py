@@ -82,7 +82,6 @@ class Effect:
         return max(self.forms(terms), key=lambda form: sum(t.symbol in symbols for t in form), default=())
 
 
-
 def effect(
     name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
     split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes], course: str = "",

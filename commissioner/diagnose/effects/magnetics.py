@@ -177,9 +177,9 @@ def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="tones on both sides of the corner, 20 Hz to 1 kHz",
 )
 def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
-    """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners fixed from 12 to 800 Hz, a factor 2 apart.
+    """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners from 12.5 to 800 Hz, two thirds of an octave apart, and closer
 
-    No branch carries more than a hundred times the motor's own conductance: a bar's resistance rises tenfold at most.
+    where one acts. No branch carries more than a hundred times the motor's own conductance: a bar's resistance rises tenfold at most.
     """
     # the box ends at 6 times the resistance seen at the tones (`nominal.bare_layout`)
     largest = 600.0 / setting.layout.nominal_box[1][1] if np.isfinite(setting.layout.nominal_box[1][1]) else np.inf
