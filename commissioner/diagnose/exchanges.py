@@ -109,7 +109,7 @@ def regrouped(
         if to_beat < trial.chi2 < to_beat + NEARLY * (without.chi2 - current.chi2):
             trial, there = with_closer_paths(trial, setting, noise, to_beat)
         is_sound = all(
-            is_plausible(trial.model, n, setting) and loss_without(trial, n) > threshold(screening.scores[n].numbers)
+            is_plausible(trial.model, n, there) and loss_without(trial, n) > threshold(screening.scores[n].numbers)
             for n in group
         )
         report(f"  instead of {'+'.join(mine)} {'+'.join(group)}: gained {current.chi2 - trial.chi2:.4g} more")
