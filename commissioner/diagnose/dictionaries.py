@@ -12,12 +12,13 @@ from scipy.optimize import lsq_linear
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Fit, fit, normal_equations
+from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, with_ranges
 from commissioner.diagnose.screen import required_chi2
 from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves
+from commissioner.diagnose.trial import Trial
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -96,7 +97,7 @@ def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
     """The fit that begins with the model's curves and loops as they are or at zero, whichever is nearer."""
     starts = [model] if (flat := without_curves(model)).values == model.values else [model, flat]
     if len(starts) > 1:
-        chi2 = [normal_equations(m, setting.record, setting.layout, (), noise).total_chi2 for m in starts]
+        chi2 = [Trial(m, setting.record, setting.layout, (), noise).chi2 for m in starts]
         if not chi2[0] <= chi2[1]:
             starts.reverse()
     return fit(starts[0], setting.record, setting.layout, noise)

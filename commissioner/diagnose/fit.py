@@ -1,22 +1,18 @@
-"""Output-error fits: normal equations gathered segment by segment, Gauss-Newton with bounds and damping.
-
-Only Gram matrices leave a segment, so memory does not grow with the recording and leave-one-segment-out estimates
-are a subtraction.
-"""
+"""Output-error fits: Gauss-Newton with bounds and damping on the normal equations of a record."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from commissioner.diagnose.model import Layout, Model, Term
+from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.plant import predict
-from commissioner.diagnose.record import Record, each_segment
+from commissioner.diagnose.record import Record
+from commissioner.diagnose.trial import Normal, Trial
 
 Array = NDArray[np.float64]
 TRIFLE = 1e-4
@@ -28,37 +24,6 @@ TOLERANCE_OF_A_NUMBER = 0.02
 """Chi2 per number that a fit may leave: each takes 1 from noise alone, so that it lies a seventh of its spread from the optimum."""
 LEAST_EIGENVALUE = 1e-11
 """Of the largest: below it is rounding."""
-SLICE = 12 * 1024
-"""Samples whitened at once in white noise: a multiple of every block a screening averages over."""
-
-
-@dataclass(frozen=True)
-class Normal:
-    """Whitened normal equations per segment: `gram` (s, P, P), `slope` (s, P), `chi2` (s,), `count` (s,) samples."""
-
-    gram: Array
-    slope: Array
-    chi2: Array
-    count: Array
-
-    @property
-    def total_gram(self) -> Array:
-        total: Array = self.gram.sum(axis=0)
-        return total
-
-    @property
-    def total_slope(self) -> Array:
-        total: Array = self.slope.sum(axis=0)
-        return total
-
-    @property
-    def total_chi2(self) -> float:
-        return float(self.chi2.sum())
-
-    @property
-    def unexplained(self) -> float:
-        """Chi2 above what the noise makes, which is 1 for every sample."""
-        return self.total_chi2 - float(self.count.sum())
 
 
 @dataclass(frozen=True)
@@ -97,98 +62,6 @@ def inverse(information: Array) -> Array:
     scale = np.maximum(scale, 1e-9 * max(float(scale.max(initial=0.0)), 1e-150))
     unit = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(information / unit, rcond=1e-12, hermitian=True) / unit, dtype=np.float64)
-
-
-def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:
-    """`(..., phases, n)` residual or sensitivities -> `(..., m)` with unit noise variance; masked samples drop out."""
-    if noise.is_white:
-        scaled = signal / noise.sigma_a[:, None]
-        if not is_good.all():
-            scaled = scaled[..., is_good]
-        return np.ascontiguousarray(scaled.reshape(*signal.shape[:-2], -1))
-    n = signal.shape[-1]
-    weights = noise.weights(n, period_s)
-    masked = np.where(is_good, signal, 0.0) if not is_good.all() else signal
-    spectrum = np.fft.rfft(masked, axis=-1)
-    scale = np.full(weights.shape[1], np.sqrt(2.0 / n))
-    scale[0] = np.sqrt(1.0 / n)
-    if n % 2 == 0:
-        scale[-1] = np.sqrt(1.0 / n)
-    spectrum *= scale / weights
-    # real and imaginary parts side by side
-    return spectrum.view(np.float64).reshape(*signal.shape[:-2], -1)
-
-
-def normal_equations(
-    model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise, block: int = 1
-) -> Normal:
-    """Gram matrix and slope of the whitened residual for the four and `wanted`, one block per segment.
-
-    `block` > 1 averages so many neighbouring samples first (white noise only): a screening needs no more bandwidth
-    than the excitation has.
-    """
-    size = 4 + len(wanted)
-
-    def _sensitivities(k: int, here: Sequence[Term]) -> tuple[Array, Array]:
-        prediction = predict(model, record, k, layout, here)
-        return prediction.jacobian, record.segments[k].currents_a - prediction.currents_a
-
-    def _product(jacobian: Array, residual: Array, good: NDArray[np.bool_]) -> Array:
-        """Whitened Gram matrix of all directions and, last, the residual: in slices where noise is white, never copied whole."""
-        size = jacobian.shape[0] + 1
-        total = np.zeros((size, size))
-        length = SLICE if noise.is_white else max(residual.shape[1], 1)
-        for start in range(0, residual.shape[1], length):
-            part = slice(start, start + length)
-            kept = good[part]
-            both = [jacobian[..., part], residual[None, :, part]]
-            if block > 1 and noise.is_white:
-                both, kept = [_averaged(x, block) for x in both], _whole(kept, block)
-            directions, left = (whiten(x, kept, noise, record.facts.sample_period_s) for x in both)
-            total[:-1, :-1] += directions @ directions.T
-            total[:-1, -1] += directions @ left[0]
-            total[-1, -1] += left[0] @ left[0]
-        return total
-
-    def of_segment(k: int) -> tuple[Array, Array, float, int]:
-        # a trial step may be far too long, and the setting of the caller's thread does not hold in another
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            return _of_segment(k)
-
-    def _of_segment(k: int) -> tuple[Array, Array, float, int]:
-        segment = record.segments[k]
-        here = [c for c, term in enumerate(wanted) if term.segment in (-1, segment.uid)]
-        rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
-        product = _product(*_sensitivities(k, [wanted[c] for c in here]), segment.is_good)
-        gram, slope = np.zeros((size, size)), np.zeros(size)
-        gram[np.ix_(rows, rows)] = product[:-1, :-1]
-        slope[rows] = product[:-1, -1]
-        return gram, slope, float(product[-1, -1]), int(segment.is_good.sum()) * record.facts.phases
-
-    grams, slopes, chi2, counts = (list(column) for column in zip(*each_segment(of_segment, record), strict=True))
-    prior = layout.penalty(wanted)
-    if prior.any():
-        theta = np.zeros(size)
-        known = {(t.effect, t.symbol): x for t, x in zip(model.terms, model.theta[4:], strict=True)}
-        theta[4:] = [known.get((t.effect, t.symbol), 0.0) for t in wanted]
-        grams.append(prior)
-        slopes.append(-prior @ theta)
-        chi2.append(float(theta @ prior @ theta))
-        counts.append(0)
-    return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
-
-
-def _averaged(signal: Array, block: int) -> Array:
-    """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
-    n = signal.shape[-1] // block * block
-    summed: Array = signal[..., :n].reshape(*signal.shape[:-1], -1, block).sum(axis=-1) / np.sqrt(block)
-    return summed
-
-
-def _whole(good: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
-    """Blocks whose every sample is good."""
-    whole: NDArray[np.bool_] = np.asarray(good[: good.size // block * block].reshape(-1, block).all(axis=1))
-    return whole
 
 
 def bounded_step(gram: Array, slope: Array, lower: Array, upper: Array, damping: float) -> Array:
@@ -250,7 +123,7 @@ def fit(
     """
     damping = 1e-9
     tolerance = max(tolerance, TOLERANCE_OF_A_NUMBER * (4 + len(model.terms)))
-    normal = normal_equations(model, record, layout, model.terms, noise)
+    normal = Trial(model, record, layout, model.terms, noise).normal()
     if not np.isfinite(normal.total_gram).all():
         return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)
     dull = 0
@@ -267,17 +140,18 @@ def fit(
                 return Fit(model, normal, True, done)
             if normal.total_chi2 - PATIENCE * promised > wanted_chi2:
                 return Fit(model, normal, False, done)
-            trial = model.moved(theta + step)
-            # the tangent costs little beside the trajectory: not worth looking at chi2 first
-            there = normal_equations(trial, record, layout, trial.terms, noise)
-            if np.isfinite(there.total_gram).all() and there.total_chi2 < normal.total_chi2:
-                improved = True
+            moved = model.moved(theta + step)
+            trial = Trial(moved, record, layout, moved.terms, noise)
+            if trial.chi2 < normal.total_chi2:
+                there = trial.normal()
+                improved = bool(np.isfinite(there.total_gram).all())
+            if improved:
                 break
             damping, was_shortened = max(10.0 * damping, 1e-4), True
         if not improved:
             return Fit(model, normal, False, done)
         gained = normal.total_chi2 - there.total_chi2
-        model, normal = trial, there
+        model, normal = moved, there
         if gained <= 0.5 * promised:
             damping *= 3.0
         elif not was_shortened:

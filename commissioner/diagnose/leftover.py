@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
-from commissioner.diagnose.fit import whiten
 from commissioner.diagnose.guards import MATERIAL_SHARE
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
+from commissioner.diagnose.trial import whiten
 
 Array = NDArray[np.float64]
 TONE_BINS, BESIDE_BINS = 3, 25

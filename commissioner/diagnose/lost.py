@@ -15,11 +15,11 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from commissioner.diagnose.fit import whiten
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import exact_step, predict
 from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
+from commissioner.diagnose.trial import whiten
 
 Array = NDArray[np.float64]
 MOST_EVENTS = 16

@@ -36,15 +36,19 @@ class Prediction:
 
 
 def predict(
-    model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term] | None = None
+    model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term] | None = None,
+    path: Path | None = None,
 ) -> Prediction:
-    """Segment `position` as the model sees it. `wanted` None: no jacobian; else derivatives for the four and `wanted`."""
+    """Segment `position` as the model sees it. `wanted` None: no jacobian; else derivatives for the four and `wanted`.
+
+    `path` is the trajectory where it is known already.
+    """
     segment = record.segments[position]
-    channels = record.channels[position] if record.channels else np.zeros((segment.count, 1))
+    channels = _channels(record, position)
     listed = [] if wanted is None else list(wanted)
-    inside = [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
+    inside = _inside(listed, segment)
     asked = [listed[k] for k in inside]
-    path = _trajectory(model, segment, channels, layout, asked)
+    path = path or trajectory(model, record, position, layout, listed)
     jacobian = np.zeros((0, record.facts.phases, segment.count))
     if wanted is not None:
         jacobian = np.zeros((4 + len(listed), record.facts.phases, segment.count))
@@ -54,8 +58,8 @@ def predict(
         ])
         _to_phases(_tangent(path, model, segment, channels, layout, asked), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
     held_v = segment.voltage_ab_v * path.drive[2]
-    trajectory = (path.current, path.after, path.before)
-    measured = sense(model, record, segment, channels, layout, trajectory, held_v, jacobian, listed)
+    terminal = (path.current, path.after, path.before)
+    measured = sense(model, record, segment, channels, layout, terminal, held_v, jacobian, listed)
     nu = path.machine[0][4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
     leakage = (path.states[:-1, 0:2] - path.machine[0][12] * path.states[:-1, 2:4]).T
@@ -72,7 +76,7 @@ def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -
 
 
 @dataclass(frozen=True)
-class _Path:
+class Path:
     """A trajectory and what it was driven by: `drive` known functions of time, `machine` constants and dictionaries."""
 
     states: Array
@@ -85,7 +89,19 @@ class _Path:
     machine: tuple[Any, ...]
 
 
-def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]) -> _Path:
+def _channels(record: Record, position: int) -> Array:
+    return record.channels[position] if record.channels else np.zeros((record.segments[position].count, 1))
+
+
+def _inside(listed: Sequence[Term], segment: Segment) -> list[int]:
+    """Which of the terms act on the motor's side of the terminals, in this segment."""
+    return [k for k, t in enumerate(listed) if t.kind < kinds.FIRST_OF_SENSING and t.segment in (-1, segment.uid)]
+
+
+def trajectory(model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term]) -> Path:
+    """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`."""
+    segment, channels = record.segments[position], _channels(record, position)
+    asked = [wanted[k] for k in _inside(wanted, segment)]
     drive = _drive(model, segment, channels)
     machine = _machine(model, layout, asked)
     period = segment.period_s
@@ -98,7 +114,7 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
         transition, gain, output, slope = exact_step(model.nominal, period)
         states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
         rotor = states[:-1, 2:4].T / model.nominal[3] - current
-        return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     if not acting & kinds.NONLINEAR:
         base, branches = machine[0], machine[-2:]
         rate = _fastest(model, *branches) * period
@@ -107,11 +123,11 @@ def _trajectory(model: Model, segment: Segment, channels: Array, layout: Layout,
         states, current, after, before, rotor = propagate_varying(
             va, vb, *factors, period, steps, _taylor_order(rate / steps), base, *branches, start
         )
-        return _Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
         va, vb, *drive, period, _substeps(model, layout, segment, asked), layout.crossing_substeps, *machine, start
     )
-    return _Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
+    return Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
 
 
 def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
@@ -129,7 +145,7 @@ def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> t
 
 
 def _tangent(
-    path: _Path, model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]
+    path: Path, model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]
 ) -> Array:
     wanted = {t.kind for t in asked}
     place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}

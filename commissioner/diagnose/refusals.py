@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.diagnose.fit import Fit, whiten
+from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
+from commissioner.diagnose.trial import whiten
 
 MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""

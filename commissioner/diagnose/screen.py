@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Normal, bounded_step, normal_equations
+from commissioner.diagnose.fit import bounded_step
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
+from commissioner.diagnose.trial import Normal, Trial
 
 Array = NDArray[np.float64]
 STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER = 40.0, 10.0
@@ -88,7 +89,7 @@ def screen(
     candidates = {name: CATALOGUE[name].terms(setting) for name in absent}
     candidates = {name: terms for name, terms in candidates.items() if terms}
     wanted = [*model.terms, *(t for terms in candidates.values() for t in terms)]
-    normal = normal_equations(model, record, layout, wanted, noise, _block(record))
+    normal = Trial(model, record, layout, wanted, noise).normal(_block(record))
     return score(model, normal, candidates, setting, whole / record.samples)
 
 

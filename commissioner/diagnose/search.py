@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.dictionaries import begun, carried_over, respread
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.fit import Fit, fit, normal_equations
+from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import guard_of_lost_samples, losses_of
 from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.model import Layout, Model
@@ -25,6 +25,7 @@ from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
 from commissioner.diagnose.settle import settled
 from commissioner.diagnose.steps import Report, Steps, surely_left
+from commissioner.diagnose.trial import Trial
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
@@ -111,7 +112,7 @@ def _searched(
             start = fit(start.model, part, layout, noise)
         else:
             start, here = _on_more(seen, start.model, accepted, here, noise)
-        if accepted and not start.chi2 < normal_equations(nominal.model, part, layout, (), noise).total_chi2:
+        if accepted and not start.chi2 < Trial(nominal.model, part, layout, (), noise).chi2:
             # what fitted the smaller part runs away beyond it
             start, here = fit(nominal.model, part, layout, noise), replace(setting, record=part)
             again = fit(_completed(nominal.model, accepted, here), part, layout, noise)

@@ -5,17 +5,17 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from commissioner.diagnose import fit as module
+from commissioner.diagnose import trial as module
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.fit import normal_equations
 from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.trial import Trial
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
 
 def of_dead_time(setting, nominal, block=1):
     terms = CATALOGUE["dead_time"].terms(setting)
-    return terms, normal_equations(nominal.with_terms(terms), setting.record, setting.layout, terms, WHITE, block)
+    return terms, Trial(nominal.with_terms(terms), setting.record, setting.layout, terms, WHITE).normal(block)
 
 
 @pytest.mark.parametrize("block", [1, 3, 4])
@@ -33,9 +33,9 @@ def test_no_second_copy_of_the_sensitivities_is_held(setting, nominal, monkeypat
     record = setting.record.subset((0,))
     terms = CATALOGUE["dead_time"].terms(setting)
     model = nominal.with_terms(terms)
-    normal_equations(model, record, setting.layout, terms, WHITE)
+    Trial(model, record, setting.layout, terms, WHITE).normal()
     tracemalloc.start()
-    normal_equations(model, record, setting.layout, terms, WHITE)
+    Trial(model, record, setting.layout, terms, WHITE).normal()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     numbers, signals = 4 + len(terms), 60

@@ -7,11 +7,12 @@ import pytest
 
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.evidence import sizes_with_spread
-from commissioner.diagnose.fit import Fit, Normal, fit, inverse
+from commissioner.diagnose.fit import Fit, fit, inverse
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.settle import placed, without_idle_numbers
+from commissioner.diagnose.trial import Normal
 
 SIGMA_A = 0.01
 WHITE = Noise(np.full(3, SIGMA_A), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)

@@ -5,12 +5,12 @@ import pytest
 
 from commissioner.diagnose.alike import look_alikes
 from commissioner.diagnose.document import refused_document
-from commissioner.diagnose.fit import Normal
 from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Facts, Record, Segment
 from commissioner.diagnose.residuals import residuals
 from commissioner.diagnose.screen import Score, Screening
+from commissioner.diagnose.trial import Normal
 from commissioner.report import diagnose_figures as figures
 from commissioner.report.diagnose_numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
 from commissioner.report.diagnose_words import headline, next_promise, next_sentence
