@@ -13,8 +13,8 @@ import numpy as np
 
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.effects.effect import listed, spline_value
+from commissioner.diagnose.effects.heating import warming
 from commissioner.diagnose.effects.inverter import sagging
-from commissioner.diagnose.effects.magnetics import warming
 from commissioner.diagnose.model import Model
 
 PLATE = (

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from commissioner.diagnose.effects import inverter, magnetics, sensing
+from commissioner.diagnose.effects import heating, inverter, magnetics, sensing
 from commissioner.diagnose.effects.effect import Effect, Setting
 
 CATALOGUE: dict[str, Effect] = {
-    entry.name: entry for entry in (*inverter.ENTRIES, *magnetics.ENTRIES, *sensing.ENTRIES)
+    entry.name: entry for entry in (*inverter.ENTRIES, *magnetics.ENTRIES, *heating.ENTRIES, *sensing.ENTRIES)
 }
 
 __all__ = ["CATALOGUE", "Effect", "Setting"]

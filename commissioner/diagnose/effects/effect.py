@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from commissioner.diagnose.model import Layout, Term
 from commissioner.diagnose.record import Facts, Record
@@ -111,3 +112,23 @@ def spline_value(vectors: Array, coefficients: Array, top: float, at: float) -> 
 def listed(values: Mapping[str, float], prefix: str, count: int) -> Array:
     """`prefix_0 ... prefix_{count-1}` as an array, zero where absent."""
     return np.array([values.get(f"{prefix}_{k}", 0.0) for k in range(count)])
+
+
+def nearest_course(
+    course: Array, of: Callable[[float], Array], tried: Array, weight: float | Array = 1.0
+) -> tuple[float, float]:
+    """Size >= 0 and number x of the one course `of(x)` that comes nearest to `course` but for a constant; x from those `tried`
+
+    (ascending) and between them.
+    """
+
+    def nearest(x: float) -> tuple[float, float]:
+        table = np.stack([of(x), np.ones(course.size)], axis=1) * np.broadcast_to(weight, course.size)[:, None]
+        found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
+        found[0] = max(found[0], 0.0)
+        return float(found[0]), float(np.linalg.norm(weight * course - table @ found))
+
+    at = int(np.argmin([nearest(float(x))[1] for x in tried]))
+    ends = float(tried[max(at - 1, 0)]), float(tried[min(at + 1, tried.size - 1)])
+    best = float(minimize_scalar(lambda x: nearest(x)[1], bounds=ends, method="bounded", options={"xatol": 1e-6 * (ends[1] - ends[0])}).x)
+    return nearest(best)[0], best

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import SAG_LAGS_S, lagged_power
-from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
+from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, nearest_course, spline_value
 from commissioner.diagnose.kinds import CABLE
 from commissioner.diagnose.model import Term
 
@@ -84,19 +83,11 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
     ])
 
-    def one(log_lag: float) -> Array:
+    def lagged(log_lag: float) -> Array:
         return -np.concatenate([lagged_power(record, s, float(np.exp(log_lag))) for s in first])
 
-    def nearest(log_lag: float) -> tuple[Array, float]:
-        table = np.stack([one(log_lag), np.ones(course.size)], axis=1) * weight[:, None]
-        found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
-        return found, float(np.linalg.norm(weight * course - table @ found))
-
-    tried = np.log(SAG_LAGS_S)
-    at = int(np.argmin([nearest(x)[1] for x in tried]))
-    ends = tried[max(at - 1, 0)], tried[min(at + 1, tried.size - 1)]
-    best = float(minimize_scalar(lambda x: nearest(x)[1], bounds=ends, method="bounded", options={"xatol": 1e-3}).x)
-    return max(float(nearest(best)[0][0]), 0.0), float(np.exp(best))
+    size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
+    return size, float(np.exp(log_lag))
 
 
 def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:

@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 
 from commissioner.diagnose.channels import HEAT_LEAKS_S, _doses
 from commissioner.diagnose.diagnosis import diagnose
-from commissioner.diagnose.effects.magnetics import warming
+from commissioner.diagnose.effects.heating import warming
 from sim import hidden
 from sim.scenario import build
 from tests.hidden_effects.cases import recording_of
