@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channels import LINES, with_clearer_lines
 from commissioner.diagnose.dictionaries import following, with_closer_radii, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, guard, is_plausible, losses_of, meets_tones
+from commissioner.diagnose.lines import LINES, with_clearer_lines
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import with_flux_before

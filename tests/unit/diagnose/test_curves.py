@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from commissioner.diagnose.channels import with_clearer_lines
 from commissioner.diagnose.dictionaries import carried_over
 from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.lines import with_clearer_lines
 from commissioner.diagnose.model import Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.nominal import with_ranges
 from tests.unit.diagnose.conftest import WHITE

@@ -1,0 +1,194 @@
+"""Lines bound to the mains: ripple of the link and pickup of the sensors, found in a residual and laid down as functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammainccinv
+
+from commissioner.diagnose.audit import excited_lines
+from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.plant import predict
+from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
+
+Array = NDArray[np.float64]
+HARMONICS = {"mains": (3, 5, 7), "ripple": (2,)}
+"""Mains hum comes distorted; a rectifier's ripple is no sine."""
+RIPPLE_HZ = (100.0, 120.0, 300.0, 360.0)
+MAINS_HZ = (50.0, 60.0)
+SEARCH = 0.008
+"""Relative range in which a mains-bound frequency is looked for (grid codes allow 1 %, seconds-long records see less)."""
+AT_A_TONE = 4.0
+"""Lines beside an excited one that count as its own."""
+BY_CHANCE = 1e-6
+"""Chance with which noise makes a line at one frequency that counts as seen."""
+SAME_LINE = 0.02
+"""Turns by which two frequencies may come apart in a segment: every segment has its own phase."""
+LINES = {"ripple": "dc_link_ripple", "mains": "mains_pickup"}
+"""The causes that ride on each kind of line."""
+
+
+def with_clearer_lines(
+    record: Record, model: Model, layout: Layout, noise: Noise, lines: Mapping[str, float], kept: Sequence[str]
+) -> tuple[Record, Mapping[str, float]]:
+    """The record with the lines that a better model shows where they differ from `lines`: a strong cause that was not in the
+
+    model hides them. Lines of the `kept` kinds, which the model has, stay near where they are.
+    """
+    # what the model has of a line is in the residual as well where the line is looked for
+    bare = model
+    for kind in kept:
+        bare = bare.without(LINES[kind])
+    residuals = each_segment(lambda k: record.segments[k].currents_a - predict(bare, record, k, layout).currents_a, record)
+    readings = len(residuals)
+    clear = float(gammainccinv(readings, BY_CHANCE) / gammainccinv(readings, 0.5))
+    longest = max(s.count for s in record.segments) * record.facts.sample_period_s
+    fresh: dict[str, float] = {}
+    for (old, known), (new, (frequency, ratio)) in zip(lines.items(), found_lines(record, residuals, model, noise).items(), strict=True):
+        is_same = old == new and abs(frequency - known) * longest < SAME_LINE
+        is_old = is_same or ratio < clear or (old != new and new.partition("_")[0] in kept)
+        fresh |= {old: known} if is_old else {new: frequency}
+    return (record, lines) if fresh == lines else (with_lines(record, fresh), fresh)
+
+
+def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> dict[str, tuple[float, float]]:
+    """Of ripple and mains each the frequency that explains or stands out most, Hz, and by how much it stands out (`ripple_300`: ...)."""
+    drive = _ripple_drive(record, residuals, model, noise)
+    driven = [_refine(record, drive, base) for base in RIPPLE_HZ]
+    # what is left at the tones, times another tone, may stand out as well, but explains nothing
+    ripple = int(np.argmax(_ripple_gains(record, residuals, model, noise, [frequency for frequency, _ in driven])))
+    picked = [_refine(record, residuals, base) for base in MAINS_HZ]
+    mains = int(np.argmax([ratio for _, ratio in picked]))
+    return {f"ripple_{RIPPLE_HZ[ripple]:.0f}": driven[ripple], f"mains_{MAINS_HZ[mains]:.0f}": picked[mains]}
+
+
+def with_lines(record: Record, lines: Mapping[str, float]) -> Record:
+    """The record with these lines as its last channels, in place of those it had."""
+    others = sum(name.partition("_")[0].partition("x")[0] not in HARMONICS for name in record.channel_names)
+    record = replace(
+        record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels)
+    )
+    for name, frequency in lines.items():
+        record = record.with_channels(*_line(record, name, frequency))
+        for order in HARMONICS[name.partition("_")[0]]:
+            if order * frequency * record.facts.sample_period_s < 0.45:
+                record = record.with_channels(*_line(record, f"{name}x{order}", order * frequency))
+    return record
+
+
+@dataclass(frozen=True)
+class _Along:
+    """A segment's residual along its axis, seen through the four-parameter machine; `power` (bins,) of its noise, `is_free` (bins,)
+
+    of the lines beside the tones: an error at one tone, times another, is no ripple.
+    """
+
+    residual: Array
+    impedance: NDArray[np.complex128]
+    power: Array
+    is_free: NDArray[np.bool_]
+
+    def freed(self, signal: Array) -> Array:
+        """The signal without its lines at the tones."""
+        return np.asarray(np.fft.irfft(np.where(self.is_free, np.fft.rfft(signal), 0.0), signal.size))
+
+
+def _along(record: Record, segment: Segment, residual: Array, model: Model, noise: Noise, tones: Array) -> _Along:
+    r_s, r_r, l_sigma, l_m = model.nominal
+    n, period = segment.count, record.facts.sample_period_s
+    angle = np.deg2rad(segment.axis_deg)
+    weights = TO_PHASES[: residual.shape[0]] @ np.array([np.cos(angle), np.sin(angle)])
+    weights /= weights @ weights
+    frequency = np.fft.rfftfreq(n, period)
+    s = 2j * np.pi * frequency
+    impedance = np.asarray(r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m), dtype=np.complex128)
+    is_free = np.all(np.abs(frequency[:, None] - tones) >= AT_A_TONE / (n * period), axis=1)
+    return _Along(
+        weights @ np.where(segment.is_good, residual, 0.0), impedance, weights**2 @ noise.weights(n, period) ** 2, is_free
+    )
+
+
+def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> list[Array]:
+    """The residual as seen by a ripple: through the conjugate admittance over the noise's power, times the command (matched
+
+    filter: G. Turin, IRE Trans. Inf. Theory 6(3), 1960); a ripple line stands out at its frequency.
+    """
+    tones = np.array(excited_lines(record))
+    out = []
+    for segment, residual in zip(record.segments, residuals, strict=True):
+        seen = _along(record, segment, residual, model, noise, tones)
+        matched = np.where(seen.is_free, np.fft.rfft(seen.residual) / (np.conj(seen.impedance) * seen.power), 0.0)
+        out.append((np.fft.irfft(matched, segment.count) * segment.voltage_axis_v)[None])
+    return out
+
+
+def _ripple_gains(
+    record: Record, residuals: Sequence[Array], model: Model, noise: Noise, frequencies: Sequence[float]
+) -> list[float]:
+    """What ripples of these frequencies (Hz) each explain of the residual beside the tones, in chi2 to first order."""
+    tones = np.array(excited_lines(record))
+    gains = np.zeros(len(frequencies))
+    for segment, residual in zip(record.segments, residuals, strict=True):
+        seen = _along(record, segment, residual, model, noise, tones)
+        # what a start leaves would reach far beyond the tones' own lines
+        window = np.hanning(segment.count)
+        left = np.fft.rfft(window * seen.freed(seen.residual)) / np.sqrt(seen.power)
+        time = np.arange(segment.count) * record.facts.sample_period_s
+        for k, frequency in enumerate(frequencies):
+            pushed = [segment.voltage_axis_v * of(2.0 * np.pi * frequency * time) for of in (np.cos, np.sin)]
+            currents = [np.fft.irfft(np.fft.rfft(v) / seen.impedance, v.size) for v in pushed]
+            table = np.stack([np.fft.rfft(window * seen.freed(i)) / np.sqrt(seen.power) for i in currents])
+            gram, slope = (table.conj() @ table.T).real, (table.conj() @ left).real
+            gains[k] += 2.0 / segment.count * float(slope @ np.linalg.pinv(gram, hermitian=True) @ slope)
+    return list(gains)
+
+
+def _refine(record: Record, signals: Sequence[Array], base: float) -> tuple[float, float]:
+    """The frequency near `base` where the signals are strongest, and its power over the median beside the search."""
+    period = record.facts.sample_period_s
+    span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
+    grid = base * np.linspace(1 - SEARCH, 1 + SEARCH, 2 * int(8 * SEARCH * base * span) + 3)
+    powers = _powers(signals, grid, period)
+    # a line in a short segment is as wide as the search: what it stands out from lies beyond its skirts
+    skirt = SEARCH * base + np.arange(3, 11) / span
+    beside = _powers(signals, np.concatenate([base - skirt[::-1], base + skirt]), period)
+    best = int(np.argmax(powers))
+    at = float(grid[best])
+    if 0 < best < grid.shape[0] - 1:
+        left, middle, right = powers[best - 1 : best + 2]
+        bend = left - 2.0 * middle + right
+        at += 0.5 * float((left - right) / bend) * float(grid[1] - grid[0]) if bend < 0 else 0.0
+    return at, float(powers[best] / max(float(np.median(beside)), 1e-300))
+
+
+def _powers(signals: Sequence[Array], frequency: Array, period: float) -> Array:
+    powers = np.zeros(frequency.shape[0])
+    for signal in signals:
+        window = np.hanning(signal.shape[1])
+        powers += sum(np.abs(_zoom(row * window, frequency, period)) ** 2 for row in signal)
+    return powers
+
+
+def _zoom(signal: Array, frequency: Array, period: float) -> Array:
+    """Fourier sums at a few frequencies after block averaging around the centre frequency."""
+    centre = float(np.mean(frequency))
+    n = signal.shape[0]
+    block = max(1, int(0.02 / period))
+    base = signal * np.exp(-2j * np.pi * centre * np.arange(n) * period)
+    m = n // block
+    slow = base[: m * block].reshape(m, block).sum(axis=1)
+    at = (np.arange(m) * block + 0.5 * (block - 1)) * period
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency - centre, at)) @ slow)
+
+
+def _line(record: Record, name: str, frequency: float) -> tuple[tuple[str, ...], tuple[Array, ...]]:
+    """Cosine and sine of the time within the segment: phases need not carry over pauses."""
+    out = []
+    for segment in record.segments:
+        angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
+        out.append(np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return (f"{name}_cos", f"{name}_sin"), tuple(out)
