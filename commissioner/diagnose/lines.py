@@ -22,6 +22,8 @@ RIPPLE_HZ = (100.0, 120.0, 300.0, 360.0)
 MAINS_HZ = (50.0, 60.0)
 SEARCH = 0.008
 """Relative range in which a mains-bound frequency is looked for (grid codes allow 1 %, seconds-long records see less)."""
+MOST_PEAKS, WEIGHED_SAMPLES = 3, 16384
+"""Of each mains-bound frequency, so many that stand out are weighed, on so many samples of every segment."""
 AT_A_TONE = 4.0
 """Lines beside an excited one that count as its own."""
 BY_CHANCE = 1e-6
@@ -58,12 +60,14 @@ def with_clearer_lines(
 def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> dict[str, tuple[float, float]]:
     """Of ripple and mains each the frequency that explains or stands out most, Hz, and by how much it stands out (`ripple_300`: ...)."""
     drive = _ripple_drive(record, residuals, model, noise)
-    driven = [_refine(record, drive, base) for base in RIPPLE_HZ]
-    # what is left at the tones, times another tone, may stand out as well, but explains nothing
-    ripple = int(np.argmax(_ripple_gains(record, residuals, model, noise, [frequency for frequency, _ in driven])))
-    picked = [_refine(record, residuals, base) for base in MAINS_HZ]
-    mains = int(np.argmax([ratio for _, ratio in picked]))
-    return {f"ripple_{RIPPLE_HZ[ripple]:.0f}": driven[ripple], f"mains_{MAINS_HZ[mains]:.0f}": picked[mains]}
+    driven = [(base, *peak) for base in RIPPLE_HZ for peak in _peaks(record, drive, base)]
+    # what one tone's error or another side line makes of the command may stand out more, but explains less
+    gains = _ripple_gains(record, residuals, model, noise, [frequency for _, frequency, _ in driven])
+    ripple, ripple_hz, ripple_ratio = driven[int(np.argmax(gains))]
+    mains, mains_hz, mains_ratio = max(
+        ((base, *_peaks(record, residuals, base)[0]) for base in MAINS_HZ), key=lambda found: found[2]
+    )
+    return {f"ripple_{ripple:.0f}": (ripple_hz, ripple_ratio), f"mains_{mains:.0f}": (mains_hz, mains_ratio)}
 
 
 def with_lines(record: Record, lines: Mapping[str, float]) -> Record:
@@ -131,24 +135,31 @@ def _ripple_gains(
 ) -> list[float]:
     """What ripples of these frequencies (Hz) each explain of the residual beside the tones, in chi2 to first order."""
     tones = np.array(excited_lines(record))
-    gains = np.zeros(len(frequencies))
-    for segment, residual in zip(record.segments, residuals, strict=True):
-        seen = _along(record, segment, residual, model, noise, tones)
+
+    def of_segment(k: int) -> Array:
+        segment = record.segments[k].first(WEIGHED_SAMPLES)
+        seen = _along(record, segment, residuals[k][:, : segment.count], model, noise, tones)
         # what a start leaves would reach far beyond the tones' own lines
         window = np.hanning(segment.count)
         left = np.fft.rfft(window * seen.freed(seen.residual)) / np.sqrt(seen.power)
         time = np.arange(segment.count) * record.facts.sample_period_s
-        for k, frequency in enumerate(frequencies):
+        gains = []
+        for frequency in frequencies:
             pushed = [segment.voltage_axis_v * of(2.0 * np.pi * frequency * time) for of in (np.cos, np.sin)]
             currents = [np.fft.irfft(np.fft.rfft(v) / seen.impedance, v.size) for v in pushed]
             table = np.stack([np.fft.rfft(window * seen.freed(i)) / np.sqrt(seen.power) for i in currents])
             gram, slope = (table.conj() @ table.T).real, (table.conj() @ left).real
-            gains[k] += 2.0 / segment.count * float(slope @ np.linalg.pinv(gram, hermitian=True) @ slope)
-    return list(gains)
+            gains.append(2.0 / segment.count * float(slope @ np.linalg.pinv(gram, hermitian=True) @ slope))
+        return np.array(gains)
+
+    return list(np.sum(each_segment(of_segment, record), axis=0))
 
 
-def _refine(record: Record, signals: Sequence[Array], base: float) -> tuple[float, float]:
-    """The frequency near `base` where the signals are strongest, and its power over the median beside the search."""
+def _peaks(record: Record, signals: Sequence[Array], base: float) -> list[tuple[float, float]]:
+    """The frequencies near `base` where the signals are strongest, the strongest first, each with its power over the median beside
+
+    the search.
+    """
     period = record.facts.sample_period_s
     span = max(float(s.time_s[-1] - s.time_s[0]) for s in record.segments)
     grid = base * np.linspace(1 - SEARCH, 1 + SEARCH, 2 * int(8 * SEARCH * base * span) + 3)
@@ -156,13 +167,17 @@ def _refine(record: Record, signals: Sequence[Array], base: float) -> tuple[floa
     # a line in a short segment is as wide as the search: what it stands out from lies beyond its skirts
     skirt = SEARCH * base + np.arange(3, 11) / span
     beside = _powers(signals, np.concatenate([base - skirt[::-1], base + skirt]), period)
-    best = int(np.argmax(powers))
-    at = float(grid[best])
-    if 0 < best < grid.shape[0] - 1:
-        left, middle, right = powers[best - 1 : best + 2]
-        bend = left - 2.0 * middle + right
-        at += 0.5 * float((left - right) / bend) * float(grid[1] - grid[0]) if bend < 0 else 0.0
-    return at, float(powers[best] / max(float(np.median(beside)), 1e-300))
+    around = np.pad(powers, 1, constant_values=-np.inf)
+    tops = np.flatnonzero((around[1:-1] > around[:-2]) & (around[1:-1] >= around[2:]))
+    out = []
+    for top in [int(k) for k in sorted(tops, key=lambda k: -powers[k])[:MOST_PEAKS]] or [0]:
+        at = float(grid[top])
+        if 0 < top < grid.shape[0] - 1:
+            left, middle, right = powers[top - 1 : top + 2]
+            bend = left - 2.0 * middle + right
+            at += 0.5 * float((left - right) / bend) * float(grid[1] - grid[0]) if bend < 0 else 0.0
+        out.append((at, float(powers[top] / max(float(np.median(beside)), 1e-300))))
+    return out
 
 
 def _powers(signals: Sequence[Array], frequency: Array, period: float) -> Array:

@@ -156,7 +156,7 @@ def _tangent(
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
         path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
-        _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK}), layout.legs_vectors),
+        _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE}), layout.legs_vectors),
         cells_of(_if(kinds.IRON_CURVE in wanted, layout.iron_vectors)),
         cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)), flux_before, out,
     )
@@ -198,10 +198,11 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, 
     per_share = 2.0 * layout.leak_ratio / (1.0 + layout.leak_ratio)
     rotor, leakage, magnetizing = aniso
     coupled = per_share * (0.5 + model.total(kinds.ANISOTROPY_SPLIT))
+    shares = model.sum_kind(kinds.LEG_SHARE, 3)[1:]
     base = np.array([
         r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS),
         *(rotor + coupled * (leakage - magnetizing)), *leakage, *magnetizing, kappa, layout.leak_ratio, coupled,
-        *(per_share * (leakage - magnetizing)),
+        *(per_share * (leakage - magnetizing)), 1.0 - shares.sum(), *(1.0 + shares),
     ])
     stops, branches = _at_work(kinds.STOP, model, asked), _at_work(kinds.BRANCH, model, asked)
     wanted = {t.kind for t in asked}

@@ -11,7 +11,7 @@ from commissioner.diagnose.memory import widened
 from commissioner.diagnose.spline import curve
 from commissioner.diagnose.trajectory import SQRT3
 
-INTO_FLUX = (kinds.R_S, kinds.PHASE_RESISTANCE, kinds.LEGS, kinds.LEGS_LINK, kinds.VOLTAGE_MOD, kinds.OMEGA)
+INTO_FLUX = (kinds.R_S, kinds.PHASE_RESISTANCE, kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE, kinds.VOLTAGE_MOD, kinds.OMEGA)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
@@ -48,7 +48,7 @@ def starts(kind_of, indices, flux_before, coupled, splits_a, splits_b, x):
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
 def pushes(
     kind, n, start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels, base, branch_time,
-    stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, magnetizing, current, terminal, flux, rotor,
+    stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost, magnetizing, current, terminal, flux, rotor,
 ):
     """What one parameter pushes at each sample: into the `magnetizing` and the stator `current`, straight into the `terminal`
 
@@ -96,6 +96,10 @@ def pushes(
                     fb -= legs_vectors[n, c] * leg_mean[m, 1, c]
                 f = link_factor[held] if kind == kinds.LEGS_LINK else 1.0
                 flux[0, m], flux[1, m] = f * fa, f * fb
+        elif kind == kinds.LEG_SHARE:
+            if t > 0:
+                eu, en = lost[m, 0], lost[m, n]
+                flux[0, m], flux[1, m] = (2.0 * eu + en) / 3.0, en / SQRT3 * (1.0 if n == 2 else -1.0)
         elif kind == kinds.IRON_CURVE:
             f = curve(iron_vectors[n], int(at[row.IRON_AT, m]), at[row.IRON_U, m])
             magnetizing[0, m], magnetizing[1, m] = f * at[row.IRON_A, m], f * at[row.IRON_B, m]

@@ -49,13 +49,14 @@ def _leg_path(i0, i1, top, knee, intervals, mean):
 def at_samples(
     start, stop, states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega,
     base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top, stop_gain, stop_radius, branch_gain, branch_time,
-    working, wants_legs, at, before, now, secant, leg_mean, memory,
+    working, wants_legs, at, before, now, secant, leg_mean, lost, memory,
 ):
     """(1)-(6) at samples `start` ... `stop` - 1 into columns 1 ... of `at` and rows 1 ... of the others; 0 is the sample before.
 
     A sample still belongs to the voltage of the period it ends. `before`, `now` (B+1, 3) phase currents at that period's ends,
-    `secant` (B+1, 3) resistance of phase and leg between them, `leg_mean` (B+1, 2, width) mean weights of the leg curve, memory
-    operators' derivatives in `memory` (B+1, s, 7), of the `working` (s,) ones: factor, by the flux (aa, ab, bb), by the state before.
+    `secant` (B+1, 3) resistance of phase and leg between them, `leg_mean` (B+1, 2, width) mean weights of the leg curve, `lost` (B+1, 3)
+    mean voltage of a leg that is as the mean of the three, memory operators' derivatives in `memory` (B+1, s, 7), of the `working`
+    (s,) ones: factor, by the flux (aa, ab, bb), by the state before.
     """
     rs, gs, gm, nu, g, kappa = base[0], base[2], base[3], base[4], base[5], base[12]
     shrink = 1.0 / (1.0 + g * rs)
@@ -147,11 +148,14 @@ def at_samples(
                 e1, d1 = leg_loss(now[m, leg], legs_now, legs_top, legs_knee)
                 e0, d0 = leg_loss(before[m, leg], legs_now, legs_top, legs_knee)
                 gap = now[m, leg] - before[m, leg]
-                secant[m, leg] += 0.5 * (d0 + d1) if abs(gap) < 1e-3 * legs_knee else (e1 - e0) / gap
+                secant[m, leg] += base[17 + leg] * (0.5 * (d0 + d1) if abs(gap) < 1e-3 * legs_knee else (e1 - e0) / gap)
+                if wants_legs:
+                    middle = leg_loss(0.5 * (before[m, leg] + now[m, leg]), legs_now, legs_top, legs_knee)[0]
+                    lost[m, leg] = (e0 + 4.0 * middle + e1) / 6.0
         if wants_legs and t > 0:
             mean[:] = 0.0
             for leg in range(3):
                 _leg_path(before[m, leg], now[m, leg], legs_top, legs_knee, width - 3, mean[leg])
             for c in range(width):
-                leg_mean[m, 0, c] = (2.0 * mean[0, c] - mean[1, c] - mean[2, c]) / 3.0
-                leg_mean[m, 1, c] = (mean[1, c] - mean[2, c]) / SQRT3
+                leg_mean[m, 0, c] = (2.0 * base[17] * mean[0, c] - base[18] * mean[1, c] - base[19] * mean[2, c]) / 3.0
+                leg_mean[m, 1, c] = (base[18] * mean[1, c] - base[19] * mean[2, c]) / SQRT3

@@ -24,8 +24,8 @@ SETTLED_SAMPLES, PLACED_SAMPLES = 160_000, 45_000
 """On so many, loops are settled and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
-REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,)}
-"""Indices of the numbers that only refine a clock, a delay or a lag."""
+REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,), kinds.LEG_SHARE: (1, 2)}
+"""Indices of the numbers that only refine a clock, a delay, a lag or the legs."""
 WARMING = frozenset({"stator_heating", "rotor_heating"})
 
 
@@ -167,7 +167,7 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 def _spare(model: Model, record: Record) -> list[list[int]]:
     """Rows of theta that may as well be zero: each memory operator, second path and course of heat; what only refines a clock, a
 
-    delay or a lag; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
+    delay, a lag or the legs; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
     """
     rows = list(enumerate(model.terms, 4))
     alone = [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH) or t.effect in WARMING]

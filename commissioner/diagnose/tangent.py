@@ -161,7 +161,7 @@ def sensitivities(
     # row 0 is the sample before the block
     rows = BLOCK + 1
     at, memory = np.zeros((row.ROWS, rows)), np.zeros((rows, working.shape[0], 7))
-    before, now, secant = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
+    before, now, secant, lost = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
     leg_mean = np.zeros((rows, 2, legs_vectors.shape[1]))
     step, push = np.zeros((rows, 4, 4)), np.zeros((4, 8, rows))
     amp, cage, cage_push = np.zeros((rows, 2, 4)), np.zeros((rows, 2, 4)), np.zeros((rows, 7))
@@ -187,7 +187,7 @@ def sensitivities(
         at_samples(
             start, stop, states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor,
             omega_rad_per_s, base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top, stop_gain, stop_radius,
-            branch_gain, branch_time, working, wants_legs, at, before, now, secant, leg_mean, memory,
+            branch_gain, branch_time, working, wants_legs, at, before, now, secant, leg_mean, lost, memory,
         )
         _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage, cage_push)
         for group in range(0, count, SIDE_BY_SIDE):
@@ -197,7 +197,7 @@ def sensitivities(
                 magnetizing[:], current[:], flux[:], terminal[here], rotor[here] = 0.0, 0.0, 0.0, 0.0, 0.0
                 pushes(
                     kind, indices[p], start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels,
-                    base, branch_time, stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean,
+                    base, branch_time, stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost,
                     magnetizing, current, terminal[here], flux, rotor[here],
                 )
                 has_flux, has_more = kind in INTO_FLUX, kind == kinds.R_S or kind not in INTO_FLUX

@@ -117,9 +117,9 @@ def _rates(
     iw = -0.5 * ta - 0.5 * SQRT3 * tb
     eu, ev, ew = ru * ta, rv * iv, rw * iw
     if has_legs:
-        eu += leg_loss(ta, legs, legs_top, legs_knee)[0]
-        ev += leg_loss(iv, legs, legs_top, legs_knee)[0]
-        ew += leg_loss(iw, legs, legs_top, legs_knee)[0]
+        eu += base[17] * leg_loss(ta, legs, legs_top, legs_knee)[0]
+        ev += base[18] * leg_loss(iv, legs, legs_top, legs_knee)[0]
+        ew += base[19] * leg_loss(iw, legs, legs_top, legs_knee)[0]
     k[0] = va - (2.0 * eu - ev - ew) / 3.0
     k[1] = vb - (ev - ew) / SQRT3
     # (6), (7)

@@ -51,6 +51,11 @@ class Machine:
     leg_v: float = 0.0
     leg_a: float = 0.2
     """A leg loses (2 / pi) leg_v atan(i / leg_a)."""
+    legs: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """So many times that, each of the three."""
+    ripple: float = 0.0
+    """Share of the link that swings at `ripple_hz`."""
+    ripple_hz: float = 300.0
     lag_s: float = 0.0
     cut_off_hz: float = math.inf
     """Of a Butterworth filter of second order."""
@@ -124,7 +129,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.lag_s, turn, m.delay_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz)
 
 
 @njit(cache=True)
@@ -133,18 +138,18 @@ def _magnetizing(flux, l_m, knee):
 
 
 @njit(cache=True)
-def _leg_loss(current, leg_v, leg_a):
+def _leg_loss(current, leg_v, leg_a, legs):
     """Space vector of what the three legs lose."""
     out = 0.0 + 0.0j
     for p in range(3):
         turned = complex(math.cos(2.0 * math.pi * p / 3.0), math.sin(2.0 * math.pi * p / 3.0))
         i = (current * turned.conjugate()).real
-        out += 2.0 / 3.0 * turned * leg_v * 2.0 / math.pi * math.atan(i / leg_a)
+        out += 2.0 / 3.0 * turned * legs[p] * leg_v * 2.0 / math.pi * math.atan(i / leg_a)
     return out
 
 
 @njit(cache=True)
-def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion):
+def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
 
     currents of the bar's layers.
@@ -159,7 +164,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
             middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8) / l_m)
     i_s, i_r = (x[0] - middle) / l_s, (x[1] - middle) / own
     d = np.zeros(7 + LAYERS.size, dtype=np.complex128)
-    d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a) if leg_v > 0.0 else 0.0)
+    d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a, legs) if leg_v > 0.0 else 0.0)
     if bar > 0.0:
         # the cage is two in parallel: a resistance alone, and one in series with the deeper part of the leakage
         deep = x[3] / (bar * l_r)
@@ -182,7 +187,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, b
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, delay, sag, sag_s, bar, diffusion):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, sag, sag_s, bar, diffusion, ripple, ripple_hz):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -197,17 +202,19 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
         r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
             memory[at % (late + 1)] = seen
             if step == 0:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
                 v = volts[k] * (1.0 - sag * load)
-                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
             at += 1
-            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
-            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
-            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, lag, turn, bar, diffusion)
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
+            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            if ripple > 0.0:
+                v = volts[k] * (1.0 + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 0.5) / fine) * period))
             if sag > 0.0:
                 load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - load)
                 v = volts[k] * (1.0 - sag * load)

@@ -80,6 +80,27 @@ def test_a_sagging_link_has_its_size_whatever_its_lag(lag_s):
     assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(0.4, rel=0.03)
 
 
+def test_legs_that_differ_are_told_apart():
+    """Where all three had to be alike, legs 8 % apart were an error without a name."""
+    seen, names = named(Machine(leg_v=4.0, legs=(0.97, 1.08, 0.95)))
+    assert len(names) == 1 and "dead_time" in names and seen.left.sigma < 0.1
+    sizes = seen.causes[0].sizes
+    assert sizes["unequal_v"][0] == pytest.approx(0.08, abs=0.005) and sizes["unequal_w"][0] == pytest.approx(-0.05, abs=0.005)
+
+
+def test_legs_that_are_alike_are_not_said_to_differ():
+    seen, _ = named(Machine(leg_v=4.0))
+    assert not {"unequal_v", "unequal_w"} & set(seen.causes[0].sizes)
+
+
+@pytest.mark.parametrize(("hz", "tones_hz"), [(300.0, (0.5, 2.0, 7.5, 29.5, 101.5, 329.5)), long(100.0, TONES_HZ)])
+def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(hz, tones_hz):
+    """300 - 29.5 and 329.5 - 300 Hz: what starts leave at the tones, times one another, stood out more at 100 Hz."""
+    seen, names = named(Machine(ripple=0.006, ripple_hz=hz, tones_hz=tones_hz), 3.0)
+    assert set(names) == {"dc_link_ripple"}
+    assert seen.causes[0].sizes[f"amplitude_{hz:.0f}_hz"][0] == pytest.approx(0.006, rel=0.02)
+
+
 @pytest.mark.campaign
 def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
     machine = Machine(bar_s=2e-2)

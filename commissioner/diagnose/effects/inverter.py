@@ -14,6 +14,8 @@ from commissioner.diagnose.kinds import CABLE
 from commissioner.diagnose.model import Term
 
 Array = NDArray[np.float64]
+MOST_UNEQUAL = 0.4
+"""Of the mean of the three legs, by which one may differ."""
 SAG_SAMPLES = 4000
 """Of every segment, on which a sag of several lags is read as one of a single lag."""
 
@@ -26,7 +28,8 @@ def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     curve = np.array([spline_value(layout.legs_vectors, weights, layout.legs_top, y) for y in grid])
     reached = np.flatnonzero(curve >= 0.5 * top) if top > 0 else np.array([0])
     half = float(layout.legs_knee_a * np.sinh(grid[reached[0]])) if reached.size else 0.0
-    return {"voltage_v": (top, "V"), "half_current_a": (half, "A")}
+    unequal = {k: (values[k], "1") for k in ("unequal_v", "unequal_w") if values.get(k)}
+    return {"voltage_v": (top, "V"), "half_current_a": (half, "A"), **unequal}
 
 
 def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -40,7 +43,10 @@ def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 def _legs(name: str, kind: int, setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.legs_vectors.shape[0]
-    return tuple(Term(name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count))
+    shares = tuple(
+        Term(name, f"unequal_{leg}", "1", kinds.LEG_SHARE, k, 0.01, -MOST_UNEQUAL, MOST_UNEQUAL) for k, leg in ((1, "v"), (2, "w"))
+    )
+    return (*(Term(name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count)), *shares)
 
 
 @effect(
@@ -52,9 +58,9 @@ def _legs(name: str, kind: int, setting: Setting) -> tuple[Term, ...]:
     split_by="repeat one segment at half the switching frequency or another link voltage",
 )
 def dead_time(setting: Setting) -> tuple[Term, ...]:
-    """v_x = v_x* - F(|i_x|) sign(i_x), F a spline over asinh(i) that rises from 0 to V_dt [V >= 0] and stays there.
+    """v_x = v_x* - (1 + u_x) F(|i_x|) sign(i_x), F a spline over asinh(i) that rises from 0 to V_dt [V >= 0] and stays there, u_x what
 
-    Scales with link voltage times switching frequency where these differ between segments.
+    sets the leg apart from the mean of the three. Scales with link voltage times switching frequency where these differ between segments.
     """
     return _legs("dead_time", kinds.LEGS_LINK, setting)
 
