@@ -25,6 +25,8 @@ PILE = 1e-6
 is a cause to be fitted."""
 SHORTEST_STRETCH = 200
 REST_SAMPLES = 1
+LEAST_AT_PEAKS = 0.5
+"""Of a command's power, where it consists of tones: the rest of their lines is beside them by the window alone."""
 
 
 @dataclass(frozen=True)
@@ -258,8 +260,12 @@ def _bridge(segment: Segment, period: float) -> Segment:
 
 
 def excited_lines(record: Record) -> list[float]:
-    """Frequencies the command excites, Hz: spectral peaks within 40 dB of the largest, merged over segments."""
+    """Frequencies the command excites, Hz: spectral peaks within 40 dB of the largest, merged over segments; none where most of its
+
+    power lies between them, as a sweep's does.
+    """
     found: list[float] = []
+    at_peaks = power = 0.0
     for segment in record.segments:
         v = segment.voltage_axis_v - segment.voltage_axis_v.mean()
         n = v.shape[0]
@@ -270,10 +276,13 @@ def excited_lines(record: Record) -> list[float]:
         frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
         peaks = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
         strong = peaks[spectrum[peaks] > 1e-2 * spectrum.max()]
+        is_near = np.zeros(spectrum.size, dtype=np.bool_)
+        is_near[np.clip(strong[:, None] + np.arange(-2, 3), 0, spectrum.size - 1)] = True
+        at_peaks, power = at_peaks + float((spectrum[is_near] ** 2).sum()), power + float((spectrum**2).sum())
         for f in frequency[strong]:
             if all(abs(f - g) > 2.5 / (n * record.facts.sample_period_s) for g in found):
                 found.append(float(f))
-    return sorted(found)
+    return sorted(found) if at_peaks > LEAST_AT_PEAKS * power else []
 
 
 def _judge(

@@ -175,8 +175,8 @@ def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
 
 
 def _not_told_apart(lines: int) -> tuple[str, ...]:
-    """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then."""
-    if lines > 2:
+    """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then. (A sweep has none.)"""
+    if lines not in (1, 2):
         return ()
     linear = tuple(name for name, entry in CATALOGUE.items() if entry.family == "linear")
     return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")

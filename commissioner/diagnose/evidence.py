@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
-from commissioner.diagnose.exchanges import with_closer_paths
+from commissioner.diagnose.effects.magnetics import EDGE
+from commissioner.diagnose.exchanges import read_late, with_closer_paths
 from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
 from commissioner.diagnose.guards import is_plausible, loss_without
 from commissioner.diagnose.leftover import Leftover
@@ -116,6 +117,10 @@ def alternatives(
             if is_plausible(trial.model, score.name, there):
                 loss = (trial.chi2 - found.chi2) * whole / record.samples
                 rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], there))
+        if EDGE.symbol in found.model.of(name) and "sampling_delay" in absent:
+            late = fit(read_late(found.model, found.model.nominal[2]), record, layout, noise, wanted_chi2=wanted)
+            loss = (late.chi2 - found.chi2) * whole / record.samples
+            rivals["sampling_delay"] = Rival(loss, _moved(found.model, late.model, [n for n in accepted if n != name], setting))
         out[name] = rivals
     return out
 

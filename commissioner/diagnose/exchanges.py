@@ -6,11 +6,15 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from commissioner.diagnose import kinds
 from commissioner.diagnose.dictionaries import with_closer_branches
 from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.magnetics import EDGE
+from commissioner.diagnose.effects.sensing import EARLY
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, RIGID_GUARD, SAME_ORDER, is_plausible, loss_without
+from commissioner.diagnose.guards import LINEAR, RIGID_GUARD, SAME_ORDER, effects_of, is_plausible, loss_without
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import impedance_starts
@@ -19,6 +23,8 @@ from commissioner.diagnose.screen import STATISTICAL_FLOOR, joint_net, price, re
 LATE = ("sampling_delay", "sensor_lag", "cable_capacitance")
 REGROUPED, HOPEFUL = 4, 1.3
 """Groups refitted at most; and the factor by which a refit may gain more than promised."""
+SAME_STEP = 0.03
+"""Of conductance times period: a capacitance so near is the conductance's own."""
 NEARLY = 0.05
 """Of the gain of those in the model: a group that lacks no more may get there with closer time constants."""
 LARGE_MISFIT, LARGE_DELAYS = 9.0, (0.7, 1.5, 2.5)
@@ -73,6 +79,67 @@ def as_a_lag(
         if trial.chi2 < wanted and all(is_plausible(trial.model, n, setting) for n in group):
             return trial, (*(n for n in accepted if n not in mine), *group), setting
     return None
+
+
+def as_read_late(
+    current: Fit, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report
+) -> Exchanged | None:
+    """A current that is read after its instant, or a conductance's that shows the step of that instant, in place of what imitates it.
+
+    After d seconds the current has taken d / L_sigma of the new voltage: a conductance g of that size and a capacitance g T, or a clock
+    that makes up for some of it. A conductance whose current at an instant is that of the new voltage has the capacitance g T too.
+    """
+    loss = current.model.of("iron_loss")
+    if loss.get("conductance", 0.0) <= 0.0 or EDGE.symbol in loss or "sampling_delay" in accepted:
+        return None
+    beside = [n for n in ("clock_drift", "cable_capacitance") if n in accepted]
+    for gone in dict.fromkeys((tuple(beside), tuple(beside[1:]))):
+        found = _read_late_without(gone, current, setting, noise, "sampling_delay" in names, report)
+        if found is not None:
+            kept = [n for n in accepted if n not in gone and n in effects_of(found.model)]
+            late = ["sampling_delay"] if "sampling_delay" in effects_of(found.model) else []
+            return found, (*kept, *late), setting
+    return None
+
+
+def _read_late_without(
+    gone: Sequence[str], current: Fit, setting: Setting, noise: Noise, may_be_late: bool, report: Report
+) -> Fit | None:
+    """The better of both readings without the causes `gone`, if it loses no more than they would have to gain."""
+    bare, record, layout = current.model, setting.record, setting.layout
+    for name in gone:
+        bare = bare.without(name)
+    saved = len(current.model.terms) - len(bare.terms)
+    wanted = current.chi2 + (required_chi2(saved) if gone else -STATISTICAL_FLOOR)
+    best = None
+    if gone:
+        period = setting.facts.sample_period_s
+        shown = bare.with_terms([replace(EDGE, start=bare.total(kinds.IRON_LOSS) * period)])
+        trial = fit(shown, record, layout, noise, wanted_chi2=wanted)
+        report(f"  iron_loss that shows its instant's voltage in place of {'+'.join(gone)}: gained {current.chi2 - trial.chi2:.4g} more")
+        best = trial if trial.chi2 < wanted and _is_its_own(trial, period) else None
+    if may_be_late:
+        to_beat = wanted if best is None else best.chi2 - STATISTICAL_FLOOR
+        late = fit(read_late(bare, bare.nominal[2]), record, layout, noise, wanted_chi2=to_beat)
+        report(f"  a current that is read late in place of {'+'.join(('iron_loss', *gone))}: gained {current.chi2 - late.chi2:.4g} more")
+        if late.chi2 < to_beat and late.model.of("sampling_delay")[EARLY.symbol] < 0.0:
+            return late
+    return best
+
+
+def read_late(model: Model, l_sigma: float) -> Model:
+    """The model that begins with a current read so late as makes what its iron loss does."""
+    start = max(-model.total(kinds.IRON_LOSS) * l_sigma, EARLY.lower)
+    return model.without("iron_loss").with_terms([replace(EARLY, start=start)])
+
+
+def _is_its_own(fitted: Fit, period_s: float) -> bool:
+    """Whether the charge per volt of a step is what the iron's conductance draws in a period, as far as the data tell."""
+    edge = fitted.model.of("iron_loss")[EDGE.symbol]
+    _, information = fitted.information_of("iron_loss", EDGE.symbol)
+    spread = EDGE.step / float(np.sqrt(max(information[0, 0], 1e-300)))
+    charge = fitted.model.total(kinds.IRON_LOSS) * period_s
+    return abs(edge - charge) < SAME_STEP * charge + 3.0 * spread
 
 
 def regrouped(

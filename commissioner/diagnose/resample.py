@@ -25,8 +25,11 @@ def _hermite(values, after, before, late, period, out, slope):
                 slope[c, k] = 0.0
             continue
         if j > n - 2:
-            j = n - 2
-            u = min(at - j, 2.0)
+            # past the last sample the current goes on as it begins to
+            for c in range(rows):
+                out[c, k] = values[c, n - 1] + after[c, n - 1] * period * min(at - (n - 1), 1.0)
+                slope[c, k] = after[c, n - 1]
+            continue
         for c in range(rows):
             y0, y1 = values[c, j], values[c, j + 1]
             m0, m1 = after[c, j] * period, before[c, j + 1] * period

@@ -14,7 +14,7 @@ import numpy as np
 from commissioner.diagnose import kinds
 from commissioner.diagnose.dictionaries import following, with_closer_radii, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, large_delay, regrouped
+from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, as_read_late, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, guard, is_plausible, losses_of, meets_tones
 from commissioner.diagnose.lines import LINES, with_clearer_lines
@@ -214,6 +214,11 @@ class Steps:
         if "cable_capacitance" in late and "sensor_lag" in self.names and late not in self.lagging:
             self.lagging.add(late)
             other = as_a_lag(current, accepted, self.setting, self.noise, self.names, self.report)
+            if other is not None:
+                return other
+        if "iron_loss" in mine and mine not in self.lagging:
+            self.lagging.add(mine)
+            other = as_read_late(current, accepted, self.setting, self.noise, self.names, self.report)
             if other is not None:
                 return other
         if not 1 <= len(mine) <= 2 or mine in self.regrouped:

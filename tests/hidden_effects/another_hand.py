@@ -60,6 +60,8 @@ class Machine:
     cut_off_hz: float = math.inf
     """Of a Butterworth filter of second order."""
     delay_s: float = 0.0
+    read_late_s: float = 0.0
+    """So long after its instant a current is read."""
     gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
     offsets_a: tuple[float, float, float] = (0.0, 0.0, 0.0)
     hum_a: float = 0.0
@@ -129,7 +131,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz)
 
 
 @njit(cache=True)
@@ -187,12 +189,12 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, sag, sag_s, bar, diffusion, ripple, ripple_hz):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, bar, diffusion, ripple, ripple_hz):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     x[0], x[1], x[2] = left, left * (l_m + l_r) / l_m, left
-    late = round(delay / h)
+    late, after = round(delay / h), round(read_late / h)
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)
     at = 0
@@ -204,8 +206,9 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
             # the sample shows what was before the voltage stepped
             k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
             memory[at % (late + 1)] = seen
-            if step == 0:
+            if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
+            if step == 0:
                 v = volts[k] * (1.0 - sag * load)
                 k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
             at += 1

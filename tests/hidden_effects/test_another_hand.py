@@ -88,6 +88,13 @@ def test_legs_that_differ_are_told_apart():
     assert sizes["unequal_v"][0] == pytest.approx(0.08, abs=0.005) and sizes["unequal_w"][0] == pytest.approx(-0.05, abs=0.005)
 
 
+@pytest.mark.parametrize("late_s", [2e-5, long(5e-6)])
+def test_a_current_that_is_read_late_is_not_sure_to_be_iron_loss_and_never_a_cable(late_s):
+    """It has taken late_s / L_sigma of the new voltage: a conductance, and a capacitance of that times the period."""
+    _, names = named(Machine(read_late_s=late_s))
+    assert len(names) == 1 and any("sampling_delay" in found for found in names.values()), names
+
+
 def test_legs_that_are_alike_are_not_said_to_differ():
     seen, _ = named(Machine(leg_v=4.0))
     assert not {"unequal_v", "unequal_w"} & set(seen.causes[0].sizes)

@@ -70,6 +70,8 @@ class Effect:
     """What the names of numbers begin with that together are one free function of time: all one, it is one."""
     either: tuple[tuple[str, ...], ...] = ()
     """Sets of its numbers' names of which but one is at work."""
+    exchanged: tuple[Term, ...] = ()
+    """Numbers that are never sought alone: they come in exchange for others only."""
 
     def forms(self, terms: Sequence[Term]) -> tuple[tuple[Term, ...], ...]:
         """The sets of these numbers that may be at work together."""
@@ -79,19 +81,23 @@ class Effect:
         return tuple(s for s in sets if s)
 
     def form_of(self, symbols: Collection[str], terms: Sequence[Term]) -> tuple[Term, ...]:
-        """Of the sets of these numbers the one that has most of these names."""
-        return max(self.forms(terms), key=lambda form: sum(t.symbol in symbols for t in form), default=())
+        """Of the sets of these numbers the one that has most of these names, and what was exchanged."""
+        best = max(self.forms(terms), key=lambda form: sum(t.symbol in symbols for t in form), default=())
+        return (*best, *self.exchanged_in(symbols))
+
+    def exchanged_in(self, symbols: Collection[str]) -> tuple[Term, ...]:
+        return tuple(t for t in self.exchanged if t.symbol in symbols)
 
 
 def effect(
     name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
     split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes], course: str = "",
-    either: tuple[tuple[str, ...], ...] = (),
+    either: tuple[tuple[str, ...], ...] = (), exchanged: tuple[Term, ...] = (),
 ) -> Callable[[Callable[[Setting], tuple[Term, ...]]], Effect]:
     """Turns the function that lists an effect's terms into its catalogue entry."""
 
     def enter(terms: Callable[[Setting], tuple[Term, ...]]) -> Effect:
-        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course, either)
+        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course, either, exchanged)
         object.__setattr__(entry, "__doc__", terms.__doc__)
         return entry
 

@@ -181,9 +181,13 @@ def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
     )
 
 
+EDGE = Term("iron_loss", "edge", "F", kinds.CABLE, 0, 1e-9, 0.0, 1e-3)
+"""Charge per volt of a step of the command that a sample at that instant has seen already: conductance times period, all of it."""
+
+
 def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """At low frequency, where eddy currents fill the sheet."""
-    return {"conductance_ms": (sum(values.values()) * 1e3, "mS")}
+    return {"conductance_ms": (sum(v for k, v in values.items() if k != EDGE.symbol) * 1e3, "mS")}
 
 
 @effect(
@@ -191,7 +195,7 @@ def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     signature="resistance rises with the square of frequency up to more than 1 kHz; looks like a lead",
     confounders=("rotor_skin_effect", "sampling_delay", "cable_capacitance"),
     source="conductance across the stator flux: E. Levi, IEEE Trans. Energy Convers. 10(2), 1995",
-    split_by="tones above 1 kHz, or a running no-load test",
+    split_by="tones above 1 kHz, or a running no-load test", exchanged=(EDGE,),
 )
 def iron_loss(setting: Setting) -> tuple[Term, ...]:
     """Conductance g >= 0 [S] fed by the stator's induced voltage, and eddy paths g_k / (1 + s T_k) that lag behind it, with

@@ -14,8 +14,13 @@ from commissioner.diagnose.model import Term
 PHASES = ("u", "v", "w")
 
 
+EARLY = Term("sampling_delay", "read_late", "s", DELAY, 0, 1e-6, -1e-3, 0.0)
+"""Delay below zero: the current is read after the instant that it is recorded for."""
+
+
 def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"delay_us": (values.get("delay", 0.0) * 1e6, "us"), "alternating_us": (abs(values.get("alternating", 0.0)) * 1e6, "us")}
+    delay = values.get("delay", 0.0) + values.get(EARLY.symbol, 0.0)
+    return {"delay_us": (delay * 1e6, "us"), "alternating_us": (abs(values.get("alternating", 0.0)) * 1e6, "us")}
 
 
 @effect(
@@ -23,10 +28,13 @@ def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     signature="phase proportional to frequency at excited lines, no distortion",
     confounders=("sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance"),
     source="computation and PWM delay: B.-H. Bae, S.-K. Sul, IEEE Trans. Ind. Appl. 39(3), 2003",
-    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
+    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor", exchanged=(EARLY,),
 )
 def sampling_delay(setting: Setting) -> tuple[Term, ...]:
-    """Reported current is i(t - tau), tau >= 0 [s], and a part that is added and taken off from sample to sample."""
+    """Reported current is i(t - tau), tau >= 0 [s], and a part that is added and taken off from sample to sample; tau < 0 only in
+
+    exchange for a conductance and a cable that imitate it.
+    """
     return (
         Term("sampling_delay", "delay", "s", DELAY, 0, 1e-6, 0.0, 0.02),
         Term("sampling_delay", "alternating", "s", DELAY, 1, 1e-6, -0.02, 0.02),
