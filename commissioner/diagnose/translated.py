@@ -89,6 +89,11 @@ def _heat(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> En
     return {"size": rise, "time_constant_s": 1.0 / max(leak, 1.0 / ADIABATIC_S)}
 
 
+def _delay(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
+    """The simulator cannot read ahead: a current that is read late is read at its instant there."""
+    return {"size": max(1e-6 * sizes["delay_us"], 0.0)}
+
+
 def _lag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
     """One time constant, or from half of the shape of two equal ones on, those."""
     shape = "second_order" if values.get("shape", 0.0) > 0.125 else "first_order"
@@ -195,7 +200,7 @@ def _clock(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> E
 
 TRANSLATED: dict[str, Translate] = {
     "dead_time": _legs(1.0), "device_drop": _legs(ROOT_AT_HALF), "dc_link_sag": _sag,
-    "dc_link_ripple": _line("ripple"), "sampling_delay": _size("delay_us", 1e-6),
+    "dc_link_ripple": _line("ripple"), "sampling_delay": _delay,
     "sensor_lag": _lag, "magnetizing_saturation": _saturation,
     "magnetic_hysteresis": _hysteresis, "remanence": _remanence, "leakage_saturation": _leakage,
     "rotor_skin_effect": _skin, "iron_loss": _size("conductance_ms", 1e-3),

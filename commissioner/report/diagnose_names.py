@@ -7,14 +7,15 @@ from typing import Any
 
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.report.diagnose_numbers import PLAIN_NUMBERS, quantity, quantity_name, short, sure
-from commissioner.report.diagnose_plain import LEGS, PLAIN, Plain
+from commissioner.report.diagnose_plain import LEGS, PLAIN, READ_LATE, Plain
 
 Cause = Mapping[str, Any]
 TOGETHER = frozenset({"dead_time", "device_drop"})
 """Every inverter has both, and both do the same at one switching frequency and link voltage."""
 LATE = frozenset({"sampling_delay", "sensor_lag"})
 COMMON: Mapping[frozenset[str], Mapping[str, str]] = {
-    TOGETHER: {"voltage_v": "lost per leg", "half_current_a": "half of it reached at"},
+    TOGETHER: {"voltage_v": "lost per leg", "half_current_a": "half of it reached at", "unequal_v": "leg V against the mean of the three",
+               "unequal_w": "leg W against the mean of the three"},
     LATE: {"delay_us": "delay in all", "time_constant_us": "delay in all"},
 }
 """What the members of a class share: the only sizes that are known while nobody knows which of them it is."""
@@ -100,6 +101,8 @@ def plain_of(cause: Cause) -> Plain:
     if members(cause) == TOGETHER:
         return LEGS
     own = PLAIN[cause["name"]]
+    if cause["name"] == "sampling_delay" and cause["parameters"]["delay_us"]["value"] < 0.0:
+        own = READ_LATE
     if not cause["equivalent"]:
         return own
     if members(cause) == LATE:

@@ -26,6 +26,10 @@ LEGS = Plain(
     "Switch the drive's dead-time compensation on if it has one, and record again: this error must become smaller.",
     is_normal=True,
 )
+READ_LATE = Plain(
+    "The current is read {size} after the instant it is recorded for", FINE,
+    measurement="Read the current at the step of the command, or correct its time stamps by that.",
+)
 PLAIN: Mapping[str, Plain] = {
     "dead_time": Plain("The inverter's dead time takes {size} from every leg", LEGS.motor, LEGS.drive, is_normal=True),
     "device_drop": Plain("The inverter's switches and diodes take {size} from every leg", LEGS.motor, LEGS.drive, is_normal=True),
