@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
-from commissioner.diagnose.lines import found_lines, with_lines
+from commissioner.diagnose.lines import found_lines, with_lines, without_lines
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
@@ -28,8 +28,11 @@ FRESH_STATOR_HEAT, FRESH_CAGE_HEAT = "fresh", "rotor_heat_fresh"
 """Of a motor that cools in the pauses, whatever the time stamps say."""
 SETTLED = 4.0
 """Thermal time constants in a recording, for a temperature that settles within it."""
-SPEED_KNOTS_S, MOST_SPEED_KNOTS = 0.4, 40
-"""A shaft held by its load swings below about 1 Hz: cubic splines of this spacing follow it to a per cent."""
+HAT, FINE_HAT = "hat_", "hat_fine_"
+SPEED_KNOTS_S = {HAT: (0.4, 40), FINE_HAT: (0.16, 80)}
+"""Spacing of a speed's cubic splines, and the most intervals of a segment. A shaft held by its load swings below about 1 Hz, which the
+
+wide ones follow to a per cent; the fine ones follow 2.5 Hz to some per cent."""
 Named = tuple[tuple[str, ...], list[Array]]
 
 
@@ -46,7 +49,12 @@ def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[
     record = _with(record, _phase_patterns(record))
     record = _with(record, _heat(record, rotor_current_a))
     record = _with(record, _sag(record))
-    return with_lines(_with(record, _hats(record)), lines)
+    return with_lines(_with(record, _hats(record, HAT)), lines)
+
+
+def with_fine_hats(record: Record, lines: Mapping[str, float]) -> Record:
+    """The record with splines for a faster speed as well, before its lines."""
+    return with_lines(_with(without_lines(record), _hats(record, FINE_HAT)), lines)
 
 
 def _with(record: Record, named: Named) -> Record:
@@ -141,13 +149,14 @@ def lagged_power(record: Record, segment: Segment, lag_s: float) -> Array:
     return np.asarray(power + (before - power) * arrives / periods)
 
 
-def _hats(record: Record) -> Named:
+def _hats(record: Record, name: str) -> Named:
+    spacing_s, most_intervals = SPEED_KNOTS_S[name]
     out = []
     for segment in record.segments:
         seconds = segment.count * record.facts.sample_period_s
-        intervals = int(np.clip(round(seconds / SPEED_KNOTS_S), 2, MOST_SPEED_KNOTS))
+        intervals = int(np.clip(round(seconds / spacing_s), 2, most_intervals))
         knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, intervals + 1), np.ones(3)]
         out.append(BSpline.design_matrix(np.linspace(0.0, 1.0, segment.count), knots, 3).toarray())
     most = max(o.shape[1] for o in out)
     padded = [np.hstack([o, np.zeros((o.shape[0], most - o.shape[1]))]) for o in out]
-    return tuple(f"hat_{k}" for k in range(most)), padded
+    return tuple(f"{name}{k}" for k in range(most)), padded

@@ -70,12 +70,14 @@ def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise:
     return {f"ripple_{ripple:.0f}": (ripple_hz, ripple_ratio), f"mains_{mains:.0f}": (mains_hz, mains_ratio)}
 
 
+def without_lines(record: Record) -> Record:
+    others = sum(name.partition("_")[0].partition("x")[0] not in HARMONICS for name in record.channel_names)
+    return replace(record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels))
+
+
 def with_lines(record: Record, lines: Mapping[str, float]) -> Record:
     """The record with these lines as its last channels, in place of those it had."""
-    others = sum(name.partition("_")[0].partition("x")[0] not in HARMONICS for name in record.channel_names)
-    record = replace(
-        record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels)
-    )
+    record = without_lines(record)
     for name, frequency in lines.items():
         record = record.with_channels(*_line(record, name, frequency))
         for order in HARMONICS[name.partition("_")[0]]:

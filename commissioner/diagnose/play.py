@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.channels import with_known
+from commissioner.diagnose.channels import FINE_HAT, with_fine_hats, with_known
 from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model
 from commissioner.diagnose.nominal import with_flux_before
 from commissioner.diagnose.plant import predict
@@ -68,6 +68,8 @@ def play(
     for _ in range(2):
         rotor = [predict(plain, record, k, used).rotor_current_a for k in range(len(record.segments))]
         known = with_known(replace(record, channel_names=(), channels=()), rotor, lines_hz)
+        if any(t.symbol.startswith(FINE_HAT) for t in model.terms):
+            known = with_fine_hats(known, lines_hz)
         record = _filled(with_flux_before(known, model, used), model, used)
     noise = np.random.default_rng(seed + 1)
     parts = [

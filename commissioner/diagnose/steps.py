@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.dictionaries import following, with_closer_radii, with_finer_curves
+from commissioner.diagnose.channels import FINE_HAT
+from commissioner.diagnose.dictionaries import following, with_closer_radii, with_faster_speed, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, as_read_late, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
@@ -110,7 +111,8 @@ class Steps:
                 other = None if is_over else self._exchanged(current, accepted)
                 if other is None and not is_over and accepted:
                     clearer = self._with_clearer_lines(current, accepted)
-                    other = None if clearer is None else (clearer, accepted, self.setting)
+                    faster = clearer or self._with_faster_speed(current, accepted)
+                    other = None if faster is None else (faster, accepted, self.setting)
                 if other is None:
                     return current, accepted, screening
                 current, accepted, self.setting = other
@@ -142,6 +144,14 @@ class Steps:
             return None
         self.full, self.setting, self.ripple_meets_tones = full, setting, meets_tones(full, setting)
         return again
+
+    def _with_faster_speed(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
+        """The fit in which a shaft swings faster, where it does; tried once something is left beside all other causes."""
+        is_left = surely_left(current, self.noise) * float(current.normal.count.sum()) > self.threshold(1)
+        if "shaft_motion" not in accepted or not is_left or any(n.startswith(FINE_HAT) for n in self.record.channel_names):
+            return None
+        again, self.full, self.setting = with_faster_speed(current, self.full, self.setting, self.noise, self.report)
+        return again if again is not current else None
 
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""

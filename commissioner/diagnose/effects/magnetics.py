@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.channels import FINE_HAT, HAT
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
 from commissioner.diagnose.model import Term
+from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]
 
@@ -209,6 +211,12 @@ def iron_loss(setting: Setting) -> tuple[Term, ...]:
     return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
 
 
+def _speed_hats(record: Record) -> list[str]:
+    """Channels that a speed is made of: the finest there are."""
+    hats = [n for n in record.channel_names if n.startswith(HAT)]
+    return [n for n in hats if n.startswith(FINE_HAT)] or hats
+
+
 def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """Root mean square over the time in which the command would show it: without flux a speed leaves no trace."""
     power, weight = 0.0, 0.0
@@ -216,28 +224,28 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
         shown = segment.voltage_axis_v**2
         for name, value in values.items():
             hat, _, uid = name.rpartition("_")
-            if uid == str(segment.uid) and hat.startswith("hat_"):
+            if uid == str(segment.uid) and hat.startswith(HAT):
                 mine = float(shown @ channels[:, setting.record.channel(hat)])
                 power, weight = power + mine * value**2, weight + mine
     return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
 
 
 @effect(
-    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes, course="hat_",
+    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes, course=HAT,
     signature="current in the axis that gets no voltage, proportional to the rotor flux",
     confounders=("sensor_offset", "sensor_drift", "inductance_anisotropy"),
     source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
     split_by="block the shaft",
 )
 def shaft_motion(setting: Setting) -> tuple[Term, ...]:
-    """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment; and where in the pause before a
+    """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment, or closer where the record has such
 
-    segment it carried the flux left from the segment before that.
+    splines; and where in the pause before a segment it carried the flux left from the segment before that.
     """
     speed = tuple(
         Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
         for s in setting.record.segments
-        for n in setting.record.channel_names if n.startswith("hat_")
+        for n in _speed_hats(setting.record)
     )
     carried = tuple(
         Term("shaft_motion", f"{name}_{s.uid}", "1", kinds.CARRY, k, 0.01, -2.0, 2.0, segment=s.uid)
