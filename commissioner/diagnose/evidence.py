@@ -23,6 +23,8 @@ from commissioner.diagnose.screen import screen
 
 Array = NDArray[np.float64]
 TIE_CHI2 = 10.0
+UNKNOWN, INSTANTS_PER_NUMBER = 1e-9, 4
+"""Information, of the best known number of a course, that any has; and instants at which a course is read, per number."""
 ALTERNATIVE_SHARE = 0.9
 """An alternative is refitted only if it promises this share of the cause's own gain, or of what that one promises."""
 ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
@@ -161,20 +163,38 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
     if CATALOGUE[name].course:
         first = next(iter(sizes))
-        out[first] = (*_steady(found, name), sizes[first][1])
+        out[first] = (*_rms_of_course(found, name, setting), sizes[first][1])
     return out
 
 
-def _steady(found: Fit, name: str) -> tuple[float, float]:
-    """The steady value that would change the current as much as the effect's course over time does, and its standard deviation.
+def _rms_of_course(found: Fit, name: str, setting: Setting) -> tuple[float, float]:
+    """Root mean square of the effect's course over time and its standard deviation, each instant weighed by how surely it is known.
 
-    What the noise alone adds to a sum of squares, one for every number, is taken off.
+    What the noise alone adds to a square, the variance of the course there, is taken off.
     """
     mine, information = found.information_of(name, CATALOGUE[name].course)
-    values, steady = found.model.theta[mine], np.array([1.0 / found.model.terms[k - 4].step for k in mine])
-    shown = max(float(values @ information @ values) - mine.size, 0.0)
-    weight = float(steady @ information @ steady)
-    return float(np.sqrt(shown / weight)), float(np.sqrt((shown + 0.5 * mine.size) / max(shown, 1.0) / weight))
+    terms = [found.model.terms[k - 4] for k in mine]
+    steps = np.array([t.step for t in terms])
+    known = information / np.outer(steps, steps)
+    covariance = np.linalg.inv(known + UNKNOWN * float(np.diag(known).max()) * np.eye(mine.size))
+    shapes = []
+    for segment, channels in zip(setting.record.segments, setting.record.channels, strict=True):
+        here = [k for k, t in enumerate(terms) if t.segment == segment.uid]
+        at = np.linspace(0, segment.count - 1, INSTANTS_PER_NUMBER * len(here)).astype(int)
+        shape = np.zeros((at.size, mine.size))
+        shape[:, here] = channels[np.ix_(at, [terms[k].index for k in here])]
+        shapes.append(shape)
+    course = np.concatenate(shapes)
+    certainty = 1.0 / np.einsum("tk,kl,tl->t", course, covariance, course)
+    weight = (course * (certainty / certainty.sum())[:, None]).T @ course
+    values = steps * found.model.theta[mine]
+    power = float(values @ weight @ values - np.trace(weight @ covariance))
+    spread = weight @ covariance
+    by_chance = 2.0 * float(np.sum(spread * spread.T))
+    # the values carry their noise themselves
+    doubt = max(4.0 * float(values @ spread @ weight @ values) - by_chance, by_chance)
+    rms = float(np.sqrt(max(power, 0.0)))
+    return rms, float(np.sqrt(doubt) / (2.0 * max(rms, doubt**0.25)))
 
 
 def confidence(features: Sequence[float], weights: Sequence[float]) -> float:

@@ -78,6 +78,9 @@ class Machine:
     sag: float = 0.0
     """Share of the voltage that is missing at rated power, behind a lag of `sag_s`."""
     sag_s: float = 0.01
+    swing: float = 0.0
+    """Amplitude of the electrical speed, rad/s, of a shaft that swings at `swing_hz`."""
+    swing_hz: float = 1.7
     left_wb: complex = 0.0
     """Flux of the open rotor's current, at the stator, when each segment begins."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
@@ -131,7 +134,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
 
 
 @njit(cache=True)
@@ -151,7 +154,7 @@ def _leg_loss(current, leg_v, leg_a, legs):
 
 
 @njit(cache=True)
-def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion):
+def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
 
     currents of the bar's layers.
@@ -177,6 +180,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
         d[7:] = (-2.0 * d[1] / r_r - LAYERS * x[7:]) / diffusion
     else:
         d[1] = -r_r * i_r
+    d[1] += 1j * omega * x[1]
     if iron > 0.0:
         d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee))
     if lag > 0.0:
@@ -189,7 +193,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, bar, diffusion, ripple, ripple_hz):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, bar, diffusion, ripple, ripple_hz, swing, swings):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -201,20 +205,21 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
     v = 0.0j
     load = 0.0
     for k in range(n):
+        omega = swing * math.cos(swings * (begin + k * period))
         r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
+            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             memory[at % (late + 1)] = seen
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
                 v = volts[k] * (1.0 - sag * load)
-                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
+                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             at += 1
-            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
-            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
-            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion)
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             if ripple > 0.0:
                 v = volts[k] * (1.0 + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 0.5) / fine) * period))

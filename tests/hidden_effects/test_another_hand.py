@@ -109,6 +109,16 @@ def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(
 
 
 @pytest.mark.campaign
+@pytest.mark.parametrize("hz", [0.0, 0.7, 1.7])
+def test_a_shaft_that_swings_has_its_speed(hz):
+    """At 1.7 Hz splines on a knot every 0.4 s cannot follow, and the speed is no steady one's equal."""
+    seen, names = named(Machine(swing=0.5, swing_hz=hz), 4.0)
+    assert set(names) == {"shaft_motion"} and seen.left.sigma < 0.1
+    rms = 0.5 if hz == 0.0 else 0.5 / math.sqrt(2.0)
+    assert seen.causes[0].sizes["speed_rad_per_s"][0] == pytest.approx(rms, rel=0.05)
+
+
+@pytest.mark.campaign
 def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
     machine = Machine(bar_s=2e-2)
     seen, names = named(machine, 3.0)

@@ -61,12 +61,15 @@ def test_a_curve_carried_over_is_the_same_where_it_was_seen_and_straight_beyond(
     assert np.abs(old[~seen] - straight).max() > 0.01 * straight.max()
 
 
-def with_ripple(setting, frequency_hz):
-    """The recorded currents as a link with that ripple makes them, but for what passes through the rotor's time constant."""
+def with_ripple(setting, nominal, frequency_hz):
+    """What a link with that ripple adds to the currents, through the machine's impedance."""
+    r_s, r_r, l_sigma, l_m = nominal.nominal
     segments = []
     for segment in setting.record.segments:
         turn = np.cos(2.0 * np.pi * frequency_hz * segment.time_s)
-        segments.append((segment, 0.01 * segment.voltage_axis_v * turn / (2.0 * np.pi * frequency_hz * 0.021)))
+        s = 2j * np.pi * np.fft.rfftfreq(segment.count, segment.period_s)
+        impedance = r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m)
+        segments.append((segment, np.fft.irfft(np.fft.rfft(0.01 * segment.voltage_axis_v * turn) / impedance, segment.count)))
     return segments
 
 
@@ -76,7 +79,7 @@ def test_a_ripple_is_seen_at_its_frequency(nominal, setting, hertz, line):
     directions = [np.cos(np.deg2rad(s.axis_deg - np.array([0.0, 120.0, 240.0]))) for s in setting.record.segments]
     segments = tuple(
         replace(s, currents_a=s.currents_a + np.outer(d, more) + 0.01 * random.normal(size=s.currents_a.shape))
-        for (s, more), d in zip(with_ripple(setting, hertz), directions, strict=True)
+        for (s, more), d in zip(with_ripple(setting, nominal, hertz), directions, strict=True)
     )
     record = replace(setting.record, segments=segments)
     seen, lines = with_clearer_lines(record, nominal, setting.layout, WHITE, setting.lines_hz, ())
