@@ -32,6 +32,8 @@ TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
+IMITATED = frozenset({("sensor_offset", "sensor_drift")})
+"""Simple causes, each with one of many numbers that has it as a limit."""
 DELAY_OR_LAG_TIE = 1e-5
 SAME_ORDER_TIE = 2e-3
 NEARLY_ALL, LEFT_TIE = 0.001, 0.1
@@ -121,7 +123,9 @@ def _cause(
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
-    close = tuple(n for n, r in rivals.items() if r.loss < max(TIE_CHI2, _share_open(name, n) * gain, unsettled))
+    close = tuple(
+        n for n, r in rivals.items() if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
+    )
     features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
     if not noise.is_known:
@@ -156,6 +160,17 @@ def _share_open(name: str, rival: str) -> float:
     """
     shares = {SAME_ORDER: SAME_ORDER_TIE, frozenset({"sampling_delay", "sensor_lag"}): DELAY_OR_LAG_TIE}
     return shares.get(frozenset({name, rival}), 0.0)
+
+
+def _more_numbers(found: Found, name: str, rival: str) -> float:
+    """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
+
+    has settled at once.
+    """
+    if (name, rival) not in IMITATED:
+        return 0.0
+    mine = sum(t.effect == name for t in found.fit.model.terms)
+    return float(np.log(found.fit.normal.count.sum())) * (len(CATALOGUE[rival].terms(found.setting)) - mine)
 
 
 def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:

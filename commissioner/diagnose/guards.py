@@ -23,12 +23,12 @@ CLASS_GUARD = 1e-2
 SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
     SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 2e-3,
-    frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+    frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "remanence"}): 1e-4, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
     frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
     frozenset({"iron_loss", "sensor_lag"}): 5e-4, frozenset({"iron_loss", "sampling_delay"}): 5e-4,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
-flux left from the segment before, which a shaft that turns in the pause carries elsewhere. (Offset and drift differ plainly, and so does a
+flux left from the segment before, which a shaft that turns in the pause carries elsewhere. (A flux decays and an offset stays. Offset and drift differ plainly, and so does a
 shaft, which moves current across the axis; a conductance's current steps with the voltage, which a delay or a lag does to no current; and how
 far a leakage's anisotropy tilts the cage's resistance is a number of its own.)"""
 LINEAR = ("sampling_delay", "sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance")
