@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.diagnose.dictionaries import begun, carried_over, respread
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import guard_of_lost_samples, losses_of
+from commissioner.diagnose.guards import LINES_OF_THEIR_OWN, guard_of_lost_samples, losses_of
 from commissioner.diagnose.lost import Loss, mend
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
@@ -104,6 +104,7 @@ def _searched(
     accepted: tuple[str, ...] = ()
     first: Screening | None = None
     regrouped: set[frozenset[str]] = set()
+    placed: frozenset[str] = frozenset()
     is_hopeless = False
     for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
         part = record if samples == record.samples else record.beginning(samples)
@@ -118,12 +119,12 @@ def _searched(
             again = fit(_completed(nominal.model, accepted, here), part, layout, noise)
             start, accepted = (again, accepted) if again.chi2 < start.chi2 else (start, ())
         whole = Steps(here, noise, names, report, record, go_on)
-        whole.regrouped = regrouped
+        whole.regrouped, whole.placed = regrouped, placed
         if accepted or part is record:
             start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
         fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
         is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal, noise)
-        first, record, regrouped = first or whole.first, whole.full, whole.regrouped
+        first, record, regrouped, placed = first or whole.first, whole.full, whole.regrouped, whole.placed
         setting, start = replace(setting, record=record, lines_hz=whole.setting.lines_hz), fitted
         seen = whole
     if accepted and losses:
@@ -142,7 +143,7 @@ def _searched(
             fitted, accepted, last = whole.run(again, accepted)
     layout = whole.layout
     if not _leaves(UNKNOWN_SIGMA, fitted, nominal, noise):
-        fitted, layout = settled(fitted, whole.record, layout, noise, is_placed=whole.placed == frozenset(accepted))
+        fitted, layout = settled(fitted, whole.record, layout, noise, is_placed=_is_placed(placed, accepted))
     iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
     reached = replace(
         whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
@@ -151,6 +152,13 @@ def _searched(
         nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
         whole.below, losses_of(fitted, accepted), tuple(x for x in losses if not x.is_spike),
         tuple(x for x in losses if x.is_spike), whole.material_chi2, go_on(),
+    )
+
+
+def _is_placed(placed: frozenset[str], accepted: Sequence[str]) -> bool:
+    """Whether the iron's side was sought beside these causes already, but for some that act at lines of their own."""
+    return bool(placed) and placed <= set(accepted) and all(
+        CATALOGUE[n].family in LINES_OF_THEIR_OWN for n in set(accepted) - placed
     )
 
 
