@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from commissioner.diagnose.plant import Path, predict, trajectory
 from commissioner.diagnose.record import Record, each_segment
 
 Array = NDArray[np.float64]
+HELD_SAMPLES = 400_000
+"""Of a record whose trajectories are held: a quarter of a gigabyte at the most."""
 SLICE = 12 * 1024
 """Samples whitened at once in white noise: a multiple of every block a screening averages over."""
 
@@ -72,16 +75,30 @@ def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: fl
 
 
 class Trial:
-    """A model on a record: its chi2 from the trajectories alone, and the derivatives for the four and `wanted` once they are asked for."""
+    """A model on a record: its chi2 from the trajectories alone, and the derivatives for the four and `wanted` once they are asked for.
+
+    The trajectories of a long record are not held between the two: there derivatives come with the chi2.
+    """
 
     def __init__(self, model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise) -> None:
         self._model, self._record, self._layout, self._wanted, self._noise = model, record, layout, wanted, noise
         self._size = 4 + len(wanted)
-        self._paths, chi2 = (list(column) for column in zip(*each_segment(self._chi2_of, record), strict=True))
+        self._paths: list[Path] = []
         self._prior = layout.penalty(wanted)
         known = {(t.effect, t.symbol): x for t, x in zip(model.terms, model.theta[4:], strict=True)}
         self._theta = np.array([0.0] * 4 + [known.get((t.effect, t.symbol), 0.0) for t in wanted])
-        self.chi2 = sum(chi2) + float(self._theta @ self._prior @ self._theta)
+
+    @cached_property
+    def chi2(self) -> float:
+        if self._wanted and self._record.samples > HELD_SAMPLES:
+            return self._normal.total_chi2
+        paths, chi2 = zip(*each_segment(self._chi2_of, self._record), strict=True)
+        self._paths = list(paths) if self._wanted else []
+        return float(sum(chi2)) + float(self._theta @ self._prior @ self._theta)
+
+    @cached_property
+    def _normal(self) -> Normal:
+        return self._gathered(1)
 
     def _here(self, k: int) -> list[int]:
         return [c for c, term in enumerate(self._wanted) if term.segment in (-1, self._record.segments[k].uid)]
@@ -102,11 +119,14 @@ class Trial:
         `block` > 1 averages so many neighbouring samples first (white noise only): a screening needs no more bandwidth
         than the excitation has.
         """
+        return self._normal if block == 1 else self._gathered(block)
 
+    def _gathered(self, block: int) -> Normal:
         def of_segment(k: int) -> tuple[Array, Array, float, int]:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 here, segment = self._here(k), self._record.segments[k]
-                seen = predict(self._model, self._record, k, self._layout, [self._wanted[c] for c in here], self._paths[k])
+                path = self._paths[k] if self._paths else None
+                seen = predict(self._model, self._record, k, self._layout, [self._wanted[c] for c in here], path)
                 product = self._product(seen.jacobian, segment.currents_a - seen.currents_a, segment.is_good, block)
             rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
             gram, slope = np.zeros((self._size, self._size)), np.zeros(self._size)
