@@ -20,7 +20,7 @@ SIDES = (0.0, 0.5, 1.0)
 NEAR = 0.1
 
 
-SETTLED_SAMPLES, PLACED_SAMPLES = 160_000, 45_000
+SETTLED_SAMPLES, PLACED_SAMPLES = 90_000, 45_000
 """On so many, loops are settled and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
