@@ -280,15 +280,18 @@ def _taylor_order(rate_times_step: float) -> int:
 
 
 def _substeps(model: Model, layout: Layout, segment: Segment, asked: Sequence[Term]) -> int:
-    """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode); below 2.5, where a second
+    """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode); below 2.5, which is stable,
 
-    path is asked for that has no size yet: its voltage must be stable.
+    for a second path that is asked for and has no size yet, and for what strong ones make of one another.
     """
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
     for terms, share in (((), 0.5), (asked, 0.1)):
         times = np.abs(layout.branch_time_s[_at_work(kinds.BRANCH, model, terms)])
         rate = max(rate, share / float(times.min(initial=np.inf)))
+    acting = _at_work(kinds.BRANCH, model, ())
+    gains = model.sum_kind(kinds.BRANCH, layout.branch_time_s.size)[acting]
+    rate = max(rate, 0.1 * _fastest(model, gains, layout.branch_time_s[acting]))
     if model.has_kind(kinds.LEAKAGE_CURVE):
         rate *= 1.3
     return int(layout.substeps * np.clip(np.ceil(rate * segment.period_s / 0.25), 1, 40))
