@@ -101,7 +101,7 @@ def plain_of(cause: Cause) -> Plain:
     if members(cause) == TOGETHER:
         return LEGS
     own = PLAIN[cause["name"]]
-    if cause["name"] == "sampling_delay" and cause["parameters"]["delay_us"]["value"] < 0.0:
+    if cause["name"] == "sampling_delay" and cause["parameters"].get("delay_us", {"value": 0.0})["value"] < 0.0:
         own = READ_LATE
     if not cause["equivalent"]:
         return own

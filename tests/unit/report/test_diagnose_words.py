@@ -123,6 +123,11 @@ def test_every_cause_has_a_sentence_with_and_without_a_size_and_what_decides_it(
     assert "_" not in spoken(name)
 
 
+def test_a_delay_below_zero_is_a_current_that_is_read_late():
+    words = sentence(cause("sampling_delay", {"delay_us": (-13.7, 0.1, "us")}))
+    assert "read" in words and "14" in words.replace("13.7", "14") and "-" not in words
+
+
 @pytest.mark.parametrize("names", [
     ("dead_time", "device_drop"), ("sampling_delay", "sensor_lag"), ("iron_loss", "rotor_skin_effect"), ("sensor_offset", "sensor_drift"),
     ("inductance_anisotropy", "sensor_gain_mismatch"), ("remanence", "shaft_motion"),
