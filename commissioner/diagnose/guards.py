@@ -109,7 +109,7 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
         return False
     sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
-    has_own_sign = CATALOGUE[name].exchanged_in(model.of(name))
+    has_own_sign = any(t.lower < 0.0 for t in CATALOGUE[name].exchanged_in(model.of(name)))
     if sign and sizes and not has_own_sign and next(iter(sizes.values()))[0] * sign <= 0:
         return False
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
