@@ -59,10 +59,11 @@ def with_clearer_lines(
 
 def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> dict[str, tuple[float, float]]:
     """Of ripple and mains each the frequency that explains or stands out most, Hz, and by how much it stands out (`ripple_300`: ...)."""
-    drive = _ripple_drive(record, residuals, model, noise)
+    tones = np.array(excited_lines(record))
+    drive = _ripple_drive(record, residuals, model, noise, tones)
     driven = [(base, *peak) for base in RIPPLE_HZ for peak in _peaks(record, drive, base)]
     # what one tone's error or another side line makes of the command may stand out more, but explains less
-    gains = _ripple_gains(record, residuals, model, noise, [frequency for _, frequency, _ in driven])
+    gains = _ripple_gains(record, residuals, model, noise, tones, [frequency for _, frequency, _ in driven])
     ripple, ripple_hz, ripple_ratio = driven[int(np.argmax(gains))]
     mains, mains_hz, mains_ratio = max(
         ((base, *_peaks(record, residuals, base)[0]) for base in MAINS_HZ), key=lambda found: found[2]
@@ -118,12 +119,11 @@ def _along(record: Record, segment: Segment, residual: Array, model: Model, nois
     )
 
 
-def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> list[Array]:
+def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise, tones: Array) -> list[Array]:
     """The residual as seen by a ripple: through the conjugate admittance over the noise's power, times the command (matched
 
     filter: G. Turin, IRE Trans. Inf. Theory 6(3), 1960); a ripple line stands out at its frequency.
     """
-    tones = np.array(excited_lines(record))
     out = []
     for segment, residual in zip(record.segments, residuals, strict=True):
         seen = _along(record, segment, residual, model, noise, tones)
@@ -133,10 +133,9 @@ def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, nois
 
 
 def _ripple_gains(
-    record: Record, residuals: Sequence[Array], model: Model, noise: Noise, frequencies: Sequence[float]
+    record: Record, residuals: Sequence[Array], model: Model, noise: Noise, tones: Array, frequencies: Sequence[float]
 ) -> list[float]:
     """What ripples of these frequencies (Hz) each explain of the residual beside the tones, in chi2 to first order."""
-    tones = np.array(excited_lines(record))
 
     def of_segment(k: int) -> Array:
         segment = record.segments[k].first(WEIGHED_SAMPLES)
