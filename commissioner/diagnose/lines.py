@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from commissioner.diagnose.audit import excited_lines
-from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.model import Layout, Model, impedance
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import TO_PHASES, Record, Segment, each_segment
@@ -105,17 +105,14 @@ class _Along:
 
 
 def _along(record: Record, segment: Segment, residual: Array, model: Model, noise: Noise, tones: Array) -> _Along:
-    r_s, r_r, l_sigma, l_m = model.nominal
     n, period = segment.count, record.facts.sample_period_s
     angle = np.deg2rad(segment.axis_deg)
     weights = TO_PHASES[: residual.shape[0]] @ np.array([np.cos(angle), np.sin(angle)])
     weights /= weights @ weights
-    frequency = np.fft.rfftfreq(n, period)
-    s = 2j * np.pi * frequency
-    impedance = np.asarray(r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m), dtype=np.complex128)
+    frequency = np.asarray(np.fft.rfftfreq(n, period), dtype=np.float64)
     is_free = np.all(np.abs(frequency[:, None] - tones) >= AT_A_TONE / (n * period), axis=1)
     return _Along(
-        weights @ np.where(segment.is_good, residual, 0.0), impedance, weights**2 @ noise.weights(n, period) ** 2, is_free
+        weights @ np.where(segment.is_good, residual, 0.0), impedance(model.nominal, frequency), weights**2 @ noise.weights(n, period) ** 2, is_free
     )
 
 

@@ -116,6 +116,13 @@ def with_halved_intervals(vectors: Array, weights: Array, finer: Array) -> Array
     return np.asarray(np.linalg.lstsq(finer.T, halved, rcond=None)[0])
 
 
+def impedance(nominal: tuple[float, float, float, float], hertz: Array) -> NDArray[np.complex128]:
+    """Of the four-parameter machine at rest, ohm, seen from its terminals along one axis."""
+    r_s, r_r, l_sigma, l_m = nominal
+    s = 2j * np.pi * hertz
+    return np.asarray(r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m), dtype=np.complex128)
+
+
 MOST_TAKEN = 0.9
 """Of the conductance of R_R in one step."""
 SKIN_EFFECT = "rotor_skin_effect"

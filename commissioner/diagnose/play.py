@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.channels import FINE_HAT, with_fine_hats, with_known
-from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model
+from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model, impedance
 from commissioner.diagnose.nominal import with_flux_before
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Facts, Record, Segment
@@ -41,18 +41,16 @@ def default_plan(axes_deg: Sequence[float] = (0.0, 60.0, 120.0)) -> tuple[Test, 
 
 def command(model: Model, facts: Facts, plan: Sequence[Test], seconds: float, seed: int) -> list[tuple[float, Array]]:
     """(axis, voltage) of every segment: half a second of zero, a ramp, then the multisine; phases from `seed`."""
-    r_s, r_r, l_sigma, l_m = model.nominal
     period = facts.sample_period_s
     t = np.arange(round(seconds / period)) * period
     phases = np.random.default_rng(seed).uniform(-np.pi, np.pi, len(TONES_HZ))
     tones = np.zeros(t.shape[0])
     for f, share, phase in zip(TONES_HZ, CURRENT_SHARES, phases, strict=True):
-        s = 2j * np.pi * f
-        impedance = abs(r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m))
-        flux_limit = 0.25 * facts.rated_flux_wb * abs(s) if facts.rated_flux_wb else np.inf
-        tones += min(share * facts.rated_current_peak_a * impedance, flux_limit) * np.cos(2 * np.pi * f * t + phase)
+        flux_limit = 0.25 * facts.rated_flux_wb * 2.0 * np.pi * f if facts.rated_flux_wb else np.inf
+        ohms = float(np.abs(impedance(model.nominal, np.array(f))))
+        tones += min(share * facts.rated_current_peak_a * ohms, flux_limit) * np.cos(2 * np.pi * f * t + phase)
     ramp = np.clip((t - 0.5) / 0.3, 0.0, 1.0)
-    bias = BIAS_SHARE * facts.rated_current_peak_a * r_s
+    bias = BIAS_SHARE * facts.rated_current_peak_a * model.nominal[0]
     return [(test.axis_deg, ramp * (test.level * tones + bias * test.has_bias)) for test in plan]
 
 
