@@ -165,7 +165,11 @@ def monitor(
 @app.command()
 def diagnose(
     files: Annotated[
-        list[Path], typer.Argument(help="Standstill recordings of one motor, or tables of steady points.")
+        list[Path],
+        typer.Argument(
+            help="Standstill recordings of one motor, or tables of locked-rotor or no-load points: columns frequency_hz, "
+            "voltage_line_v, current_line_a, power_w, and winding_resistance_uv_ohm where it is known."
+        ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     out: Annotated[

@@ -29,7 +29,7 @@ def diagnose(files: Sequence[Path], motor: str | None = None, out: Path | None =
     tables = [contract_table(Path(path)) for path in files]
     from commissioner.diagnose.points import is_points_table
 
-    if all(is_points_table(list(t.columns)) and "voltage_axis_v" not in t.columns for t in tables):
+    if all(is_points_table(list(t.columns)) for t in tables):
         _points(tables, out, as_json)
     else:
         _recordings(tables, motor, out, as_json)
@@ -119,13 +119,13 @@ def _points(tables: Sequence[Table], out: Path | None, as_json: bool) -> None:
     read = [read_points(t.columns, Path(t.source).stem) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
     documents = []
-    for points, table in zip(read, tables, strict=True):
-        if isinstance(points, str):
-            documents.append(refused_document(f"{table.source}: {points}", "points"))
+    for points in read:
+        if isinstance(points, DataRefused):
+            documents.append(refused_document(points, "points"))
         else:
             documents.append(points_document(diagnose_points(points, float(known[0]) if known else None)))
     document = documents[0] if len(documents) == 1 else _joined(documents, tables)
-    if out is not None and all(d["verdict"] != "refused" for d in documents):
+    if out is not None:
         from commissioner.report.diagnose_page import points_page
         from commissioner.report.page import render
 
@@ -138,7 +138,7 @@ def _points(tables: Sequence[Table], out: Path | None, as_json: bool) -> None:
 def _joined(documents: Sequence[dict[str, Any]], tables: Sequence[Table]) -> dict[str, Any]:
     """One document: all causes together, every table's own result under `tables`."""
     verdicts = [d["verdict"] for d in documents]
-    order = ("explained", "nothing_significant", "refused")
+    order = ("unexplained", "explained", "nothing_significant", "refused")
     verdict = next((v for v in order if v in verdicts), verdicts[0])
     return {
         **documents[0],

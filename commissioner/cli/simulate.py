@@ -9,6 +9,8 @@ from commissioner.cli.angles import parse_axes
 from commissioner.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from commissioner.diagnose.model import Layout, Model
 
 MAX_BYTES = 5_000_000
@@ -39,7 +41,7 @@ def simulate(
     else:
         segments, facts = _command_of(like, facts)
     with busy("playing"):
-        columns = player.play(made, layout, facts, segments, lines, noise_a, seed)
+        columns = _played(model, lambda: player.play(made, layout, facts, segments, lines, noise_a, seed))
     keys = {k: v for k, v in plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
     write_table(out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     summary = {
@@ -50,6 +52,22 @@ def simulate(
         emit(summary)
     else:
         err.print(f"{summary['samples']} samples in {summary['segments']} segments written to {out}")
+
+
+def _played(model: str, play: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The columns; ConfigurationError where the model cannot be played or runs away."""
+    import numpy as np
+
+    try:
+        with np.errstate(all="ignore"):
+            columns = play()
+    except (IndexError, np.linalg.LinAlgError) as error:
+        raise ConfigurationError(
+            file=model, key="terms", value=str(error), expected="numbers that its own dictionary has, as `commissioner diagnose` writes them"
+        ) from error
+    if not all(np.isfinite(values).all() for values in columns.values()):
+        raise ConfigurationError(file=model, key="nominal and terms", value="currents that run away", expected="numbers of a motor")
+    return columns
 
 
 def _check_size(seconds: float, noise_a: float) -> None:

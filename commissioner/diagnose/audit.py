@@ -16,6 +16,8 @@ from scipy.interpolate import CubicSpline
 
 from commissioner.diagnose.contradiction import contradiction
 from commissioner.diagnose.record import Facts, Record, Segment
+from commissioner.diagnose.refusals import refused
+from commissioner.errors import DataRefused
 from commissioner.records import Signal, StandstillRecording
 
 BRIDGED_SAMPLES = 5
@@ -24,6 +26,8 @@ PILE = 1e-6
 """How close to the end samples pile up, relative to the peak: to the last digit. Before a soft limit a channel bends, which
 is a cause to be fitted."""
 SHORTEST_STRETCH = 200
+MOST_CLIPPED = 0.3
+"""Of all samples: where more sit at a limit the data are refused."""
 REST_SAMPLES = 1
 LEAST_AT_PEAKS = 0.5
 """Of a command's power, where it consists of tones: the rest of their lines is beside them by the window alone."""
@@ -39,7 +43,7 @@ class Audit:
     holes: tuple[tuple[int, float, int], ...] = ()
     excited_hz: tuple[float, ...] = ()
     axes_deg: tuple[float, ...] = ()
-    refusal: str | None = None
+    refusal: DataRefused | None = None
 
 
 def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
@@ -288,22 +292,29 @@ def excited_lines(record: Record) -> list[float]:
 def _judge(
     record: Record, tones: Sequence[float], holes: Sequence[tuple[int, float, int]], clipped: dict[str, float],
     steps: Sequence[float],
-) -> tuple[str | None, list[str]]:
+) -> tuple[DataRefused | None, list[str]]:
     out: list[str] = []
     if not record.segments:
-        return "no stretch of the recording is long enough to fit anything", out
+        return refused(
+            "no stretch of the recording is long enough to fit anything", 0, f"{SHORTEST_STRETCH} samples without a hole",
+            "record again without losses, for longer",
+        ), out
     if float(max(np.std(s.voltage_axis_v) for s in record.segments)) == 0.0:
-        return "the command is constant: nothing is excited", out
+        return refused(
+            "the command is constant: nothing is excited", 0.0, "a command that moves", "record a test with tones (`commissioner run`)",
+        ), out
     if record.facts.current_peak_a == 0.0:
-        return "every current sample is zero: no sensor or no motor is connected", out
+        return refused(
+            "every current sample is zero: no sensor or no motor is connected", 0.0, "a current that flows", "check sensors and leads",
+        ), out
     lost = sum(h[2] for h in holes)
     if lost:
         out.append(f"{lost} samples are missing in {len(holes)} holes; they were left out, not filled.")
     if clipped:
         out.append(f"{clipped['samples']:.0f} samples sit at a limit of {clipped['limit_a']:.4g} A; they are masked.")
-        total = record.samples
-        if clipped["samples"] > 0.3 * total:
-            return f"{clipped['samples'] / total:.0%} of the samples are clipped", out
+        share = clipped["samples"] / record.samples
+        if share > MOST_CLIPPED:
+            return refused(f"{share:.0%} of the samples are clipped", share, f"at most {MOST_CLIPPED:.0%}", "record again at a lower level"), out
     if (refusal := contradiction(record)) is not None:
         return refusal, out
     if max(steps, default=0.0) > 0:

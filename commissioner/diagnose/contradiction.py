@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.refusals import refused
+from commissioner.errors import DataRefused
 
 LEAST_PROJECTION = 0.2
 """Share of a segment's current that a phase must carry, by the axis, to be missed when it is silent."""
@@ -19,19 +21,19 @@ LEAST_LAG_FACTOR = -0.1
 PHASES = ("u", "v", "w")
 
 
-def contradiction(record: Record) -> str | None:
+def contradiction(record: Record) -> DataRefused | None:
     """Why these currents cannot be the answer to this command, or None."""
     return _silent_phase(record) or _wrong_direction(record) or _wrong_sign(record)
 
 
-def _silent_phase(record: Record) -> str | None:
+def _silent_phase(record: Record) -> DataRefused | None:
     swing = np.array([max(float(np.ptp(s.currents_a[p])) for s in record.segments) for p in range(record.facts.phases)])
     for phase in np.flatnonzero(swing < 1e-6 * swing.max()):
         share = max(abs(float(TO_PHASES[phase] @ _direction(s))) for s in record.segments)
         if share > LEAST_PROJECTION:
-            return (
-                f"the current of phase {PHASES[phase]} stands still while the others flow: its sensor or lead is not "
-                "connected"
+            return refused(
+                f"the current of phase {PHASES[phase]} stands still while the others flow: its sensor or lead is not connected",
+                float(swing[phase]), f"about {share:.0%} of the others' {swing.max():.3g} A", "connect it and record again",
             )
     return None
 
@@ -41,7 +43,7 @@ def _direction(segment: Segment) -> np.ndarray:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def _wrong_sign(record: Record) -> str | None:
+def _wrong_sign(record: Record) -> DataRefused | None:
     """A motor at rest takes energy: its current lags by 0 to 90 degrees, and seems to lag by more where it is read late.
 
     The power itself of an inductive tone read a little late is negative: the lag is held against the middle of all that can be.
@@ -59,11 +61,14 @@ def _wrong_sign(record: Record) -> str | None:
         taken += float(np.vdot(below * middle, volts).real)
         scale += float(np.linalg.norm(volts) * np.linalg.norm(below))
     if taken < LEAST_LAG_FACTOR * scale:
-        return "the currents flow against the voltage, as if a motor at rest gave power: turn the sign of one of them"
+        return refused(
+            "the currents flow against the voltage, as if a motor at rest gave power", taken / scale,
+            f"at least {LEAST_LAG_FACTOR}", "turn the sign of one of them",
+        )
     return None
 
 
-def _wrong_direction(record: Record) -> str | None:
+def _wrong_direction(record: Record) -> DataRefused | None:
     along, across = 0.0, 0.0
     for segment in record.segments:
         inverse = np.linalg.pinv(TO_PHASES[: record.facts.phases])
@@ -73,9 +78,10 @@ def _wrong_direction(record: Record) -> str | None:
         along += float(((a * vector[0] + b * vector[1]) ** 2).sum())
         across += float(((a * vector[1] - b * vector[0]) ** 2).sum())
     if across > MOST_ACROSS**2 * along:
-        return (
-            "the current does not follow the excited axis (across it flows "
-            f"{np.sqrt(across / max(along, 1e-300)):.0%} of what flows along it): a shaft that turns, phases in another "
-            "order, or a wrong axis column; `commissioner monitor` reads a running motor"
+        share = float(np.sqrt(across / max(along, 1e-300)))
+        return refused(
+            f"the current does not follow the excited axis (across it flows {share:.0%} of what flows along it): a shaft that "
+            "turns, phases in another order, or a wrong axis column", share, f"at most {MOST_ACROSS:.0%}",
+            "check phases and axis; `commissioner monitor` reads a running motor",
         )
     return None

@@ -26,9 +26,10 @@ from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.moved import PARAMETERS
 from commissioner.diagnose.noise import Noise, measure_noise
-from commissioner.diagnose.refusals import Refused, check_before_search, check_one_state
+from commissioner.diagnose.refusals import check_before_search, check_one_state
 from commissioner.diagnose.search import Found, search
 from commissioner.diagnose.split import Split, split_lines
+from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
@@ -77,6 +78,7 @@ class Diagnosis:
     remarks: tuple[str, ...] = ()
     unsure: tuple[Cause, ...] = ()
     """Fitted, and more likely wrong than right as names: what they explain counts as left."""
+    refusal: DataRefused | None = None
 
 
 def diagnose(
@@ -90,7 +92,7 @@ def diagnose(
     """
     record, audit = prepare(recordings)
     if audit.refusal:
-        return Diagnosis(Verdict.REFUSED, audit.refusal, (), (), audit)
+        return _refused(audit.refusal, audit)
     noise = measure_noise(record)
     if audit.step_a:
         noise = noise.with_converter_step(np.array(audit.step_a))
@@ -100,9 +102,13 @@ def diagnose(
     try:
         found = search(record, noise, excluded=excluded, report=report, check=lambda f, r: check_before_search(f, r, noise), go_on=go_on)
         check_one_state(found.fit, found.record)
-    except Refused as refusal:
-        return Diagnosis(Verdict.REFUSED, str(refusal), (), (), audit, noise)
+    except DataRefused as refusal:
+        return _refused(refusal, audit, noise)
     return _conclude(found, audit, noise, excluded)
+
+
+def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> Diagnosis:
+    return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", (), (), audit, noise, refusal=refusal)
 
 
 def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str]) -> Diagnosis:

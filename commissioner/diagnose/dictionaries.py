@@ -14,7 +14,6 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import with_fine_hats
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.lines import LINES
 from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, with_ranges
@@ -135,15 +134,10 @@ def with_faster_speed(current: Fit, full: Record, setting: Setting, noise: Noise
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz."""
     record = with_fine_hats(full, setting.lines_hz)
     there = replace(setting, record=record.first(max(s.count for s in setting.record.segments)))
-    riding = {t.symbol: t for name in LINES.values() for t in CATALOGUE[name].terms(there)}
-    pairs = [
-        (riding.get(t.symbol, t) if t.effect in LINES.values() else t, v)
-        for t, v in zip(current.model.terms, current.model.values, strict=True) if t.kind != kinds.OMEGA
-    ]
     speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
-    terms, values = zip(*pairs, *((t, 0.0) for t in speed), strict=True)
-    wanted = current.chi2 - max(required_chi2(len(terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained)
-    faster = fit(Model(current.model.nominal, terms, values), there.record, there.layout, noise, wanted_chi2=wanted)
+    model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
+    wanted = current.chi2 - max(required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained)
+    faster = fit(model, there.record, there.layout, noise, wanted_chi2=wanted)
     report(f"  a speed on closer knots: gained {current.chi2 - faster.chi2:.4g}")
     return (faster, record, there) if faster.chi2 < wanted else (current, full, setting)
 

@@ -9,6 +9,7 @@ from commissioner.diagnose.causes import Cause
 from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.points_diagnosis import PointsDiagnosis
+from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
@@ -24,6 +25,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
     return {
         "verdict": seen.verdict.value,
         "reason": seen.reason,
+        **_error(seen.refusal),
         "kind": "recording",
         "convention": f"{CONVENTION}; {OF_RECORDINGS}",
         "causes": [_cause(c) for c in seen.causes],
@@ -96,6 +98,7 @@ def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
         "parameters_before": _quantities(seen.parameters_before),
         "parameters_after": _quantities(seen.parameters_after),
         "tested_p_values": dict(seen.tested),
+        "remarks": list(seen.points.remarks),
         "points": _points(seen),
         "next_experiment": None,
         "model_file": None,
@@ -115,10 +118,14 @@ def _points(seen: PointsDiagnosis) -> list[dict[str, float]]:
     return [{key: float(column[k]) for key, column in columns.items()} for k in range(seen.points.count)]
 
 
-def refused_document(reason: str, kind: str) -> dict[str, Any]:
+def _error(refusal: DataRefused | None) -> dict[str, Any]:
+    return {} if refusal is None else {"error": refusal.as_dict()}
+
+
+def refused_document(refusal: DataRefused, kind: str) -> dict[str, Any]:
     """The document where nothing could be answered."""
     return {
-        "verdict": "refused", "reason": reason, "kind": kind, "convention": CONVENTION, "causes": [],
+        "verdict": "refused", "reason": f"{refusal.what}; {refusal.remedy}", **_error(refusal), "kind": kind, "convention": CONVENTION, "causes": [],
         "gain": {"held_out": None, "rmse_before_a": None, "rmse_after_a": None, "noise_floor_a": None},
         "parameters_before": {}, "parameters_after": {}, "next_experiment": None, "model_file": None,
     }

@@ -12,13 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from commissioner.diagnose import kinds
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
-FORMAT = 4
+FORMAT = 5
 """2: a lag is its sum and its shape, no longer two time constants. 3: tilts of L_sigma and L_M are what they become together.
 
-4: heat leaks away with more time constants, and the channels behind it have moved."""
+4: heat leaks away with more time constants, and the channels behind it have moved. 5: numbers name the channel they multiply.
+"""
+KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstance(v, int))
 
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
@@ -44,7 +47,7 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
 def _term(term: Term, value: float) -> dict[str, Any]:
     return {
         "effect": term.effect, "symbol": term.symbol, "unit": term.unit, "kind": term.kind, "index": term.index,
-        "segment": term.segment, "value": value,
+        "segment": term.segment, "channel": term.channel, "value": value,
     }
 
 
@@ -59,8 +62,8 @@ def _dictionary(layout: Layout) -> dict[str, Any]:
 
 
 def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
-    """The model and its dictionary back from the document. KeyError or ValueError where it is not one."""
-    if document.get("kind") != "extended_model":
+    """The model and its dictionary back from the document. KeyError, TypeError or ValueError where it is not one."""
+    if not isinstance(document, Mapping) or document.get("kind") != "extended_model":
         raise ValueError("not an extended model")
     if document.get("format") != FORMAT:
         raise ValueError(f"an extended model of format {document.get('format')}, read is {FORMAT}: diagnose the recording again")
@@ -70,10 +73,19 @@ def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
         float(n["leakage_inductance_h"]), float(n["magnetizing_inductance_h"]),
     )
     terms = tuple(
-        Term(t["effect"], t["symbol"], t["unit"], int(t["kind"]), int(t["index"]), 1.0, segment=int(t["segment"]))
+        Term(
+            t["effect"], t["symbol"], t["unit"], int(t["kind"]), int(t["index"]), 1.0, segment=int(t["segment"]),
+            channel=str(t["channel"]),
+        )
         for t in document["terms"]
     )
     values = tuple(float(t["value"]) for t in document["terms"])
+    if not min(nominal) > 0.0 or not np.isfinite([*nominal, *values]).all():
+        raise ValueError(f"R_s, R_R, L_sigma and L_M must be above zero, and every number finite: {nominal}")
+    if unknown := sorted({t.kind for t in terms} - KINDS):
+        raise ValueError(f"numbers of kind {unknown[0]}, which no effect has")
+    if terms and not document["dictionary"]:
+        raise ValueError("numbers without the dictionary they refer to")
     return Model(nominal, terms, values), _layout(document["dictionary"]) if document["dictionary"] else None
 
 

@@ -8,7 +8,7 @@ operators of fixed radius, rotor branches of fixed corner frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,8 @@ class Term:
     start: float = 0.0
     segment: int = -1
     """Position of the only segment it acts in; -1: everywhere."""
+    channel: str = ""
+    """Known function of time that it multiplies, to which `index` points in one record: in another it may lie elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,18 @@ class Model:
         keep = [k for k, t in enumerate(self.terms) if t.effect in effects]
         return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
 
+    def without_kind(self, kind: int) -> Model:
+        pairs = [(t, v) for t, v in zip(self.terms, self.values, strict=True) if t.kind != kind]
+        return Model(self.nominal, tuple(t for t, _ in pairs), tuple(v for _, v in pairs))
+
+    def on_channels(self, names: Sequence[str]) -> Model:
+        """The model with its numbers pointing into a record with these channels; those whose channel is not there are left out."""
+        pairs = [
+            (replace(t, index=_place(t, names)) if t.channel else t, v)
+            for t, v in zip(self.terms, self.values, strict=True) if not t.channel or t.channel in names
+        ]
+        return Model(self.nominal, tuple(t for t, _ in pairs), tuple(v for _, v in pairs))
+
     def of(self, effect: str) -> dict[str, float]:
         return {t.symbol: v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect}
 
@@ -217,3 +231,9 @@ class Model:
 
     def has_kind(self, *kinds: int) -> bool:
         return any(t.kind in kinds for t in self.terms)
+
+
+def _place(term: Term, names: Sequence[str]) -> int:
+    """Where its channel is; what a sensor picks up counts through the three phases as well."""
+    at = names.index(term.channel)
+    return 3 * at + term.index % 3 if term.kind == kinds.TONE else at

@@ -58,7 +58,10 @@ def play(
     model: Model, layout: Layout | None, facts: Facts, segments: Sequence[tuple[float, Array]],
     lines_hz: Mapping[str, float], noise_a: float = 0.0, seed: int = 0,
 ) -> dict[str, Array]:
-    """Columns of the contract's standstill table. Heat and lagged power follow the model's own currents."""
+    """Columns of the contract's standstill table. Heat and lagged power follow the model's own currents; of a speed or a line what
+
+    these segments are too short for, or not there for, is left out. IndexError where a number points beyond its dictionary.
+    """
     record = _blank(facts, segments)
     used = layout or NO_DICTIONARY
     plain = Model(model.nominal)
@@ -66,8 +69,9 @@ def play(
     for _ in range(2):
         rotor = [predict(plain, record, k, used).rotor_current_a for k in range(len(record.segments))]
         known = with_known(replace(record, channel_names=(), channels=()), rotor, lines_hz)
-        if any(t.symbol.startswith(FINE_HAT) for t in model.terms):
+        if any(t.channel.startswith(FINE_HAT) for t in model.terms):
             known = with_fine_hats(known, lines_hz)
+        model = model.on_channels(known.channel_names)
         record = _filled(with_flux_before(known, model, used), model, used)
     noise = np.random.default_rng(seed + 1)
     parts = [

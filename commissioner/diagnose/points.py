@@ -11,10 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.diagnose.refusals import refused
+from commissioner.errors import DataRefused
+from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES
+
 Array = NDArray[np.float64]
-NEEDED = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
-RESISTANCES = ("winding_resistance_uv_ohm", "winding_resistance_ohm", "resistance_ohm", "winding_resistance_line_ohm")
-LEAST_POINTS = 5
+LEAST_POINTS, MOST_POINTS = 5, 300
+LEAST_SPREAD, LEAST_FLUX_SPREAD = 1.3, 1.15
+"""Largest over smallest current (locked rotor) and flux (no load) from which on a circuit can be seen to bend."""
+LEAST_POWER_FACTOR = 0.005
+"""A large motor at no load has 0.03; kilowatts read as watts make a thousandth of any."""
 NO_LOAD_SLOPE = -0.5
 """d ln R / d ln V of R = P/(3 I^2): about 0 with a locked rotor, between -1 and -2 at no load."""
 
@@ -30,6 +36,7 @@ class Points:
     power_w: Array
     resistance_ohm: Array | None
     is_locked: bool
+    remarks: tuple[str, ...] = ()
 
     @property
     def count(self) -> int:
@@ -59,24 +66,79 @@ class Points:
 
 
 def is_points_table(columns: Sequence[str]) -> bool:
-    return all(name in columns for name in NEEDED)
+    """Whether the names are meant to be a points table's: most of what one needs, and no time."""
+    return "time_s" not in columns and sum(name in columns for name in POINT_COLUMNS) >= 2
 
 
-def read_points(columns: Mapping[str, Array], name: str) -> Points | str:
-    """The points of a table, or the sentence that says why they cannot be used."""
-    values = [np.asarray(columns[c], dtype=float) for c in NEEDED]
-    if any(not np.all(np.isfinite(v)) or np.any(v <= 0) for v in values):
-        return "frequency, voltage, current and power must be positive numbers in every row"
-    if values[0].shape[0] < LEAST_POINTS:
-        return f"{values[0].shape[0]} points cannot carry an answer; at least {LEAST_POINTS} are needed"
-    f, v, i, p = values
-    if np.any(p > np.sqrt(3.0) * v * i):
-        row = int(np.argmax(p / (v * i)))
-        return f"row {row + 1}: the power {p[row]:.6g} W exceeds the apparent power {np.sqrt(3.0) * v[row] * i[row]:.6g} VA"
+def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused:
+    """The points of a table, rows that are copies taken once, or why they cannot be used."""
+    if missing := [c for c in POINT_COLUMNS if c not in columns]:
+        return refused(
+            f"a table of test points needs the column {missing[0]}", ", ".join(columns), ", ".join(POINT_COLUMNS),
+            f"add or rename: {', '.join(missing)}",
+        )
+    between = next((c for c in POINT_RESISTANCES if c in columns), None)
+    names = (*POINT_COLUMNS, *([between] if between else []))
+    for column in names:
+        values = np.asarray(columns[column], dtype=float)
+        wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
+        if wrong.size:
+            return refused(
+                f"{column} is {values[wrong[0]]:g} in row {wrong[0] + 1}", float(values[wrong[0]]), "positive numbers in every row",
+                "correct the cell or leave the row out",
+            )
+    rows = np.stack([np.asarray(columns[c], dtype=float) for c in names], axis=1)
+    _, first = np.unique(rows, axis=0, return_index=True)
+    copies, rows = rows.shape[0] - first.size, rows[np.sort(first)]
+    f, v, i, p = rows[:, :4].T
+    is_locked = _is_locked(f, v, i, p, name)
+    if (refusal := _not_usable(f, v, i, p, is_locked=is_locked)) is not None:
+        return refusal
+    remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
+    if between is None:
+        remarks.append(
+            "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point): windings that "
+            "warm up or cool down during the test count as the rotor's resistance or as loss."
+        )
+    return Points(name, f, v, i, p, 0.5 * rows[:, 4] if between else None, is_locked, tuple(remarks))
+
+
+def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> DataRefused | None:
+    if f.size < LEAST_POINTS:
+        return refused(
+            f"{f.size} different points cannot carry an answer", f.size, f"at least {LEAST_POINTS}", "measure at more voltages",
+        )
+    if f.size > MOST_POINTS:
+        return refused(
+            f"{f.size} points are no test by hand", f.size, f"at most {MOST_POINTS}",
+            "give the steady points, each once; a recording over time needs the column time_s",
+        )
+    factor = p / (np.sqrt(3.0) * v * i)
+    if factor.max() > 1.0:
+        row = int(np.argmax(factor))
+        return refused(
+            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A exceeds the apparent power {p[row] / factor[row]:.6g} VA",
+            float(factor[row]), "a power factor of at most 1", "give line-to-line volts, line amperes and the watts of all three phases",
+        )
+    if factor.min() < LEAST_POWER_FACTOR:
+        row = int(np.argmin(factor))
+        return refused(
+            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A is a power factor of {factor[row]:.2g}", float(factor[row]),
+            f"at least {LEAST_POWER_FACTOR}", "check the units: volts, amperes and watts, with a decimal point",
+        )
     if _loaded(f, v, i):
-        return "the current changes at constant voltage and frequency: points of a loaded motor, not of a locked or idle one"
-    between = next((np.asarray(columns[c], dtype=float) for c in RESISTANCES if c in columns), None)
-    return Points(name, f, v, i, p, None if between is None else 0.5 * between, _is_locked(f, v, i, p, name))
+        return refused(
+            "the current changes at constant voltage and frequency: points of a loaded motor, not of a locked or idle one",
+            float(np.ptp(i)), "currents that follow the voltage", "give the points of a locked-rotor or a no-load test",
+        )
+    what, values, least = ("current", i, LEAST_SPREAD) if is_locked else ("flux", v / f, LEAST_FLUX_SPREAD)
+    spread = float(values.max() / values.min())
+    if spread < least and not (is_locked and np.unique(f).size > 1):
+        return refused(
+            f"the largest {what} is only {spread:.3g} times the smallest: nothing can be seen to bend", spread, f"at least {least}",
+            "measure over a wider range of voltage",
+        )
+    return None
 
 
 def _is_locked(f: Array, v: Array, i: Array, p: Array, name: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from commissioner.diagnose.points import Array, Points
+from commissioner.diagnose.points import LEAST_SPREAD, Array, Points
 
 LEAST_SCATTER = 0.002
 """No instrument of such a test is trusted beyond two parts in a thousand."""
@@ -30,7 +30,7 @@ def candidates_for(points: Points) -> list[Extension]:
         return [Extension("magnetizing_saturation", 2), Extension("iron_loss", 2)]
     several = np.unique(points.frequency_hz).size > 1
     spread = float(points.current_line_a.max() / points.current_line_a.min())
-    out = [Extension("leakage_saturation", 1)] if spread > 1.3 else []
+    out = [Extension("leakage_saturation", 1)] if spread >= LEAST_SPREAD else []
     return out + ([Extension("rotor_skin_effect", 1)] if several else [])
 
 

@@ -8,24 +8,29 @@ from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.trial import whiten
+from commissioner.errors import DataRefused
 
+ONE_BY_ONE = "diagnose them one by one"
 MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
 
 
-class Refused(Exception):
-    """The data cannot carry an answer: not of one motor in one state, or no answer to the command."""
+def refused(what: str, value: object, limit: str, remedy: str) -> DataRefused:
+    """What the data cannot carry, the value seen, what it should be, and what to do."""
+    return DataRefused(what, step="diagnose", value=value, limit=limit, remedy=remedy)
 
 
 def check_before_search(nominal: Fit, record: Record, noise: Noise) -> None:
-    """The currents answer the command at all; and a leakage that differs by half between files is no effect of level."""
+    """The currents answer the command at all; and a leakage that differs by half between files is no effect of level. DataRefused."""
     count = float(nominal.normal.count.sum())
     white = (whiten(s.currents_a, s.is_good, noise, record.facts.sample_period_s) for s in record.segments)
     flowing = sum(float(w @ w) for w in white) - count
     if nominal.chi2 - count > MOST_UNANSWERED * flowing > FAINT * count:
-        raise Refused(
-            f"the command explains only {max(1.0 - (nominal.chi2 - count) / flowing, 0.0):.0%} of the current's power: "
-            "voltage and current do not belong together, or something else drives the motor"
+        explained = max(1.0 - (nominal.chi2 - count) / flowing, 0.0)
+        raise refused(
+            f"the command explains only {explained:.0%} of the current's power: voltage and current do not belong together, or "
+            "something else drives the motor", explained, f"at least {1.0 - MOST_UNANSWERED:.0%}",
+            "check that both columns are of one test, on one time axis, and that the shaft stands still",
         )
     _compare_files(nominal, record, slice(2, 3), 0.4)
 
@@ -48,7 +53,7 @@ def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> No
     names = ("R_s", "R_R", "L_sigma", "L_M")
     worst = which.start + int(np.argmax(spread[which]))
     if spread[worst] > most:
-        raise Refused(
+        raise refused(
             f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
-            f"(fitted together: {fitted.model.nominal[worst]:.4g}); diagnose them one by one"
+            f"(fitted together: {fitted.model.nominal[worst]:.4g})", float(spread[worst]), f"at most {most:.0%}", ONE_BY_ONE,
         )

@@ -21,7 +21,7 @@ import pyarrow.parquet as pa_parquet
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
-from commissioner.records import RunningRecording, Signal, StandstillRecording
+from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES, RunningRecording, Signal, StandstillRecording
 
 MAX_METADATA_LINES = 1000
 STEP_TOLERANCE = 0.02
@@ -254,8 +254,18 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
             values = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
         elif name in CONTRACT_COLUMNS:
-            raise _not_numeric(path, name, column[0])
+            raise _not_numeric(path, name, _first_text(column))
     return Table(columns, metadata, str(path))
+
+
+def _first_text(column: pa.ChunkedArray) -> str:
+    """The first cell that is no number, with its row below the header."""
+    for row, cell in enumerate(column.to_pylist(), 1):
+        try:
+            float(str(cell))
+        except ValueError:
+            return f"{cell} in row {row}"
+    return str(column[0])
 
 
 def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
@@ -266,6 +276,7 @@ CONTRACT_COLUMNS = frozenset(
     {
         "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
         "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",
+        *POINT_COLUMNS, *POINT_RESISTANCES,
     }
 )  # fmt: skip
 
@@ -297,7 +308,7 @@ def _require(table: Table, names: Sequence[str], what: str) -> None:
         raise _refuse(
             table.source,
             f"{what} needs the column {missing[0]}",
-            ", ".join(table.columns),
+            ", ".join(table.columns) or "no column of numbers",
             ", ".join(names),
             "rename or add the columns: " + ", ".join(missing),
         )

@@ -54,15 +54,20 @@ def _facts(document: Document) -> list[tuple[str, str]]:
 def points_page(document: Mapping[str, Any], name: str) -> Page:
     """The page of a points table."""
     gain = document["gain"]
-    facts = [("error, constant parameters", percent(gain["relative_error_before"]))]
-    if document["causes"]:
-        facts.append(("error, with the named causes", percent(gain["relative_error_after"])))
+    facts: list[tuple[str, str]] = []
+    below = sections.what_it_means(document)
+    if document["verdict"] != "refused":
+        facts = [("error, constant parameters", percent(gain["relative_error_before"]))]
+        if document["causes"]:
+            facts.append(("error, with the named causes", percent(gain["relative_error_after"])))
+        facts.append(("measured on", "points kept aside for checking"))
+        below += [sections.points_causes(document), *_over_points(document)]
+        if document["verdict"] != "unexplained":
+            below.append(sections.parameters(document))
     return Page(
         title=f"Diagnosis of {document.get('test', 'test')} points: {name}", headline=headline(document), tone=tone(document),
-        facts=[*facts, ("measured on", "points kept aside for checking")],
-        sections=[
-            *sections.what_it_means(document), sections.points_causes(document), *_over_points(document), sections.parameters(document),
-        ],
+        facts=facts,
+        sections=below,
         footer=f"{PLUS_MINUS} Steady-state points; line values are effective values (rms), parameters per phase of the star equivalent.",
     )
 

@@ -58,6 +58,8 @@ def headline(document: Document) -> str:
 
 
 def _points_headline(document: Document) -> str:
+    if document["verdict"] == "unexplained":
+        return "No circuit of the catalogue describes these points."
     if not document["causes"]:
         return str(document["reason"]).replace(" (1 causes tested)", " (one cause tested)")
     named = [f"{class_name(c)} ({size_name(c)} {size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
@@ -102,11 +104,11 @@ def meaning(document: Document) -> list[str]:
     if document["verdict"] == "refused":
         return [said(str(document["reason"]))]
     causes, out = ordered(document), []
+    is_points = document["kind"] == "points"
     if not is_finished(document):
         out.append(f"Go on without a time limit: `{GO_ON}`. What is named here may still change.")
     elif document["verdict"] == "unexplained":
-        out.append(_left_over(document))
-    is_points = document["kind"] == "points"
+        out.append(str(document["reason"]) if is_points else _left_over(document))
     if document["verdict"] == "nothing_significant" and is_finished(document) and not is_points:
         out.append("Drive, motor and measurement behave as the four values say, to within the noise. Nothing to do.")
     if causes and plain_of(causes[0]).motor:

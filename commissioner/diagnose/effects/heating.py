@@ -90,10 +90,10 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
     dictionary); or anew in every segment.
     """
     kinds_of_heat = STATOR_HEAT + ((FRESH_STATOR_HEAT,) if setting.spans_segments else ())
-    channels = {kind: setting.record.channel(f"heat_{kind}_u") for kind in kinds_of_heat}
+    channels = {kind: f"heat_{kind}_u" for kind in kinds_of_heat}
     return tuple(
-        Term("stator_heating", kind, "1/min", kinds.PHASE_RESISTANCE, channel, 0.01, 0.0, FASTEST_RISE)
-        for kind, channel in channels.items()
+        Term("stator_heating", kind, "1/min", kinds.PHASE_RESISTANCE, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE, channel=n)
+        for kind, n in channels.items()
     )
 
 
@@ -111,7 +111,7 @@ def rotor_heating(setting: Setting) -> tuple[Term, ...]:
     """
     names = CAGE_HEAT + ((FRESH_CAGE_HEAT,) if setting.spans_segments else ())
     return tuple(
-        Term("rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE)
+        Term("rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE, channel=n)
         for n in names
     )
 

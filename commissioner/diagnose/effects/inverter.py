@@ -16,6 +16,7 @@ from commissioner.diagnose.model import Term
 Array = NDArray[np.float64]
 MOST_UNEQUAL = 0.4
 """Of the mean of the three legs, by which one may differ."""
+MOST_SAG = 5.0
 SAG_SAMPLES = 4000
 """Of every segment, on which a sag of several lags is read as one of a single lag."""
 
@@ -108,10 +109,13 @@ def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="record the DC-link voltage, or repeat at another amplitude",
 )
 def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
-    """Relative loss of voltage at rated power, k >= 0, through first-order lags of 0.3 to 100 ms (a dictionary)."""
+    """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
+
+    alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference.
+    """
     names = [n for n in setting.record.channel_names if n.startswith("sag_")]
     return tuple(
-        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, 0.0, 5.0) for n in names
+        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, -MOST_SAG, MOST_SAG, channel=n) for n in names
     )
 
 
@@ -135,7 +139,7 @@ def dc_link_ripple(setting: Setting) -> tuple[Term, ...]:
     """Relative amplitudes a, b of the rectifier's ripple line (frequency refined on the data)."""
     names = [n for n in setting.record.channel_names if n.startswith("ripple_")]
     return tuple(
-        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid)
+        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid, channel=n)
         for s in setting.record.segments for n in names
     )
 

@@ -243,7 +243,7 @@ def shaft_motion(setting: Setting) -> tuple[Term, ...]:
     splines; and where in the pause before a segment it carried the flux left from the segment before that.
     """
     speed = tuple(
-        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid)
+        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid, channel=n)
         for s in setting.record.segments
         for n in _speed_hats(setting.record)
     )

@@ -225,7 +225,7 @@ def mains_pickup(setting: Setting) -> tuple[Term, ...]:
     record = setting.record
     names = [n for n in record.channel_names if n.startswith("mains_")]
     return tuple(
-        Term("mains_pickup", f"{n}_{PHASES[k]}_{s.uid}", "A", TONE, 3 * record.channel(n) + k, 1e-3, segment=s.uid)
+        Term("mains_pickup", f"{n}_{PHASES[k]}_{s.uid}", "A", TONE, 3 * record.channel(n) + k, 1e-3, segment=s.uid, channel=n)
         for s in record.segments for n in names for k in range(record.facts.phases)
     )
 

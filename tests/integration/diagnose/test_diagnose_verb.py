@@ -6,9 +6,12 @@ import json
 import numpy as np
 import pytest
 
+from commissioner.diagnose.model import Model
 from sim.hidden import draw
 from sim.recording import record, write_table
 from tests.support.command_line import call, truth
+from tests.unit.diagnose.conftest import NOMINAL, setting_of
+from tests.unit.diagnose.test_extended import document_of
 
 TYPE_TEST = "tests/data/siemens_200kw_type_test/{}.csv"
 
@@ -76,6 +79,8 @@ def test_data_that_carry_no_answer_end_with_code_3_and_the_reason(files, names, 
     answer = call("diagnose", *(str(files / f"{name}.csv") for name in names), "--json")
     assert answer.code == 3
     assert said in answer.stdout + answer.stderr
+    error = json.loads(answer.stdout)["error"]
+    assert all(error[fact] not in (None, "") for fact in ("what", "step", "value", "limit", "remedy")), error
 
 
 def test_both_tables_of_a_type_test_are_one_document(tmp_path):
@@ -87,8 +92,34 @@ def test_both_tables_of_a_type_test_are_one_document(tmp_path):
     assert json.loads((tmp_path / "diagnosis.json").read_text())["verdict"] == "explained"
 
 
-def test_a_file_that_is_no_model_is_refused_as_configuration(tmp_path):
-    (tmp_path / "model.json").write_text('{"kind": "something"}')
-    answer = call("simulate", str(tmp_path / "model.json"), "--out", str(tmp_path / "out.csv"))
-    assert answer.code == 2
-    assert "model.json" in answer.stderr
+def test_a_table_that_is_refused_has_a_page_and_the_remedy(tmp_path):
+    rows = (tmp_path / "few.csv", "frequency_hz,voltage_line_v,current_line_a,power_w\n" + "50,100,10,500\n" * 9)
+    rows[0].write_text(rows[1])
+    answer = call("diagnose", str(rows[0]), "--out", str(tmp_path / "out"), "--json")
+    assert answer.code == 3 and answer.json["verdict"] == "refused"
+    assert answer.json["error"]["value"] == 1 and "at least 5" in answer.json["error"]["limit"] and answer.json["error"]["remedy"]
+    assert "cannot carry an answer" in (tmp_path / "out" / "report_few.html").read_text()
+    assert "expected: at least 5" in " ".join(call("diagnose", str(rows[0])).stdout.split())
+
+
+def test_a_cell_that_is_no_number_and_a_column_that_lacks_are_named(tmp_path):
+    table = tmp_path / "points.csv"
+    table.write_text("frequency_hz,voltage_line_v,current_line_a,power_w\n50,100,10,500\n50,x,20,2000\n")
+    assert "x in row 2" in call("diagnose", str(table)).stderr
+    table.write_text("frequency_hz,voltage_line_v,current_line_a\n50,100,10\n50,200,20\n")
+    assert "needs the column power_w" in call("diagnose", str(table)).stdout
+
+
+def broken(document, where):
+    term = document["terms"][0]
+    return {"index": document | {"terms": [term | {"index": 999}]}, "list": [document], "number": document | {
+        "nominal": document["nominal"] | {"rotor_resistance_ohm": -1.0}}, "else": {"kind": "something"}}[where]
+
+
+@pytest.mark.parametrize("where", ["index", "list", "number", "else"])
+def test_a_file_that_is_no_model_is_refused_as_configuration(tmp_path, where):
+    document = document_of("dead_time", setting_of(Model(NOMINAL)))
+    (tmp_path / "model.json").write_text(json.dumps(broken(document, where)))
+    answer = call("simulate", str(tmp_path / "model.json"), "--seconds", "0.5", "--out", str(tmp_path / "out.csv"))
+    assert answer.code == 2, answer.stderr
+    assert "model.json" in answer.stderr and not (tmp_path / "out.csv").exists()

@@ -135,3 +135,34 @@ def test_a_file_that_is_no_extended_model_is_refused():
     for broken in ({}, {"kind": "extended_model", "format": 99}, {"kind": "scenario", "format": 1}):
         with pytest.raises(ValueError, match="extended model"):
             model_from(broken)
+
+
+@pytest.mark.parametrize("name", ["dc_link_ripple", "mains_pickup", "shaft_motion"])
+def test_a_model_plays_alike_on_shorter_segments(name, setting):
+    """They have fewer knots of a speed, so that every channel behind those lies elsewhere."""
+    terms = CATALOGUE[name].terms(setting)
+    numbers = {t.symbol: 0.3 if name == "shaft_motion" else 0.05 for t in terms if t.segment == 0 and t.channel}
+    document = json.loads(json.dumps(model_document(*found(name, setting, numbers))))
+    columns = simulated(document_of("iron_loss", setting))
+    cut = {k: v[columns["segment"] == 0][:2500] for k, v in columns.items()}
+    (model, layout), long = model_from(document), commands(columns)
+    short = play(model, layout, setting.facts, [(0.0, cut["voltage_axis_v"])], setting.lines_hz)
+    whole = play(model, layout, setting.facts, long, setting.lines_hz)
+    plain_model, _ = model_from(plain(document))
+    without = play(plain_model, None, setting.facts, [(0.0, cut["voltage_axis_v"])], setting.lines_hz)
+    effect = short["current_v_a"] - without["current_v_a"]
+    assert np.abs(effect).max() > 1e-3
+    same = slice(0, 1250)  # of a speed, before the knots of the shorter segment lie elsewhere
+    assert np.abs(short["current_v_a"] - whole["current_v_a"][:2500])[same].max() < 0.02 * np.abs(effect).max()
+
+
+def test_numbers_that_no_motor_has_are_refused(setting):
+    good = document_of("iron_loss", setting)
+    term = good["terms"][0]
+    for change, said in (
+        ({"nominal": good["nominal"] | {"stator_resistance_ohm": -3.0}}, "above zero"),
+        ({"terms": [term | {"value": float("nan")}]}, "finite"), ({"terms": [term | {"kind": 77}]}, "kind 77"),
+        ({"dictionary": {}}, "dictionary"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            model_from(good | change)

@@ -6,7 +6,9 @@ import pytest
 from commissioner.diagnose.document import points_document
 from commissioner.diagnose.points import read_points
 from commissioner.diagnose.points_diagnosis import diagnose_points
+from commissioner.errors import DataRefused
 from commissioner.report.diagnose_page import points_page
+from commissioner.report.diagnose_words import headline
 from commissioner.report.page import Picture
 from tests.support.standstill import usable_motors
 
@@ -97,16 +99,56 @@ def test_the_kind_of_test_is_told_from_the_numbers():
         assert not read_points(no_load(motor, random, 0.01), "table").is_locked
 
 
-def test_too_few_points_impossible_power_and_loaded_motors_are_refused_with_the_reason():
+def refusal(columns, name="points"):
+    seen = read_points(columns, name)
+    assert isinstance(seen, DataRefused), seen
+    assert seen.step and seen.value is not None and seen.limit and seen.remedy
+    return seen.what
+
+
+def test_what_cannot_be_used_is_refused_with_the_row_the_limit_and_the_remedy():
     columns = locked(MOTORS[0], np.random.default_rng(9), 0.0)
-    assert "at least" in read_points({k: v[:3] for k, v in columns.items()}, "few")
-    wrong = columns | {"power_w": columns["power_w"] * 10.0}
-    assert "exceeds the apparent power" in read_points(wrong, "power")
-    assert "positive numbers" in read_points(
-        columns | {"current_line_a": columns["current_line_a"] - 100.0}, "negative"
-    )
+    some = {k: v[:3] for k, v in columns.items()}
+    assert "3 different points" in refusal(some)
+    assert "3 different points" in refusal({k: np.repeat(v, 4) for k, v in some.items()})
+    assert "exceeds the apparent power" in refusal(columns | {"power_w": columns["power_w"] * 10.0})
+    assert "power factor of 0.000" in refusal(columns | {"power_w": columns["power_w"] * 1e-3})
+    assert refusal(columns | {"current_line_a": np.r_[1.0, -1.0, np.ones(10)]}) == "current_line_a is -1 in row 2"
+    assert "needs the column power_w" in refusal({k: v for k, v in columns.items() if k != "power_w"})
     loaded = columns | {"frequency_hz": np.full(12, 50.0), "voltage_line_v": np.full(12, 400.0)}
-    assert "loaded" in read_points(loaded | {"power_w": 0.5 * 400.0 * columns["current_line_a"]}, "load")
+    assert "loaded" in refusal(loaded | {"power_w": 0.5 * 400.0 * columns["current_line_a"]})
+    alike = {k: v[2] * np.linspace(0.95, 1.05, 9) if k != "frequency_hz" else np.full(9, 50.0) for k, v in columns.items()}
+    assert "1.11 times the smallest" in refusal(alike | {"power_w": columns["power_w"][2] * np.linspace(0.95, 1.05, 9) ** 2})
+
+
+def test_copied_rows_make_nothing_surer():
+    columns = locked(MOTORS[0], np.random.default_rng(4), 0.002, skin=0.15, saturation=0.12)
+    once, several = named(columns)[0], named({k: np.repeat(v, 5) for k, v in columns.items()})[0]
+    assert {n: c.sizes for n, c in once.items()} == {n: c.sizes for n, c in several.items()}
+    assert "48 rows are copies" in read_points({k: np.repeat(v, 5) for k, v in columns.items()}, "x").remarks[0]
+
+
+@pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.name)
+def test_points_of_no_one_test_are_unexplained_and_nothing_is_named(motor):
+    """Two motors in one table, both tests in one table, a running motor, numbers without a circuit."""
+    random = np.random.default_rng(10)
+    one = locked(motor, random, 0.003, saturation=0.1)
+    other = locked(next(m for m in MOTORS if m.truth[2] > 1.5 * motor.truth[2] or m.truth[2] < motor.truth[2] / 1.5), random, 0.003)
+    idle = no_load(motor, random, 0.003, saturation=0.5, growth=0.6)
+    shaken = one | {"voltage_line_v": one["voltage_line_v"] * random.uniform(1.0, 2.0, 12)}
+    for wrong in ({k: np.r_[one[k], other[k]] for k in one}, {k: np.r_[one[k], idle[k]] for k in one}, shaken):
+        causes, seen = named(wrong)
+        assert seen.verdict == "unexplained" and not causes and "more than one motor" in seen.reason
+        assert headline(points_document(seen)) == "No circuit of the catalogue describes these points."
+
+
+@pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.name)
+def test_a_saturation_is_stated_over_the_range_that_was_measured(motor):
+    """The straight line through a lowest flux at which the iron bends already is not known; the bend over the range is."""
+    columns = {k: v[4:] for k, v in no_load(motor, np.random.default_rng(11), 0.003, saturation=0.5).items()}
+    value, spread, _ = named(columns, "no_load")[0]["magnetizing_saturation"].sizes["extra_current_at_highest_flux"]
+    lowest = (columns["voltage_line_v"].min() / columns["voltage_line_v"].max()) ** 7
+    assert value == pytest.approx(1.5 / (1.0 + 0.5 * lowest) - 1.0, abs=max(3.0 * spread, 0.03)) and spread < 0.1
 
 
 def test_the_page_draws_every_point_fitted_and_left_out():

@@ -8,6 +8,7 @@ from commissioner.diagnose.document import refused_document
 from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Facts, Record, Segment
+from commissioner.diagnose.refusals import refused
 from commissioner.diagnose.residuals import residuals
 from commissioner.diagnose.screen import Score, Screening
 from commissioner.diagnose.trial import Normal
@@ -63,7 +64,7 @@ def test_a_next_experiment_promises_only_what_was_predicted():
 
 
 def test_a_refusal_has_a_headline():
-    assert "cannot carry" in headline(refused_document("too short", "recording"))
+    assert "cannot carry" in headline(refused_document(refused("too short", 3, "at least 5", "record longer"), "recording"))
 
 
 def screening(gram):

@@ -8,6 +8,7 @@ from commissioner.diagnose.document import as_document, refused_document
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure
 from commissioner.diagnose.record import Facts
+from commissioner.diagnose.refusals import refused
 from commissioner.report import diagnose_sections as sections
 from commissioner.report.diagnose_names import class_name, plain_of, sentence, size_words, spoken, sure_words
 from commissioner.report.diagnose_page import page_of
@@ -151,8 +152,12 @@ def test_the_procedure_for_the_legs_has_the_drives_own_numbers():
 
 
 def test_a_refusal_and_a_null_are_said_plainly():
-    assert "cannot carry" in headline(refused_document("too short", "recording"))
-    assert meaning(refused_document("sensor_offset too large", "recording")) == ["sensor offset too large"]
+    data = refused_document(refused("sensor_offset too large", 3.0, "at most 2", "turn it off"), "recording")
+    assert "cannot carry" in headline(data) and meaning(data) == ["sensor offset too large; turn it off"]
+    assert data["error"] == {
+        "kind": "DataRefused", "what": "sensor_offset too large", "step": "diagnose", "value": 3.0, "limit": "at most 2",
+        "remedy": "turn it off",
+    }
     null = document("nothing_significant")
     assert headline(null).startswith("Nothing significant") and tone(null) == "good" and actions(null) == []
 
