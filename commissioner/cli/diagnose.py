@@ -27,6 +27,10 @@ def diagnose(files: Sequence[Path], motor: str | None = None, out: Path | None =
     from commissioner.recordings.importers import contract_table
 
     tables = [contract_table(Path(path)) for path in files]
+    if out is not None:
+        from commissioner.recordings.whole import folder_to_write
+
+        folder_to_write(out)
     from commissioner.diagnose.points import is_points_table
 
     if all(is_points_table(list(t.columns)) for t in tables):
@@ -43,6 +47,8 @@ def _recordings(tables: Sequence[Table], motor: str | None, out: Path | None, as
 
     recordings, remarks = _standstill(tables, motor)
     _same_motor(recordings)
+    recordings, copies = _without_copies(recordings)
+    remarks += copies
     progress = Progress(is_quiet=as_json)
     progress.say(BEGIN)
     seen = analyse(recordings, report=progress)
@@ -81,6 +87,21 @@ def _standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Stands
         recording = to_standstill(table)
         recordings.append(replace(recording, metadata={**recording.metadata, **_plate(motor)}))
     return recordings, remarks
+
+
+def _without_copies(recordings: Sequence[StandstillRecording]) -> tuple[list[StandstillRecording], list[str]]:
+    """Each recording once, and which were copies: their noise would be none."""
+    import numpy as np
+
+    kept: list[StandstillRecording] = []
+    remarks = []
+    for one in recordings:
+        same = next((k for k in kept if np.array_equal(k.current_u_a, one.current_u_a) and np.array_equal(k.time_s, one.time_s)), None)
+        if same is None:
+            kept.append(one)
+        else:
+            remarks.append(f"{Path(one.source).name} holds the same samples as {Path(same.source).name}: taken once.")
+    return kept, remarks
 
 
 def _plate(motor: str | None) -> dict[str, float | str]:
@@ -161,13 +182,15 @@ def _write(
 ) -> None:
     import json
 
+    from commissioner.recordings.whole import whole_file
     from commissioner.run.archive import plain
 
-    out.mkdir(parents=True, exist_ok=True)
-    (out / page_name).write_text(page, encoding="utf-8")
-    (out / "diagnosis.json").write_text(json.dumps(plain(document), indent=2), encoding="utf-8")
+    texts = {page_name: page, "diagnosis.json": json.dumps(plain(document), indent=2)}
     if model:
-        (out / "model.json").write_text(json.dumps(plain(model), indent=1), encoding="utf-8")
+        texts["model.json"] = json.dumps(plain(model), indent=1)
+    for name, text in texts.items():
+        with whole_file(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
 
 
 def _finish(document: Mapping[str, Any], out: Path | None, as_json: bool) -> None:
@@ -181,5 +204,5 @@ def _finish(document: Mapping[str, Any], out: Path | None, as_json: bool) -> Non
         from commissioner.cli.diagnose_screen import show
 
         show(document, out)
-    if document["verdict"] == "refused":
+    if "refused" in {document["verdict"], *(one["verdict"] for one in document.get("tables", {}).values())}:
         raise typer.Exit(3)

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.signal import lfilter
+from scipy.linalg import expm
+from scipy.signal import lfilter, ss2tf
 
 from commissioner.diagnose.lines import found_lines, with_lines, without_lines
 from commissioner.diagnose.model import Layout, Model
@@ -135,18 +136,26 @@ def _sag(record: Record) -> Named:
     return tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S), out
 
 
-def lagged_power(record: Record, segment: Segment, lag_s: float) -> Array:
-    """Mean over each period, (n,), of the electrical power over rated power behind a lag; the command of a sample acts on the
+def lagged_power(record: Record, segment: Segment, lag_s: float, shape: float = 0.0) -> Array:
+    """Mean over each period, (n,), of the electrical power over rated power behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`,
 
-    current until the next.
+    q = `shape`; the command of a sample acts on the current until the next.
     """
     current = segment.axis_current_a
     over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
     power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
-    periods = record.facts.sample_period_s / lag_s
-    arrives = -float(np.expm1(-periods))
-    before = lfilter([0.0, arrives], [1.0, arrives - 1.0], power)
-    return np.asarray(power + (before - power) * arrives / periods)
+    # state (output, its slope if there is one), input, and the output's integral
+    order = 2 if shape > 0.0 else 1
+    rates = np.zeros((order + 2, order + 2))
+    if shape > 0.0:
+        fastest = shape * lag_s**2
+        rates[0, 1], rates[1, :3] = 1.0, (-1.0 / fastest, -lag_s / fastest, 1.0 / fastest)
+    else:
+        rates[0, :2] = -1.0 / lag_s, 1.0 / lag_s
+    rates[-1, 0] = 1.0 / record.facts.sample_period_s
+    step = expm(rates * record.facts.sample_period_s)
+    top, bottom = ss2tf(step[:order, :order], step[:order, [order]], step[[-1], :order], step[[-1], [order]])
+    return np.asarray(lfilter(top[0], bottom, power))
 
 
 def _hats(record: Record, name: str) -> Named:

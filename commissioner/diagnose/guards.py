@@ -58,6 +58,10 @@ MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
 CLOCK_RATES = RESTARTS + RUNS_ON
 SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
+LATEST_KNEE, LATEST_KNEE_OF_RATED, LATEST_KNEE_AT_SMALL_CURRENT = 0.2, 0.15, 0.6
+"""Of the largest current, by which a leg has lost half of its voltage; or, up to that part of the largest, of the rated peak."""
+MOST_SAG = 0.5
+"""Of the link, at rated power: no source gives that power while it loses more."""
 LEAST_SLOPE_LOST = 0.25
 """A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
 
@@ -101,9 +105,10 @@ def meets_tones(record: Record, setting: Setting) -> bool:
 
 
 def is_plausible(model: Model, name: str, setting: Setting) -> bool:
-    """The sign physics demands; a leg error that is at half its height before a fifth of the largest current; and a clock whose
+    """The sign physics demands; a leg error that is at half its height before a fifth of the largest current, or where the switching's
 
-    delay grows: one that jumps to a value in each segment and stays there is a delay in disguise.
+    ripple ends in a test at small currents; and a clock whose delay grows: one that jumps to a value in each segment and stays there
+    is a delay in disguise.
     """
     if name == "clock_drift" and _is_a_delay(model.of(name), setting.record):
         return False
@@ -112,9 +117,13 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     has_own_sign = any(t.lower < 0.0 for t in CATALOGUE[name].exchanged_in(model.of(name)))
     if sign and sizes and not has_own_sign and next(iter(sizes.values()))[0] * sign <= 0:
         return False
+    if "sag_at_rated_power" in sizes and sizes["sag_at_rated_power"][0] > MOST_SAG:
+        return False
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
-    return "half_current_a" not in sizes or sizes["half_current_a"][0] < 0.2 * setting.facts.current_peak_a
+    peak, rated_peak = setting.facts.current_peak_a, setting.facts.rated_current_peak_a
+    latest = max(LATEST_KNEE * peak, min(LATEST_KNEE_OF_RATED * rated_peak, LATEST_KNEE_AT_SMALL_CURRENT * peak))
+    return "half_current_a" not in sizes or sizes["half_current_a"][0] < latest
 
 
 def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:

@@ -27,6 +27,7 @@ MOST_EVENTS = 16
 LEAST_GAIN = 80.0
 """Delta chi2 of one event: 40 for the look over all instants (2 ln N is below 30), 40 for the rule."""
 LEAST_SHARE = 0.03
+WORST_CONDITION = 1e12
 LEAST_JUMP = 0.7
 """Samples by which the delay must seem to jump: several jumps in a segment do not add up to a whole number anywhere."""
 STANDS_OUT = 9.0
@@ -278,6 +279,8 @@ def _delay_step(residual: Array, slope: Array) -> int | None:
     t = np.linspace(-1.0, 1.0, y.shape[0])
     basis = np.stack([np.ones_like(t), t])
     gram = (basis * w) @ basis.T
+    if not w.any() or np.linalg.cond(gram) > WORST_CONDITION:
+        return None  # nothing moves here
     left = y - w * (np.linalg.solve(gram, basis @ y) @ basis)
     after = np.cumsum(left[::-1])[::-1]
     moments = np.cumsum((basis * w)[:, ::-1], axis=1)[:, ::-1]

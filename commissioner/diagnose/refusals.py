@@ -48,7 +48,7 @@ def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> No
     for file in files:
         rows = [k for k, s in enumerate(record.segments) if s.file == file]
         gram, slope = fitted.normal.gram[rows].sum(axis=0)[:4, :4], fitted.normal.slope[rows].sum(axis=0)[:4]
-        estimates.append(np.linalg.solve(gram, slope))
+        estimates.append(np.linalg.pinv(gram) @ slope)
     spread = np.ptp(np.array(estimates), axis=0)
     names = ("R_s", "R_R", "L_sigma", "L_M")
     worst = which.start + int(np.argmax(spread[which]))

@@ -9,6 +9,7 @@ from typing import Any
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.trend import Entry, History, State, Verdict, judge
+from commissioner.recordings.whole import whole_file
 
 VERSION = 1
 MAX_BYTES = 50_000_000
@@ -60,9 +61,8 @@ def write(path: Path, history: History) -> None:
         "healthy": [asdict(entry) for entry in history.healthy],
         "judged": [asdict(entry) for entry in history.judged],
     }
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(document, indent=1, allow_nan=False), "utf-8")
-    temporary.replace(path)
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=1, allow_nan=False), "utf-8")
 
 
 def _entry(raw: dict[str, Any]) -> Entry:

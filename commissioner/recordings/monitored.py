@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.errors import UsageError
 from commissioner.monitor.chain import Observation
 from commissioner.recordings.table import write_table
+from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.records import Signal
 from commissioner.report.page import Page, render
 
@@ -18,20 +18,11 @@ REPORT_NAME = "report.html"
 
 def write_results(folder: Path, observation: Observation, page: Page) -> dict[str, str]:
     """The two files; names and columns are the contract's, standard deviations are added columns."""
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(
-            f"{folder} is not a folder",
-            step="write results",
-            value=str(folder),
-            limit="a folder",
-            remedy="choose another --out",
-        )
-    folder.mkdir(parents=True, exist_ok=True)
+    folder_to_write(folder)
     csv, report = folder / CSV_NAME, folder / REPORT_NAME
     write_table(csv, columns_of(observation), {})
-    temporary = report.with_name(report.name + ".part")
-    temporary.write_text(render(page), "utf-8")
-    temporary.replace(report)
+    with whole_file(report) as temporary:
+        temporary.write_text(render(page), "utf-8")
     return {"characteristic_period": str(csv), "report": str(report)}
 
 

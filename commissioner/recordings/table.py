@@ -21,6 +21,7 @@ import pyarrow.parquet as pa_parquet
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
+from commissioner.recordings.whole import whole_file
 from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES, RunningRecording, Signal, StandstillRecording
 
 MAX_METADATA_LINES = 1000
@@ -98,17 +99,16 @@ def check_ending(path: Path) -> None:
 
 def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str, float | str]) -> None:
     """Write the table whole or not at all (a temporary file is renamed into place)."""
-    temporary = path.with_name(path.name + ".part")
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
-    if path.suffix == ".parquet":
-        schema = table.schema.with_metadata({k: str(v) for k, v in metadata.items()})
-        pa_parquet.write_table(table.cast(schema), temporary, compression="zstd")
-    else:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(temporary, "wb") as file:
-            file.write("".join(f"# {k}: {v}\n" for k, v in metadata.items()).encode())
-            pa_csv.write_csv(table, file, pa_csv.WriteOptions(quoting_style="none"))
-    temporary.replace(path)
+    with whole_file(path) as temporary:
+        if path.suffix == ".parquet":
+            schema = table.schema.with_metadata({k: str(v) for k, v in metadata.items()})
+            pa_parquet.write_table(table.cast(schema), temporary, compression="zstd")
+        else:
+            opener = gzip.open if path.suffix == ".gz" else open
+            with opener(temporary, "wb") as file:
+                file.write("".join(f"# {k}: {v}\n" for k, v in metadata.items()).encode())
+                pa_csv.write_csv(table, file, pa_csv.WriteOptions(quoting_style="none"))
 
 
 def to_standstill(table: Table) -> StandstillRecording:
@@ -291,12 +291,12 @@ def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
             number = math.nan
         if key in TEXT_KEYS:
             typed[key] = value
+        elif (key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}) and not 0.0 < number < math.inf:
+            raise _refuse(
+                path, f"metadata {key} is no positive number", value, "a finite number above zero, in SI units", f"correct {key}"
+            )
         elif math.isfinite(number):
             typed[key] = number
-        elif key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}:
-            raise _refuse(
-                path, f"metadata {key} is not a number", value, "a finite number in SI units", f"correct {key}"
-            )
         else:
             typed[key] = value
     return typed

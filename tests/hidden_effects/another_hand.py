@@ -47,6 +47,9 @@ class Machine:
     l_m: float = 0.24
     knee_wb: float = math.inf
     """Flux of the magnetizing branch at which its current has doubled, ninth order."""
+    foot: float = 0.0
+    """Part by which that current is larger at little flux, where the sheet is less permeable: exp(-(flux / foot_wb)^2) of it."""
+    foot_wb: float = 0.2
     iron_ohm: float = math.inf
     leg_v: float = 0.0
     leg_a: float = 0.2
@@ -78,12 +81,16 @@ class Machine:
     sag: float = 0.0
     """Share of the voltage that is missing at rated power, behind a lag of `sag_s`."""
     sag_s: float = 0.01
+    again_s: float = 0.0
+    """A second lag behind that one, as of a choke before the capacitor."""
     swing: float = 0.0
     """Amplitude of the electrical speed, rad/s, of a shaft that swings at `swing_hz`."""
     swing_hz: float = 1.7
     left_wb: complex = 0.0
     """Flux of the open rotor's current, at the stator, when each segment begins."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
+    sweeps: bool = False
+    """From the first of these to the last, in equal times for equal ratios, instead of all at once."""
 
 
 def impedance(machine: Machine, hz: float) -> complex:
@@ -97,9 +104,14 @@ def command(machine: Machine, level: float, bias: float, seconds: float, seed: i
     random = np.random.default_rng(seed)
     t = np.arange(round(seconds / PERIOD_S)) * PERIOD_S
     out = np.full(t.size, machine.r_s * bias * PEAK_A)
-    for hz in machine.tones_hz:
+    for hz in () if machine.sweeps else machine.tones_hz:
         size = SHARE * level * PEAK_A * abs(impedance(machine, hz))
         out += size * np.cos(2.0 * math.pi * hz * t + random.uniform(-math.pi, math.pi))
+    if machine.sweeps:
+        rate = math.log(machine.tones_hz[-1] / machine.tones_hz[0]) / seconds
+        hertz = machine.tones_hz[0] * np.exp(rate * t)
+        sizes = SHARE * len(machine.tones_hz) * level * PEAK_A * np.array([abs(impedance(machine, hz)) for hz in hertz])
+        out += sizes * np.cos(2.0 * math.pi * (hertz - machine.tones_hz[0]) / rate + random.uniform(-math.pi, math.pi))
     return np.asarray(out * np.clip(t / 0.1, 0.0, 1.0))
 
 
@@ -134,12 +146,12 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
 
 
 @njit(cache=True)
-def _magnetizing(flux, l_m, knee):
-    return flux / l_m * (1.0 + (abs(flux) * knee) ** 8)
+def _magnetizing(flux, l_m, knee, foot, foot_wb):
+    return flux / l_m * (1.0 + (abs(flux) * knee) ** 8 + foot * math.exp(-((abs(flux) / foot_wb) ** 2)))
 
 
 @njit(cache=True)
@@ -154,7 +166,7 @@ def _leg_loss(current, leg_v, leg_a, legs):
 
 
 @njit(cache=True)
-def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
+def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
 
     currents of the bar's layers.
@@ -164,9 +176,9 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
         middle = x[2]
     else:
         middle = (x[0] / l_s + x[1] / own) / (1.0 / l_s + 1.0 / own + 1.0 / l_m)
-        for _ in range(12 if knee > 0.0 else 0):
-            wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee)
-            middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8) / l_m)
+        for _ in range(12 if knee > 0.0 or foot > 0.0 else 0):
+            wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee, foot, foot_wb)
+            middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8 + foot * math.exp(-((abs(middle) / foot_wb) ** 2))) / l_m)
     i_s, i_r = (x[0] - middle) / l_s, (x[1] - middle) / own
     d = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a, legs) if leg_v > 0.0 else 0.0)
@@ -182,7 +194,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
         d[1] = -r_r * i_r
     d[1] += 1j * omega * x[1]
     if iron > 0.0:
-        d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee))
+        d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee, foot, foot_wb))
     if lag > 0.0:
         d[4] = (i_s - x[4]) / lag
     if turn > 0.0:
@@ -193,7 +205,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, t
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, bar, diffusion, ripple, ripple_hz, swing, swings):
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, bar, diffusion, ripple, ripple_hz, swing, swings):
     """Current (n,) that the sensors see, `delay` old, before noise."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -203,27 +215,28 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
     out = np.zeros(n, dtype=np.complex128)
     at = 0
     v = 0.0j
-    load = 0.0
+    load = drops = 0.0
     for k in range(n):
         omega = swing * math.cos(swings * (begin + k * period))
         r_s = cold * (1.0 + warming * (begin + k * period))
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             memory[at % (late + 1)] = seen
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
-                v = volts[k] * (1.0 - sag * load)
-                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+                v = volts[k] * (1.0 - sag * drops)
+                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             at += 1
-            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             if ripple > 0.0:
                 v = volts[k] * (1.0 + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 0.5) / fine) * period))
             if sag > 0.0:
                 load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - load)
-                v = volts[k] * (1.0 - sag * load)
+                drops = drops + h / again_s * (load - drops) if again_s > 0.0 else load
+                v = volts[k] * (1.0 - sag * drops)
     return out

@@ -120,21 +120,24 @@ def listed(values: Mapping[str, float], prefix: str, count: int) -> Array:
     return np.array([values.get(f"{prefix}_{k}", 0.0) for k in range(count)])
 
 
-def nearest_course(
-    course: Array, of: Callable[[float], Array], tried: Array, weight: float | Array = 1.0
-) -> tuple[float, float]:
+def nearest_course(course: Array, of: Callable[[float], Array], tried: Array, weight: float | Array = 1.0) -> tuple[float, float]:
     """Size >= 0 and number x of the one course `of(x)` that comes nearest to `course` but for a constant; x from those `tried`
 
     (ascending) and between them.
     """
 
-    def nearest(x: float) -> tuple[float, float]:
-        table = np.stack([of(x), np.ones(course.size)], axis=1) * np.broadcast_to(weight, course.size)[:, None]
-        found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
-        found[0] = max(found[0], 0.0)
-        return float(found[0]), float(np.linalg.norm(weight * course - table @ found))
+    def misfit(x: float) -> float:
+        return float(np.linalg.norm(as_much_of(of(x), course, weight)[1]))
 
-    at = int(np.argmin([nearest(float(x))[1] for x in tried]))
+    at = int(np.argmin([misfit(float(x)) for x in tried]))
     ends = float(tried[max(at - 1, 0)]), float(tried[min(at + 1, tried.size - 1)])
-    best = float(minimize_scalar(lambda x: nearest(x)[1], bounds=ends, method="bounded", options={"xatol": 1e-6 * (ends[1] - ends[0])}).x)
-    return nearest(best)[0], best
+    best = float(minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-6 * (ends[1] - ends[0])}).x)
+    return as_much_of(of(best), course, weight)[0], best
+
+
+def as_much_of(one: Array, course: Array, weight: float | Array = 1.0) -> tuple[float, Array]:
+    """How much >= 0 of `one` comes nearest to `course` but for a constant, and what is left of it, times the weight."""
+    table = np.stack([one, np.ones(course.size)], axis=1) * np.broadcast_to(weight, course.size)[:, None]
+    found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
+    found[0] = max(found[0], 0.0)
+    return float(found[0]), np.asarray(weight * course - table @ found)

@@ -6,19 +6,31 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import SAG_LAGS_S, lagged_power
-from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, nearest_course, spline_value
+from commissioner.diagnose.effects.effect import (
+    Effect,
+    Setting,
+    Sizes,
+    as_much_of,
+    effect,
+    listed,
+    nearest_course,
+    spline_value,
+)
 from commissioner.diagnose.kinds import CABLE
 from commissioner.diagnose.model import Term
 
 Array = NDArray[np.float64]
 MOST_UNEQUAL = 0.4
 """Of the mean of the three legs, by which one may differ."""
-MOST_SAG = 5.0
+MOST_OF_A_LAG = 5.0
 SAG_SAMPLES = 4000
 """Of every segment, on which a sag of several lags is read as one of a single lag."""
+SECOND_ORDER_LEAVES, MOST_RINGING = 0.25, 2.0
+"""Of the power that a lag of first order leaves; and the largest q of a lag 1 / (1 + s S + s^2 q S^2), two equal ones at a quarter."""
 
 
 def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -81,7 +93,8 @@ def device_drop(setting: Setting) -> tuple[Term, ...]:
 def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float]:
     """Sag at rated power and time constant (s) of the one lag whose loss of voltage comes nearest to the sum of these, but for a
 
-    constant: that only scales the four numbers, so that several lags in place of one between them have any sum.
+    constant: that only scales the four numbers, so that several lags in place of one between them have any sum. The lag is of second
+    order where that leaves next to nothing of what a first one does.
     """
     record = setting.record
     first = [s.first(SAG_SAMPLES) for s in record.segments]
@@ -90,10 +103,18 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
     ])
 
-    def lagged(log_lag: float) -> Array:
-        return -np.concatenate([lagged_power(record, s, float(np.exp(log_lag))) for s in first])
+    def lagged(log_lag: float, shape: float = 0.0) -> Array:
+        return -np.concatenate([lagged_power(record, s, float(np.exp(log_lag)), shape) for s in first])
 
     size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
+    left = as_much_of(lagged(log_lag), course, weight)[1]
+    second = least_squares(
+        lambda x: as_much_of(lagged(*x), course, weight)[1], (log_lag, 0.1), x_scale=(0.1, 0.1),
+        bounds=((np.log(SAG_LAGS_S[0] / 2.0), 0.0), (np.log(2.0 * SAG_LAGS_S[-1]), MOST_RINGING)),
+    )
+    if 2.0 * second.cost < SECOND_ORDER_LEAVES * float(left @ left):
+        log_lag, shape = second.x
+        size = as_much_of(lagged(log_lag, shape), course, weight)[0]
     return size, float(np.exp(log_lag))
 
 
@@ -115,7 +136,7 @@ def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """
     names = [n for n in setting.record.channel_names if n.startswith("sag_")]
     return tuple(
-        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, -MOST_SAG, MOST_SAG, channel=n) for n in names
+        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n) for n in names
     )
 
 

@@ -18,16 +18,21 @@ Array = NDArray[np.float64]
 
 
 def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    """Extra current at the largest flux against the iron at its most permeable: that of sheet at small flux is lower."""
+    """Extra current against the iron at its most permeable (that of sheet at small flux is lower) where it is largest: at the largest
+
+    flux, of iron that is only hard to magnetize at first below it.
+    """
     layout = setting.layout
     weights = listed(values, "curve", layout.iron_vectors.shape[0])
     grid = np.linspace(0.0, setting.iron_flux_wb, 60)
-    curve = [spline_value(layout.iron_vectors, weights, layout.iron_top_wb, float(flux)) for flux in grid]
-    extra = curve[-1] - min(curve)
-    return {
-        "extra_current_a": (extra * setting.iron_flux_wb, "A"),
-        "at_flux_wb": (setting.iron_flux_wb, "Wb"),
-    }
+    curve = np.array([spline_value(layout.iron_vectors, weights, layout.iron_top_wb, float(flux)) for flux in grid])
+    extra = (curve - curve.min()) * grid
+    most = int(np.argmax(extra))
+    return {"extra_current_a": (float(extra[most]), "A"), "at_flux_wb": (float(grid[most]), "Wb")}
+
+
+FOOT_SHARE = 0.4
+"""Of the flux reached, at which a foot that ends within three intervals of the dictionary has ended."""
 
 
 @effect(
@@ -38,15 +43,17 @@ def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     split_by="repeat the lowest tone at half and at full flux",
 )
 def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
-    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond a quarter of
+    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond a third of
 
-    it (below, the permeability of steel may still grow).
+    it (below, the permeability of steel may still grow: Rayleigh's foot).
     `split` moves the saturating flux between rotor (-0.5) and stator (+0.5) side of the leakage.
     """
     count = setting.layout.iron_vectors.shape[0]
     step = setting.facts.rated_current_peak_a / max(setting.iron_flux_wb, 1e-9) * 0.01
+    # on twice the knots what falls at k falls from 2 k - 1 to 2 k + 2: a curve must not lose its foot there
+    foot = FOOT_SHARE * (count - 1) - 2.0
     curve = tuple(
-        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > count // 4 else -np.inf)
+        Term("magnetizing_saturation", f"curve_{k}", "A/Wb", kinds.IRON_CURVE, k, step, 0.0 if k > foot else -np.inf)
         for k in range(count)
     )
     return (*curve, _split("magnetizing_saturation"))

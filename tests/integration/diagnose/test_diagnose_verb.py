@@ -123,3 +123,8 @@ def test_a_file_that_is_no_model_is_refused_as_configuration(tmp_path, where):
     answer = call("simulate", str(tmp_path / "model.json"), "--seconds", "0.5", "--out", str(tmp_path / "out.csv"))
     assert answer.code == 2, answer.stderr
     assert "model.json" in answer.stderr and not (tmp_path / "out.csv").exists()
+
+
+def test_a_file_given_twice_counts_once(files):
+    once, twice = (call("diagnose", *[str(files / "good.csv")] * n, "--json").json for n in (1, 2))
+    assert once["causes"] == twice["causes"] and any("taken once" in sentence for sentence in twice["audit"])

@@ -80,12 +80,12 @@ def answered(tones_hz, late_s=0.0):
 def test_a_current_read_late_is_not_taken_for_one_of_the_wrong_sign(tones, late):
     seen = answered(TONES_HZ[tones], LATE_S[late])
     assert prepare([seen])[1].refusal is None
-    assert "against the voltage" in prepare([scaled(seen, -1.0, -1.0, -1.0)])[1].refusal
+    assert "against the voltage" in prepare([scaled(seen, -1.0, -1.0, -1.0)])[1].refusal.what
 
 
 ODD = {
     "no noise at all": lambda r: r,
-    "microamperes": lambda r: scaled(r, 1e-6, 1e-6, 1e-6),
+    "microamperes": lambda r: replace(scaled(r, 1e-6, 1e-6, 1e-6), metadata={**r.metadata, "rated_current_a": 5e-6}),
     "a third of a second": lambda r: replace(
         r, **{n: getattr(r, n)[:1650] for n in ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a",
                                                  "current_v_a", "current_w_a", "dc_link_v")}

@@ -82,9 +82,24 @@ def test_one_tone_is_said_to_carry_little():
 def test_what_carries_nothing_is_refused_with_the_reason():
     source = measured()
     zero = np.zeros(source.time_s.size)
-    assert "zero" in prepare([replace(source, current_u_a=zero, current_v_a=zero, current_w_a=zero)])[1].refusal
-    assert "constant" in prepare([replace(source, voltage_axis_v=zero)])[1].refusal
+    assert "zero" in prepare([replace(source, current_u_a=zero, current_v_a=zero, current_w_a=zero)])[1].refusal.what
+    assert "constant" in prepare([replace(source, voltage_axis_v=zero)])[1].refusal.what
     rows = [np.clip(c, -0.5, 0.5) for c in (source.current_u_a, source.current_v_a, source.current_w_a)]
     most = replace(source, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])
-    assert "clipped" in prepare([most])[1].refusal
+    assert "clipped" in prepare([most])[1].refusal.what
     assert prepare([source])[1].refusal is None
+
+
+@pytest.mark.parametrize(("volts", "amps", "said"), [(1.0, 1000.0, "times the rated peak"), (1e-3, 1.0, "rated impedance"), (1.0, 1e-3, "rated impedance")])
+def test_units_that_no_motor_of_the_nameplate_has_are_refused(volts, amps, said):
+    source = measured()
+    rows = {f"current_{p}_a": amps * getattr(source, f"current_{p}_a") for p in "uvw"}
+    _, audit = prepare([replace(source, voltage_axis_v=volts * source.voltage_axis_v, **rows)])
+    assert said in audit.refusal.what and "unit" in audit.refusal.remedy
+
+
+def test_of_a_long_record_the_first_part_of_every_segment_is_used(monkeypatch):
+    monkeypatch.setattr("commissioner.diagnose.audit.MOST_SAMPLES", 9000)
+    record, audit = prepare([measured()])
+    assert [s.count for s in record.segments] == [3000] * 3
+    assert any("first 0.6 s of every segment" in sentence for sentence in audit.sentences)

@@ -8,7 +8,7 @@ import pytest
 from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.fit import fit
-from commissioner.diagnose.lost import mend
+from commissioner.diagnose.lost import _delay_step, mend
 from commissioner.diagnose.noise import measure_noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.search import _mended
@@ -140,3 +140,9 @@ def test_a_value_held_for_long_is_lost_throughout(nominal, setting):
     rows[:, 8000:8008] = rows[:, [7999]]
     seen = diagnose([recording(currents=rows)])
     assert [(x.samples, x.way) for x in seen.found.losses] == [(1, "held value")] * 8 and seen.found.spikes == ()
+
+
+def test_where_nothing_moves_no_loss_is_looked_for():
+    """A piece between two holes without a command: it had ended in a singular matrix."""
+    assert _delay_step(np.ones((3, 300)), np.zeros((3, 300))) is None
+    assert _delay_step(np.ones((3, 300)), np.eye(1, 300, 40).repeat(3, axis=0)) is None

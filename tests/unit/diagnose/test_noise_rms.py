@@ -1,9 +1,13 @@
 """The rms of coloured noise over a stretch of samples, against the closed form of an autoregression."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.audit import prepare
+from commissioner.diagnose.noise import Noise, measure_noise
+from tests.unit.diagnose.conftest import recording
 
 PERIOD_S = 2e-4
 
@@ -18,3 +22,13 @@ def test_rms_of_an_autoregression(memory, samples):
     noise = Noise(sigma, frequency, np.tile(density, (3, 1)), "given", True, 0.0, memory == 0.0)
     expected = np.sqrt(np.mean(sigma**2) / (1.0 - memory**2))
     assert noise.rms_a(samples, PERIOD_S) == pytest.approx(expected, rel=0.01)
+
+
+def test_a_few_spikes_are_not_noise():
+    """Ten of 40 A had made a noise of 10 mA ten times as large."""
+    blank = recording(axes=(0.0, 60.0, 120.0, 0.0))
+    random = np.random.default_rng(1)
+    rows = 0.01 * random.standard_normal((3, blank.time_s.size)) + 0.1 * blank.voltage_axis_v * np.cos(np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg))
+    rows[1, [500, 3000, 19000]] = 40.0
+    noise = measure_noise(prepare([replace(blank, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[0])
+    assert noise.source == "repeated segments" and noise.sigma_a == pytest.approx(0.01, rel=0.05)
