@@ -63,12 +63,12 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
     for file, recording in enumerate(recordings):
         currents = _currents(recording, facts.phases)
         good = ~_clipped(currents, limits[file])
-        link = _link_ratio(recording, facts)
+        link, swing = _link_ratio(recording, facts), _link_swing(recording)
         starts = np.flatnonzero(np.r_[True, np.diff(recording.segment) != 0])
         stops = np.r_[starts[1:], recording.time_s.shape[0]]
         for start, stop in zip(starts, stops, strict=True):
             part = slice(int(start), int(stop))
-            pieces, lost = _pieces(recording, currents, good, link, part, file, facts)
+            pieces, lost = _pieces(recording, currents, good, link, swing, part, file, facts)
             holes.extend(lost)
             segments.extend(pieces)
     kept = [s for s in segments if s.count >= SHORTEST_STRETCH]
@@ -141,6 +141,14 @@ def _link_ratio(recording: StandstillRecording, facts: Facts) -> Signal:
         elif (value := _number(dict(recording.metadata), "dc_link_v")) is not None:
             ratio = ratio * value / facts.dc_link_v
     return ratio
+
+
+def _link_swing(recording: StandstillRecording) -> Signal | None:
+    """What the recorded link deviates from its median, over it; a constant column is the nominal value, not a recording."""
+    link = recording.dc_link_v
+    if link is None or np.ptp(link) == 0.0 or np.median(link) <= 0.0:
+        return None
+    return np.asarray(link / np.median(link) - 1.0)
 
 
 def _converter_steps(recordings: Sequence[StandstillRecording], facts: Facts) -> tuple[float, ...]:
@@ -230,7 +238,7 @@ def _clip_report(
 
 def _pieces(
     recording: StandstillRecording, currents: NDArray[np.float64], good: NDArray[np.bool_], link: Signal,
-    part: slice, file: int, facts: Facts,
+    swing: Signal | None, part: slice, file: int, facts: Facts,
 ) -> tuple[list[Segment], list[tuple[int, float, int]]]:
     time, period = recording.time_s[part], recording.sample_period_s
     number = int(recording.segment[part][0])
@@ -247,6 +255,7 @@ def _pieces(
             Segment(
                 number, file, float(axis[begin]), recording.time_s[inner], recording.voltage_axis_v[inner],
                 currents[:, inner], good[inner], link[inner], bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
+                link_swing=None if swing is None else swing[inner],
             ),
             period,
         ))
@@ -272,6 +281,7 @@ def _bridge(segment: Segment, period: float) -> Segment:
     return Segment(
         segment.number, segment.file, segment.axis_deg, segment.time_s[0] + every * period, command, currents, good,
         np.interp(every, index, segment.link_ratio), segment.starts_at_rest,
+        link_swing=None if segment.link_swing is None else np.interp(every, index, segment.link_swing),
     )
 
 

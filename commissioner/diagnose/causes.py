@@ -22,6 +22,7 @@ from commissioner.diagnose.evidence import (
 from commissioner.diagnose.fit import on_part
 from commissioner.diagnose.guards import SAME_ORDER, shows
 from commissioner.diagnose.leftover import Leftover
+from commissioner.diagnose.lost import Loss
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.search import EXPLORED, Found
 
@@ -68,7 +69,8 @@ def causes_of(
     rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, trust) for name in found.accepted]
     causes = _without_truncation(_with_open_ties(causes, rivals), audit)
-    causes += _audit_causes(audit, found, noise, {c.name for c in causes})
+    losses = () if rest.from_bursts_sigma > 0.0 else found.losses
+    causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
         c for c in causes
         if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest))
@@ -189,8 +191,11 @@ def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
     return out
 
 
-def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[str]) -> list[Cause]:
-    """Causes that leave no waveform: coarse converter steps, clipped and missing samples."""
+def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[str], losses: Sequence[Loss]) -> list[Cause]:
+    """Causes that leave no waveform: coarse converter steps, clipped and missing samples. `losses` without a gap in time: none where
+
+    errors come and go that samples put right do not take away.
+    """
     out = []
     step = max(audit.step_a, default=0.0)
     is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
@@ -199,8 +204,8 @@ def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[st
     if audit.clipped and "clipping" not in named:
         out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
                                        "samples": (audit.clipped["samples"], 0.0, "1")}))
-    if audit.holes or found.losses:
-        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in found.losses)
+    if audit.holes or losses:
+        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in losses)
         out.append(_plain("lost_samples", {
             "samples": (float(marked + unmarked), 0.0, "1"), "without_gap_in_time": (float(unmarked), 0.0, "1"),
         }))

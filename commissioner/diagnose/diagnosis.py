@@ -151,9 +151,9 @@ def _verdict(
                 f"times the noise is left so far{', beside ' + names if names else ''}."
             )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
+        comes_and_goes = " It comes and goes: in some moments much more is left than in most." if rest.from_bursts_sigma else ""
         return Verdict.UNEXPLAINED, (
-            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes."
-            f"{seen}"
+            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{seen}"
         )
     if not causes:
         return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from commissioner.diagnose import kinds
 from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.sensing import RESTARTS, RUNS_ON
@@ -60,6 +61,8 @@ SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
 LATEST_KNEE, LATEST_KNEE_OF_RATED, LATEST_KNEE_AT_SMALL_CURRENT = 0.2, 0.15, 0.6
 """Of the largest current, by which a leg has lost half of its voltage; or, up to that part of the largest, of the rated peak."""
+LEAST_SEEN, CLEARLY = 0.3, 6.0
+"""Of a sag or a ripple, what a recorded link must show of it, and how many standard errors of white noise it may miss."""
 MOST_SAG = 0.5
 """Of the link, at rated power: no source gives that power while it loses more."""
 LEAST_SLOPE_LOST = 0.25
@@ -112,6 +115,8 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     """
     if name == "clock_drift" and _is_a_delay(model.of(name), setting.record):
         return False
+    if any(t.kind == kinds.VOLTAGE_MOD for t in model.terms if t.effect == name) and _link_stands_still(model, name, setting.record):
+        return False
     sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
     has_own_sign = any(t.lower < 0.0 for t in CATALOGUE[name].exchanged_in(model.of(name)))
@@ -124,6 +129,26 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     peak, rated_peak = setting.facts.current_peak_a, setting.facts.rated_current_peak_a
     latest = max(LATEST_KNEE * peak, min(LATEST_KNEE_OF_RATED * rated_peak, LATEST_KNEE_AT_SMALL_CURRENT * peak))
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < latest
+
+
+def _link_stands_still(model: Model, name: str, record: Record) -> bool:
+    """Whether the DC link was recorded and surely moves by less than LEAST_SEEN of what this cause says."""
+    both = power = swung = 0.0
+    count = 0
+    for segment, channels in zip(record.segments, record.channels, strict=True):
+        if segment.link_swing is None:
+            return False
+        pairs = zip(model.terms, model.values, strict=True)
+        mine = [v * channels[:, t.index] for t, v in pairs if t.effect == name and t.segment in (-1, segment.uid)]
+        course = np.sum(mine, axis=0) if mine else np.zeros(segment.count)
+        said, seen = course - course.mean(), segment.link_swing - segment.link_swing.mean()
+        both, power, swung = both + float(said @ seen), power + float(said @ said), swung + float(seen @ seen)
+        count += segment.count
+    if power == 0.0:
+        return False
+    share = both / power
+    doubt = np.sqrt(max(swung - share * both, 0.0) / count / power)
+    return bool(share + CLEARLY * doubt < LEAST_SEEN)
 
 
 def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
+from commissioner.diagnose.bursts import bursts_sigma
 from commissioner.diagnose.guards import MATERIAL_SHARE
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
@@ -44,16 +45,18 @@ class Leftover:
     from_tones_sigma: float
     from_states_sigma: float
     strongest_hz: float
+    from_bursts_sigma: float = 0.0
 
 
 def leftover(
     model: Model, record: Record, layout: Layout, noise: Noise, numbers: int, tones_hz: Sequence[float] = ()
 ) -> Leftover:
-    """Four measures, the largest counts: total power above the noise (beyond three standard errors of the noise
+    """Five measures, the largest counts: total power above the noise (beyond three standard errors of the noise
 
     estimate), power in single frequencies that noise would not show once in a thousand recordings, power around
     each excited tone, all segments and phases together, where what a model misses piles up first, and power that goes with the
-    state: a law that is met in a few instants only, like a slew limit, shows in no line.
+    state: a law that is met in a few instants only, like a slew limit, shows in no line; and moments in which much more is left
+    than in most.
     """
     power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
     around: list[list[_Around]] = [[] for _ in tones_hz]
@@ -88,7 +91,10 @@ def leftover(
         float(np.sqrt(max(power / count - noise.rounding_share, 0.0)))
         for power in (line_power, at_tones, _by_state(record, predicted, whitened, noise))
     )
-    return Leftover(max(by_power, by_lines, by_tones, by_states), by_power, by_lines, by_tones, by_states, strongest[1])
+    residuals = [s.currents_a - expected for s, expected in zip(record.segments, predicted, strict=True)]
+    by_bursts = bursts_sigma(residuals, record, noise)
+    largest = max(by_power, by_lines, by_tones, by_states, by_bursts)
+    return Leftover(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)
 
 
 def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Array], noise: Noise) -> float:

@@ -42,6 +42,8 @@ class Segment:
     """Rotor flux (alpha, beta) at the end of the segment before, of which a part may be left at the start."""
     age_s: float = 0.0
     """Time of the first sample since the first one of its file."""
+    link_swing: Signal | None = None
+    """The recorded DC link over its median, less one; None where it was not recorded or is a constant."""
 
     @cached_property
     def period_s(self) -> float:
@@ -69,7 +71,7 @@ class Segment:
         return Segment(
             self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
             self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
-            self.flux_before_wb, self.age_s,
+            self.flux_before_wb, self.age_s, None if self.link_swing is None else self.link_swing[:samples],
         )
 
 

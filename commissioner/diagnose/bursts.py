@@ -1,0 +1,47 @@
+"""Errors that come and go: moments in which much more is left than in most, which no repeat of the test shows and a spectrum
+takes for noise (a link that dips, a command that is skipped)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.record import Record
+
+Array = NDArray[np.float64]
+BLOCK = 100
+"""Samples of a moment."""
+MEDIAN_OF_SQUARE = 0.4549
+"""Of a normal number: a single sample that stands out makes no moment."""
+APART, TIMES, LEAST_MOMENTS = 6.0, 2.0, 3
+"""A moment stands out by so many of the usual scatter of moments (their logarithms), and has so many times the power of the median
+one; fewer than these are chance or a start."""
+
+
+def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
+    """Root mean square over the whole record of what the moments that stand out have above the median one, over that one's; 0 where
+
+    there are none. `residuals` (phases, n) per segment; each moment is taken about a straight line, for noise rises towards low
+    frequencies. Noise that steps of the converter hide at rest counts as there.
+    """
+    line = np.stack([np.ones(BLOCK), np.linspace(-1.0, 1.0, BLOCK)])
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    floor = float(np.median(noise.sigma_a**2))
+    moments: list[Array] = []
+    for segment, residual in zip(record.segments, residuals, strict=True):
+        count = segment.count // BLOCK
+        whole = (residual.shape[0], count, BLOCK)
+        blocks = residual[:, : count * BLOCK].reshape(whole)
+        blocks = blocks - (blocks @ line.T) @ line
+        median = np.median(blocks.transpose(1, 0, 2).reshape(count, -1) ** 2, axis=1) / MEDIAN_OF_SQUARE
+        kept = segment.is_good[: count * BLOCK].reshape(count, BLOCK).all(axis=1)
+        moments.append(np.log(np.maximum(median[kept], floor)) - np.log(max(float(np.median(median[kept])), floor)) if kept.any() else np.zeros(0))
+    every = np.concatenate(moments)
+    if every.size < LEAST_MOMENTS:
+        return 0.0
+    usual = 1.4826 * float(np.median(np.abs(every[every > 0.0]))) if (every > 0.0).any() else 0.0
+    high = every[every > max(APART * usual, np.log(TIMES))]
+    return float(np.sqrt(np.expm1(high).sum() / every.size)) if high.size >= LEAST_MOMENTS else 0.0
