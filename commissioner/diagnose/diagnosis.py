@@ -34,6 +34,11 @@ from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
 UNEXPLAINED_SIGMA = 0.3
+WORSE_THAN_NONE, WEAK_SIGMA = -0.5, 0.1
+"""Share of the error of left-out segments, and of the noise: causes that make less, and these so much worse, are none."""
+REPEATS, MOST_REPEATED = ("repeated segments", "repeated periods"), 1.2
+"""The error of a model holds the noise: noise that is larger than it by more than this was not measured on noise (up to 1.09 with
+noise that rises towards low frequencies)."""
 UNEXPLAINED_STATE_SIGMA = 0.03
 """Of what goes with the state, where nothing is named and no cause that is too small to matter makes it: means over states show
 
@@ -117,6 +122,9 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     rest = leftover(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     trust = doubt(rest, explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
+    gained = float(np.sqrt(max(found.nominal.chi2 - found.fit.chi2, 0.0) / found.fit.normal.count.sum()))
+    if held.is_measured and held.share < WORSE_THAN_NONE and gained < WEAK_SIGMA:
+        trust = 0.0
     causes, unsure = causes_of(found, rest, trust, audit, noise, excluded)
     # what an unsure cause takes is left as well, yet no more than there was
     before = float(np.sqrt(max(found.nominal.normal.unexplained, 0.0) / found.nominal.normal.count.sum()))
@@ -126,7 +134,12 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
     is_seen = rest.from_states_sigma**2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
-    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=trust < 1.0 or (is_seen and not causes), is_complete=found.is_complete)
+    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), is_complete=found.is_complete)
+    if verdict is not Verdict.UNEXPLAINED and noise.source in REPEATS and held.noise_a > MOST_REPEATED * held.rmse_before_a:
+        verdict, reason = Verdict.UNEXPLAINED, (
+            f"Equal tests differ by {held.noise_a * 1e3:.3g} mA, more than the whole error of the plain simulation "
+            f"({held.rmse_before_a * 1e3:.3g} mA): something acts that the test does not repeat, and it hides the rest."
+        )
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
