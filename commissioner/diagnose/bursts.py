@@ -16,6 +16,8 @@ BLOCK = 100
 """Samples of a moment."""
 MEDIAN_OF_SQUARE = 0.4549
 """Of a normal number: a single sample that stands out makes no moment."""
+RESTING = 0.05
+"""Of the noise's power: a moment with less is one at which coarse steps of the converter stand still."""
 APART, TIMES, LEAST_MOMENTS = 6.0, 2.0, 3
 """A moment stands out by so many of the usual scatter of moments (their logarithms), and has so many times the power of the median
 one; fewer than these are chance or a start."""
@@ -30,18 +32,20 @@ def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> fl
     line = np.stack([np.ones(BLOCK), np.linspace(-1.0, 1.0, BLOCK)])
     line /= np.linalg.norm(line, axis=1, keepdims=True)
     floor = float(np.median(noise.sigma_a**2))
-    moments: list[Array] = []
+    about, above = [], []
     for segment, residual in zip(record.segments, residuals, strict=True):
         count = segment.count // BLOCK
-        whole = (residual.shape[0], count, BLOCK)
-        blocks = residual[:, : count * BLOCK].reshape(whole)
+        blocks = residual[:, : count * BLOCK].reshape(residual.shape[0], count, BLOCK)
         blocks = blocks - (blocks @ line.T) @ line
-        median = np.median(blocks.transpose(1, 0, 2).reshape(count, -1) ** 2, axis=1) / MEDIAN_OF_SQUARE
-        kept = segment.is_good[: count * BLOCK].reshape(count, BLOCK).all(axis=1)
-        moments.append(np.log(np.maximum(median[kept], floor)) - np.log(max(float(np.median(median[kept])), floor)) if kept.any() else np.zeros(0))
-    every = np.concatenate(moments)
-    if every.size < LEAST_MOMENTS:
+        power = np.median(blocks.transpose(1, 0, 2).reshape(count, -1) ** 2, axis=1) / MEDIAN_OF_SQUARE
+        moments = np.log(np.maximum(power[segment.is_good[: count * BLOCK].reshape(count, BLOCK).all(axis=1)], RESTING * floor))
+        awake = moments[moments > np.log(RESTING * floor)]
+        if awake.size:
+            usual = float(np.median(awake))
+            about.append(awake - usual)
+            above.append(moments - max(usual, float(np.log(floor))))
+    if not above:
         return 0.0
-    usual = 1.4826 * float(np.median(np.abs(every[every > 0.0]))) if (every > 0.0).any() else 0.0
-    high = every[every > max(APART * usual, np.log(TIMES))]
+    scatter, every = 1.4826 * float(np.median(np.abs(np.concatenate(about)))), np.concatenate(above)
+    high = every[every > max(APART * scatter, np.log(TIMES))]
     return float(np.sqrt(np.expm1(high).sum() / every.size)) if high.size >= LEAST_MOMENTS else 0.0

@@ -1,8 +1,12 @@
-"""A clock's delay that stands still is none of a clock."""
+"""What no sound cause does: a clock's delay that stands still, a sag that the recorded link does not show."""
+
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from commissioner.diagnose.guards import CLOCK_RATES, MOST_CONSTANT, constancy
+from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.guards import CLOCK_RATES, MOST_CONSTANT, constancy, is_plausible
 from commissioner.diagnose.reading import clock_courses
 
 
@@ -22,3 +26,38 @@ def test_clocks_pass_and_what_imitates_a_delay_does_not(setting):
 def test_constancy_is_a_share(setting):
     for rates in np.random.default_rng(3).normal(size=(20, len(CLOCK_RATES))):
         assert 0.0 <= constancy(dict(zip(CLOCK_RATES, rates, strict=True)), setting.record) <= 1.0
+
+
+def recorded_link(setting, swing):
+    """The setting with a DC link that was recorded: `swing(segment, channels)` over its median."""
+    record = setting.record
+    segments = tuple(replace(s, link_swing=swing(s, c)) for s, c in zip(record.segments, record.channels, strict=True))
+    return replace(setting, record=replace(record, segments=segments))
+
+
+@pytest.mark.parametrize(("shown", "is_sound"), [(1.0, True), (0.6, True), (0.0, False), (-1.0, False)])
+def test_a_recorded_link_is_a_witness_against_a_sag_that_it_does_not_show(setting, nominal, shown, is_sound):
+    terms = CATALOGUE["dc_link_sag"].terms(setting)
+    model = replace(nominal, terms=terms, values=tuple(0.05 * (t.symbol == "sag_10ms") for t in terms))
+    column = setting.record.channel("sag_10ms")
+    random = np.random.default_rng(2)
+
+    def swing(segment, channels):
+        return shown * 0.05 * channels[:, column] + 1e-4 * random.standard_normal(segment.count)
+
+    assert is_plausible(model, "dc_link_sag", setting)
+    assert is_plausible(model, "dc_link_sag", recorded_link(setting, swing)) is is_sound
+
+
+def test_a_link_recorded_too_coarsely_to_show_it_is_no_witness(setting, nominal):
+    terms = CATALOGUE["dc_link_sag"].terms(setting)
+    model = replace(nominal, terms=terms, values=tuple(1e-3 * (t.symbol == "sag_10ms") for t in terms))
+    random = np.random.default_rng(2)
+    assert is_plausible(model, "dc_link_sag", recorded_link(setting, lambda s, c: 0.05 * random.standard_normal(s.count)))
+
+
+def test_no_link_gives_its_rated_power_while_it_loses_more_than_half(setting, nominal):
+    terms = CATALOGUE["dc_link_sag"].terms(setting)
+    for size, is_sound in ((0.4, True), (0.7, False)):
+        model = replace(nominal, terms=terms, values=tuple(size * (t.symbol == "sag_10ms") for t in terms))
+        assert is_plausible(model, "dc_link_sag", setting) is is_sound
