@@ -91,11 +91,14 @@ def _causes(document: Mapping[str, Any]) -> None:
 
 
 def _uncertain(document: Mapping[str, Any]) -> None:
-    seen = document.get("uncertain", ())
+    some = document.get("uncertain", ())
+    seen, hidden = ([u for u in some if u["is_seen"] is one] for one in (True, False))
     if seen:
         screen.print("[bold]seen, but the name is uncertain[/]")
     for one in seen:
         screen.print(f"  {spoken(one['name'])}: {escape(one['decides'])}")
+    if hidden:
+        screen.print(f"[dim]not seen, but could hide behind a named cause: {', '.join(spoken(u['name']) for u in hidden)}[/]")
 
 
 def _next(document: Mapping[str, Any]) -> None:

@@ -46,6 +46,18 @@ DECIDES: Mapping[str, str] = {
 """What settles whether the name is right, in one sentence."""
 
 
+LINK_IS_RECORDED: Mapping[str, str] = {
+    "dc_link_sag": "Repeat one test at half the level: a sag falls to a quarter.",
+    "dc_link_ripple": "Look at the recorded dc_link_v: the ripple must be in it.",
+}
+
+
+def what_decides(name: str, record: Record) -> str:
+    """What settles a name in these data: nobody is asked to record what is recorded."""
+    is_recorded = all(s.link_swing is not None for s in record.segments)
+    return LINK_IS_RECORDED[name] if is_recorded and name in LINK_IS_RECORDED else DECIDES.get(name, "")
+
+
 @dataclass(frozen=True)
 class Procedure:
     """`steps` in order; the last command reads the old and the new file together."""

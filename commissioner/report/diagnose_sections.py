@@ -90,13 +90,14 @@ def _best_alternative(cause: Cause) -> str:
 
 
 def uncertain_names(document: Document) -> list[Section]:
-    """What was seen, or could hide, without a sure name."""
-    rows = [(spoken(u["name"]), u["why"], coded(u["decides"])) for u in document.get("uncertain", ())]
-    if not rows:
-        return []
-    return [Section("Seen, but the name is uncertain", [
-        Table(("perhaps", "why it is uncertain", "what would decide it"), rows, ["warn"] * len(rows)),
-    ])]
+    """What was seen without a sure name, and what was not seen but could hide behind a named cause."""
+    out = []
+    for title, is_seen in (("Seen, but the name is uncertain", True), ("Not seen, but could hide behind a named cause", False)):
+        rows = [(spoken(u["name"]), u["why"], coded(u["decides"])) for u in document.get("uncertain", ()) if u["is_seen"] is is_seen]
+        if rows:
+            tones: list[Tone] = ["warn" if is_seen else "good"] * len(rows)
+            out.append(Section(title, [Table(("perhaps", "why it is uncertain", "what would decide it"), rows, tones)]))
+    return out
 
 
 def next_test(document: Document) -> list[Section]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.alike import Alike, look_alikes
 from commissioner.diagnose.diagnosis import Diagnosis
-from commissioner.diagnose.experiment import DECIDES
+from commissioner.diagnose.experiment import what_decides
 from commissioner.report.diagnose_names import spoken
 from commissioner.report.diagnose_numbers import number, percent
 
@@ -18,7 +18,7 @@ SAME_FORM = 0.96
 
 
 def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[dict[str, Any]]:
-    """`name`, `why` the name is uncertain and what `decides` it; those that moved the fit first.
+    """`name`, `why` the name is uncertain, what `decides` it, and whether it `is_seen` (or could only hide); those that moved the fit first.
 
     `withdrawn`: accepted during the search and taken out again.
     """
@@ -34,10 +34,12 @@ def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[dict[str
         why.setdefault(name, "Seen, but too small to matter, or a part of the form of a named cause.")
     for name in withdrawn:
         why.setdefault(name, "Named at first, and no longer needed once the other causes were in.")
-    for name, reason in _hidden(look_alikes(seen.found.first_screening, seen.found.accepted), named).items():
-        why.setdefault(name, reason)
+    behind = _hidden(look_alikes(seen.found.first_screening, seen.found.accepted), named)
+    hidden = behind.keys() - why.keys()
+    why |= {name: behind[name] for name in behind if name in hidden}
     return [
-        {"name": name, "why": reason, "decides": DECIDES.get(name, "")} for name, reason in why.items() if name not in named
+        {"name": name, "why": reason, "decides": what_decides(name, seen.found.record), "is_seen": name not in hidden}
+        for name, reason in why.items() if name not in named
     ]
 
 

@@ -44,8 +44,16 @@ def sampling_delay(setting: Setting) -> tuple[Term, ...]:
 MOST_RESONANT = 0.5
 
 
+LEAST_SHAPE = 0.02
+"""Of a lag, from which on it may be a delay of 2 % of it, and a lag of first order."""
+
+
 def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    return {"time_constant_us": (values["lag"] * 1e6, "us")}
+    """The sum, and how much of it a delay before a lag of first order may be, whose second order is the same."""
+    sizes = {"time_constant_us": (values["lag"] * 1e6, "us")}
+    if (shape := values.get("shape", 0.0)) > LEAST_SHAPE:
+        sizes["may_be_delay_us"] = (values["lag"] * 1e6 * (1.0 - max(1.0 - 2.0 * shape, 0.0) ** 0.5), "us")
+    return sizes
 
 
 @effect(

@@ -293,3 +293,11 @@ def test_carried_flux_that_tilts_is_what_an_open_machine_keeps(nominal, setting)
     start = initial_state(model, segment, np.array([0.03, 0.02]))
     rate = np.log(0.4) * (np.eye(2) + np.array([[0.03, 0.02], [0.02, -0.03]]))
     assert start[2:4] == pytest.approx(expm(rate) @ [0.3, -0.2], rel=2e-3)
+
+
+@pytest.mark.parametrize(("shape", "delay"), [(0.0, None), (0.25, 100.0 * (1.0 - 0.5**0.5)), (0.5, 100.0)])
+def test_of_a_lag_what_may_be_a_delay_is_said(setting, shape, delay):
+    """exp(-s D) / (1 + s T) has the second order of 1 / (1 + s S + s^2 q S^2) where D + T = S and T^2 = (1 - 2 q) S^2."""
+    sizes = CATALOGUE["sensor_lag"].sizes(setting, {"lag": 1e-4, "shape": shape})
+    assert sizes["time_constant_us"][0] == pytest.approx(100.0)
+    assert ("may_be_delay_us" not in sizes) if delay is None else sizes["may_be_delay_us"][0] == pytest.approx(delay)

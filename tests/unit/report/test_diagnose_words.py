@@ -1,12 +1,15 @@
 """What the page and the terminal say for every kind of result: explained, tied, unexplained, unfinished, nothing, refused."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from commissioner.diagnose.audit import Audit
 from commissioner.diagnose.diagnosis import Diagnosis, Verdict
 from commissioner.diagnose.document import as_document, refused_document
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure
+from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure, what_decides
 from commissioner.diagnose.record import Facts
 from commissioner.diagnose.refusals import refused
 from commissioner.report import diagnose_sections as sections
@@ -93,7 +96,7 @@ def test_an_unexplained_error_keeps_what_is_known_beside_it():
 
 
 def test_what_is_uncertain_or_behind_a_class_does_not_stand_among_the_absent():
-    seen = document("not_distinguishable", [LATE], uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"]}])
+    seen = document("not_distinguishable", [LATE], uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"], "is_seen": True}])
     absent = [row[0] for row in sections.not_found(seen).parts[0].rows]
     assert absent == ["leakage saturation"]
     assert "inverter off" in sections.uncertain_names(seen)[0].parts[0].rows[0][2]
@@ -149,6 +152,20 @@ def test_the_procedure_for_the_legs_has_the_drives_own_numbers():
     plan = next_experiment("not_distinguishable", [Tied], Seen)
     assert "from 5000 to 2500 Hz" in plan["steps"][0] and plan["repeats"] == 1
     assert "switching frequency" in plan["do"] and plan["predicted_sigma"] > 100.0
+
+
+def test_what_was_seen_stands_apart_from_what_could_only_hide():
+    both = [{"name": n, "why": "w", "decides": "d", "is_seen": is_seen} for n, is_seen in (("iron_loss", False), ("sensor_lag", True))]
+    titles = {s.title: s.parts[0].rows[0][0] for s in sections.uncertain_names(document("explained", [LEGS], uncertain=both))}
+    assert titles == {"Seen, but the name is uncertain": "sensor lag", "Not seen, but could hide behind a named cause": "iron loss"}
+
+
+def test_nobody_is_asked_to_record_the_link_that_is_recorded():
+    segment = SimpleNamespace(link_swing=None)
+    record = SimpleNamespace(segments=(segment,))
+    assert "column dc_link_v" in what_decides("dc_link_sag", record)
+    segment.link_swing = np.zeros(3)
+    assert "half the level" in what_decides("dc_link_sag", record) and "column" not in what_decides("dc_link_ripple", record)
 
 
 def test_a_refusal_and_a_null_are_said_plainly():
