@@ -18,6 +18,7 @@ from commissioner.diagnose.causes import (
     explained_share,
 )
 from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.effects.inverter import tail_of_legs
 from commissioner.diagnose.evidence import HeldOut, hold_out
 from commissioner.diagnose.experiment import next_experiment
 from commissioner.diagnose.extended import model_document
@@ -186,6 +187,7 @@ def _parameters(one: Fit, layout: Layout) -> dict[str, Quantity]:
     values, derivatives = one.model.at_rest(layout)
     covariance = derivatives @ inverse(one.normal.total_gram) @ derivatives.T
     spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    spreads[0] = np.hypot(spreads[0], tail_of_legs(one.model, layout)[1])
     out = {n: Quantity(float(v), float(s)) for n, v, s in zip(PARAMETERS, values, spreads, strict=True)}
     shares = np.array([0.0, -1.0 / values[1], 0.0, 1.0 / values[3]])
     t = float(values[3] / values[1])

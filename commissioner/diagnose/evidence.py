@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.effect import Sizes
+from commissioner.diagnose.effects.inverter import tail_of_legs
 from commissioner.diagnose.effects.magnetics import EDGE
 from commissioner.diagnose.exchanges import read_late, with_closer_paths
 from commissioner.diagnose.fit import Fit, bounded_step, fit, inverse, limits
@@ -161,6 +162,9 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
         slope = np.array(slopes[key])
         variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope)
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
+    if "voltage_v" in out:
+        value, spread, unit = out["voltage_v"]
+        out["voltage_v"] = (value, float(np.hypot(spread, tail_of_legs(found.model, setting.layout)[0])), unit)
     if CATALOGUE[name].course:
         first = next(iter(sizes))
         out[first] = (*_rms_of_course(found, name, setting), sizes[first][1])

@@ -21,7 +21,7 @@ from commissioner.diagnose.effects.effect import (
     spline_value,
 )
 from commissioner.diagnose.kinds import CABLE
-from commissioner.diagnose.model import Term
+from commissioner.diagnose.model import Layout, Model, Term
 
 Array = NDArray[np.float64]
 MOST_UNEQUAL = 0.4
@@ -43,6 +43,19 @@ def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     half = float(layout.legs_knee_a * np.sinh(grid[reached[0]])) if reached.size else 0.0
     unequal = {k: (values[k], "1") for k in ("unequal_v", "unequal_w") if values.get(k)}
     return {"voltage_v": (top, "V"), "half_current_a": (half, "A"), **unequal}
+
+
+def tail_of_legs(model: Model, layout: Layout) -> tuple[float, float]:
+    """Half of what a leg's loss rises by over the upper half of the currents at which it may bend, V, and the resistance, ohm, that this
+
+    looks like: a law that goes on rising beyond cannot be told from R_s, and its form is nobody's knowledge.
+    """
+    count = layout.legs_vectors.shape[0]
+    weights = model.sum_kind(kinds.LEGS, count) + model.sum_kind(kinds.LEGS_LINK, count)
+    most = float(np.sinh(layout.legs_top))
+    ends = [spline_value(layout.legs_vectors, weights, layout.legs_top, float(np.arcsinh(share * most))) for share in (0.5, 1.0)]
+    rise = 0.5 * max(ends[1] - ends[0], 0.0)
+    return rise, rise / (0.5 * most * layout.legs_knee_a)
 
 
 def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
