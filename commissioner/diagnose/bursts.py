@@ -27,11 +27,11 @@ def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> fl
     """Root mean square over the whole record of what the moments that stand out have above the median one, over that one's; 0 where
 
     there are none. `residuals` (phases, n) per segment; each moment is taken about a straight line, for noise rises towards low
-    frequencies. Noise that steps of the converter hide at rest counts as there.
+    frequencies. A current that rests between two steps of the converter is half of one off, all of the time.
     """
     line = np.stack([np.ones(BLOCK), np.linspace(-1.0, 1.0, BLOCK)])
     line /= np.linalg.norm(line, axis=1, keepdims=True)
-    floor = float(np.median(noise.sigma_a**2))
+    floor = float(np.median(noise.sigma_a**2)) + noise.step_a**2 / 4.0 / MEDIAN_OF_SQUARE
     about, above = [], []
     for segment, residual in zip(record.segments, residuals, strict=True):
         count = segment.count // BLOCK

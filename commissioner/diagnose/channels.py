@@ -144,12 +144,11 @@ def lagged_power(record: Record, segment: Segment, lag_s: float, shape: float = 
     current = segment.axis_current_a
     over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
     power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
-    # state (output, its slope if there is one), input, and the output's integral
+    # state (output, S times its slope if there is one), input, and the output's integral
     order = 2 if shape > 0.0 else 1
     rates = np.zeros((order + 2, order + 2))
     if shape > 0.0:
-        fastest = shape * lag_s**2
-        rates[0, 1], rates[1, :3] = 1.0, (-1.0 / fastest, -lag_s / fastest, 1.0 / fastest)
+        rates[0, 1], rates[1, :3] = 1.0 / lag_s, np.array([-1.0, -1.0, 1.0]) / (shape * lag_s)
     else:
         rates[0, :2] = -1.0 / lag_s, 1.0 / lag_s
     rates[-1, 0] = 1.0 / record.facts.sample_period_s

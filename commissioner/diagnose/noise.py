@@ -52,6 +52,8 @@ class Noise:
     by_source: dict[str, list[float]] = field(default_factory=dict)
     rounding_share: float = 0.0
     """Part of the variance that coarse converter steps make, which repeat with the signal: lines, not noise."""
+    step_a: float = 0.0
+    """Largest step of the converters."""
 
     @property
     def floor_a(self) -> float:
@@ -72,8 +74,9 @@ class Noise:
 
         in all, of which repeats of one test show only what differs between them, and a current that rests shows less.
         """
+        stepped = replace(self, step_a=float(np.max(step_a)))
         if self.source not in ("repeated segments", "repeated periods", "zero voltage"):
-            return self
+            return stepped
         seen = _rounded_at_rest if self.source == "zero voltage" else _rounded_twice
         variance, repeating = self.sigma_a**2, np.zeros_like(self.sigma_a)
         for k, step in enumerate(step_a):
@@ -83,10 +86,10 @@ class Noise:
                 repeating[k] = step**2 * _repeating(ratio)
         hidden = float(np.sum(variance) / np.sum(self.sigma_a**2)) - 1.0
         if hidden < RESOLVED:
-            return self
+            return stepped
         uncertainty = max(self.uncertainty, min(hidden, 0.1))
         share = float(np.sum(repeating) / np.sum(variance))
-        return replace(self, sigma_a=np.sqrt(variance), uncertainty=uncertainty, rounding_share=share)
+        return replace(stepped, sigma_a=np.sqrt(variance), uncertainty=uncertainty, rounding_share=share)
 
     def weights(self, samples: int, period_s: float) -> Array:
         """(phases, samples//2 + 1): what a Fourier coefficient is divided by, white level included."""

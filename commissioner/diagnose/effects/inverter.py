@@ -29,8 +29,8 @@ MOST_UNEQUAL = 0.4
 MOST_OF_A_LAG = 5.0
 SAG_SAMPLES = 4000
 """Of every segment, on which a sag of several lags is read as one of a single lag."""
-SECOND_ORDER_LEAVES, MOST_RINGING = 0.25, 2.0
-"""Of the power that a lag of first order leaves; and the largest q of a lag 1 / (1 + s S + s^2 q S^2), two equal ones at a quarter."""
+SECOND_ORDER_LEAVES, LEAST_RINGING, MOST_RINGING = 0.25, 0.01, 2.0
+"""Of the power that a lag of first order leaves; and the least and largest q of a lag 1 / (1 + s S + s^2 q S^2), two equal ones at a quarter."""
 
 
 def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -123,7 +123,7 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     left = as_much_of(lagged(log_lag), course, weight)[1]
     second = least_squares(
         lambda x: as_much_of(lagged(*x), course, weight)[1], (log_lag, 0.1), x_scale=(0.1, 0.1),
-        bounds=((np.log(SAG_LAGS_S[0] / 2.0), 0.0), (np.log(2.0 * SAG_LAGS_S[-1]), MOST_RINGING)),
+        bounds=((np.log(SAG_LAGS_S[0] / 2.0), LEAST_RINGING), (np.log(2.0 * SAG_LAGS_S[-1]), MOST_RINGING)),
     )
     if 2.0 * second.cost < SECOND_ORDER_LEAVES * float(left @ left):
         log_lag, shape = second.x

@@ -12,8 +12,12 @@ from commissioner.diagnose.noise import Noise
 SIGMA = 0.01
 
 
-def noise_of(sigma=SIGMA):
-    return Noise(np.full(3, sigma), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
+STEP = 4.0 * SIGMA
+
+
+def noise_of(step_a=0.0):
+    given = Noise(np.full(3, SIGMA), np.array([1.0, 1000.0]), np.ones((3, 2)), "repeated segments", True, 0.0, True)
+    return given.with_converter_step(np.full(3, step_a)) if step_a else given
 
 
 @pytest.fixture(scope="module")
@@ -33,17 +37,16 @@ def residuals(record, kind, seed=1):
         elif kind == "heavy tails":
             white = random.standard_t(3.0, (3, segment.count)) / np.sqrt(3.0)
         elif kind == "rounded":
-            step = 4.0
-            moving = 30.0 * np.sin(0.01 * np.arange(segment.count)) * (segment.time_s - segment.time_s[0] > 0.4)
-            white = np.round((moving + white) / step) * step - moving
+            moving = 30.0 * np.sin(0.003 * np.arange(segment.count)) * (segment.time_s - segment.time_s[0] > 0.4) + 2.0
+            white = np.round((moving + white) / 4.0) * 4.0 - moving
         out.append(SIGMA * white)
     return out
 
 
 @pytest.mark.parametrize("kind", ["white", "red", "wandering", "heavy tails", "rounded"])
 def test_noise_of_any_kind_has_no_bursts(record, kind):
-    hidden = SIGMA * (4.0 / np.sqrt(12.0)) if kind == "rounded" else SIGMA
-    assert all(bursts_sigma(residuals(record, kind, seed), record, noise_of(hidden)) == 0.0 for seed in range(10))
+    noise = noise_of(STEP if kind == "rounded" else 0.0)
+    assert all(bursts_sigma(residuals(record, kind, seed), record, noise) == 0.0 for seed in range(10))
 
 
 @pytest.mark.parametrize("kind", ["white", "red", "heavy tails"])
