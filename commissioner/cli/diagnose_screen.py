@@ -42,8 +42,6 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     screen.print(f"[bold {COLOURS.get(tone(document), 'red')}]{escape(headline(document))}[/]")
     for sentence in meaning(document):
         screen.print(escape(sentence))
-    if error := document.get("error"):
-        screen.print(escape(f"seen: {error['value']}; expected: {error['limit']}"))
     if document["causes"]:
         _causes(document)
     else:

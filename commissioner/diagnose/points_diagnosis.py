@@ -147,7 +147,7 @@ def _verdict(
     if any(missed[what] > most for what, most in MOST_SCATTER.items()):
         errors = " and ".join(f"{missed[what]:.1%} in {what} (instruments: up to {most:.0%})" for what, most in MOST_SCATTER.items())
         return "unexplained", (
-            f"Read as {where}, the best circuit misses them by {errors}: points of more than one motor or "
+            f"Read as {where.removeprefix('the ')}, the best circuit misses them by {errors}: points of more than one motor or "
             "test, of a motor under load, in other units than the column says, or with a cause that no circuit here has."
         )
     if causes:

@@ -102,7 +102,8 @@ def tone(document: Document) -> Tone:
 def meaning(document: Document) -> list[str]:
     """What it means for the motor, and how much of the error is explained, a paragraph each."""
     if document["verdict"] == "refused":
-        return [said(str(document["reason"]))]
+        error = document.get("error")
+        return [said(str(document["reason"])), *([f"Seen: {_seen(error['value'])}; expected: {error['limit']}."] if error else [])]
     causes, out = ordered(document), []
     is_points = document["kind"] == "points"
     if not is_finished(document):
@@ -117,6 +118,10 @@ def meaning(document: Document) -> list[str]:
     if causes:
         out.append(_of_points(document) if is_points else _explained(document, causes))
     return out
+
+
+def _seen(value: object) -> str:
+    return number(value, 3) if isinstance(value, float) else said(str(value))
 
 
 def _left_over(document: Document) -> str:

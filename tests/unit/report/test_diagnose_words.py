@@ -170,7 +170,7 @@ def test_nobody_is_asked_to_record_the_link_that_is_recorded():
 
 def test_a_refusal_and_a_null_are_said_plainly():
     data = refused_document(refused("sensor_offset too large", 3.0, "at most 2", "turn it off"), "recording")
-    assert "cannot carry" in headline(data) and meaning(data) == ["sensor offset too large; turn it off"]
+    assert "cannot carry" in headline(data) and meaning(data) == ["sensor offset too large; turn it off", "Seen: 3.00; expected: at most 2."]
     assert data["error"] == {
         "kind": "DataRefused", "what": "sensor_offset too large", "step": "diagnose", "value": 3.0, "limit": "at most 2",
         "remedy": "turn it off",
