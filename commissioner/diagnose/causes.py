@@ -69,7 +69,7 @@ def causes_of(
     rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
     causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, trust) for name in found.accepted]
     causes = _without_truncation(_with_open_ties(causes, rivals), audit)
-    losses = () if rest.from_bursts_sigma > 0.0 else found.losses
+    losses = () if rest.from_bursts_sigma > 0.0 and not found.accepted else found.losses
     causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
         c for c in causes
