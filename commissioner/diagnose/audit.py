@@ -78,16 +78,16 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
         replace(s, uid=k, age_s=float(s.time_s[0] - recordings[s.file].time_s[0])) for k, s in enumerate(kept)
     ]
     record = Record(tuple(kept), facts)
+    clipped = _clip_report(recordings, limits, facts)
+    tones = excited_lines(record)
+    refusal, more = _judge(record, tones, holes, clipped, steps)
+    sentences.extend(more)
     if record.samples > MOST_SAMPLES:
         sentences.append(
             f"Of {record.samples} samples the first {record.share_of(MOST_SAMPLES) * facts.sample_period_s:.3g} s of every segment are used: "
             "more would need memory and time, and tell little."
         )
         record = record.beginning(MOST_SAMPLES)
-    clipped = _clip_report(recordings, limits, facts)
-    tones = excited_lines(record)
-    refusal, more = _judge(record, tones, holes, clipped, steps)
-    sentences.extend(more)
     return record, Audit(
         tuple(sentences), clipped, steps, tuple(holes), tuple(tones),
         tuple(sorted({s.axis_deg for s in kept})), refusal,
