@@ -26,10 +26,6 @@ PILE = 1e-6
 """How close to the end samples pile up, relative to the peak: to the last digit. Before a soft limit a channel bends, which
 is a cause to be fitted."""
 SHORTEST_STRETCH = 200
-MOST_CURRENT = 20.0
-"""Times the rated peak: no drive gives so much to its motor."""
-LEAST_IMPEDANCE, MOST_IMPEDANCE = 5e-4, 30.0
-"""Of the rated impedance, volts over amperes of a motor at rest: R_s has 0.005 (400 kW) to 0.15 of it, L_M 1 to 4 times."""
 MOST_SAMPLES = 1_200_000
 """Of all segments together that are looked at: a million takes 2.7 GB, a hundred seconds, and shows a thousandth of the noise."""
 MOST_CLIPPED = 0.3
@@ -311,31 +307,6 @@ def excited_lines(record: Record) -> list[float]:
     return sorted(found) if at_peaks > LEAST_AT_PEAKS * power else []
 
 
-def _unlikely_units(record: Record) -> DataRefused | None:
-    """Currents, or volts per ampere, that no motor of this nameplate has."""
-    facts = record.facts
-    volts, amps = (
-        float(np.sqrt(np.mean(np.concatenate(rows) ** 2)))
-        for rows in ([s.voltage_axis_v for s in record.segments], [s.axis_current_a[s.is_good] for s in record.segments])
-    )
-    over = facts.current_peak_a / facts.rated_current_peak_a
-    if over > MOST_CURRENT:
-        return refused(
-            f"the currents reach {facts.current_peak_a:.4g} A, {over:.3g} times the rated peak", over, f"at most {MOST_CURRENT:g} times",
-            "check the unit (amperes, not milliamperes) and the rated current of the nameplate",
-        )
-    voltage = _number(dict(facts.metadata), "rated_voltage_v")
-    if voltage and "rated_current_a" in facts.metadata and amps > 0.0:
-        rated = np.sqrt(2.0 / 3.0) * voltage / facts.rated_current_peak_a
-        share = volts / amps / rated
-        if not LEAST_IMPEDANCE < share < MOST_IMPEDANCE:
-            return refused(
-                f"{volts:.3g} V drive {amps:.3g} A: {share:.2g} of the motor's rated impedance of {rated:.3g} ohm", share,
-                f"{LEAST_IMPEDANCE:g} to {MOST_IMPEDANCE:g} of it", "check the units (volts, amperes) and the nameplate",
-            )
-    return None
-
-
 def _judge(
     record: Record, tones: Sequence[float], holes: Sequence[tuple[int, float, int]], clipped: dict[str, float],
     steps: Sequence[float],
@@ -362,7 +333,7 @@ def _judge(
         share = clipped["samples"] / record.samples
         if share > MOST_CLIPPED:
             return refused(f"{share:.0%} of the samples are clipped", share, f"at most {MOST_CLIPPED:.0%}", "record again at a lower level"), out
-    if (refusal := _unlikely_units(record) or contradiction(record)) is not None:
+    if (refusal := contradiction(record)) is not None:
         return refusal, out
     if max(steps, default=0.0) > 0:
         out.append(f"currents come in steps of {max(steps) * 1e3:.3g} mA.")

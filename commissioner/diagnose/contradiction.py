@@ -18,12 +18,41 @@ LEAST_SHARE_BELOW = 0.1
 """Of the current, where the latest reading turns it by less than 90 degrees: fewer lines are leakage and offsets."""
 LEAST_LAG_FACTOR = -0.1
 """Motors have 0.4 to 0.9 whatever cause is in them, and the negative of it with a sign turned; a foreign current has 0."""
+MOST_CURRENT = 20.0
+"""Times the rated peak: no drive gives so much to its motor."""
+LEAST_IMPEDANCE, MOST_IMPEDANCE = 5e-4, 30.0
+"""Of the rated impedance, volts over amperes of a motor at rest: R_s has 0.005 (400 kW) to 0.15 of it, L_M 1 to 4 times."""
 PHASES = ("u", "v", "w")
 
 
 def contradiction(record: Record) -> DataRefused | None:
     """Why these currents cannot be the answer to this command, or None."""
-    return _silent_phase(record) or _wrong_direction(record) or _wrong_sign(record)
+    return _unlikely_units(record) or _silent_phase(record) or _wrong_direction(record) or _wrong_sign(record)
+
+
+def _unlikely_units(record: Record) -> DataRefused | None:
+    """Currents, or volts per ampere, that no motor of this nameplate has."""
+    facts = record.facts
+    volts, amps = (
+        float(np.sqrt(np.mean(np.concatenate(rows) ** 2)))
+        for rows in ([s.voltage_axis_v for s in record.segments], [s.axis_current_a[s.is_good] for s in record.segments])
+    )
+    over = facts.current_peak_a / facts.rated_current_peak_a
+    if over > MOST_CURRENT:
+        return refused(
+            f"the currents reach {facts.current_peak_a:.4g} A, {over:.3g} times the rated peak", over, f"at most {MOST_CURRENT:g} times",
+            "check the unit (amperes, not milliamperes) and the rated current of the nameplate",
+        )
+    voltage = facts.metadata.get("rated_voltage_v")
+    if isinstance(voltage, int | float) and "rated_current_a" in facts.metadata and amps > 0.0:
+        rated = np.sqrt(2.0 / 3.0) * float(voltage) / facts.rated_current_peak_a
+        share = volts / amps / rated
+        if not LEAST_IMPEDANCE < share < MOST_IMPEDANCE:
+            return refused(
+                f"{volts:.3g} V drive {amps:.3g} A: {share:.2g} of the motor's rated impedance of {rated:.3g} ohm", share,
+                f"{LEAST_IMPEDANCE:g} to {MOST_IMPEDANCE:g} of it", "check the units (volts, amperes) and the nameplate",
+            )
+    return None
 
 
 def _silent_phase(record: Record) -> DataRefused | None:
