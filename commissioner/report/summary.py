@@ -64,7 +64,7 @@ def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, A
     out = []
     if not diagnosis.get("is_complete", True):
         out.append(
-            "the diagnosis of the samples was stopped before every cause was tried, on a busy computer; the parameters "
+            "the diagnosis of the samples was stopped before every cause was tried, when its time was over; the parameters "
             "do not depend on it. `commissioner diagnose` on the run's recording.parquet finishes it"
         )
     if names:
