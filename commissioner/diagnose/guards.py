@@ -12,6 +12,7 @@ from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.sensing import RESTARTS, RUNS_ON
 from commissioner.diagnose.fit import Fit
 from commissioner.diagnose.model import Model
+from commissioner.diagnose.plant import modulation
 from commissioner.diagnose.reading import clock_courses
 from commissioner.diagnose.record import Record
 
@@ -138,9 +139,7 @@ def _link_stands_still(model: Model, name: str, record: Record) -> bool:
     for segment, channels in zip(record.segments, record.channels, strict=True):
         if segment.link_swing is None:
             return False
-        pairs = zip(model.terms, model.values, strict=True)
-        mine = [v * channels[:, t.index] for t, v in pairs if t.effect == name and t.segment in (-1, segment.uid)]
-        course = np.sum(mine, axis=0) if mine else np.zeros(segment.count)
+        course = modulation(model.only((name,)), segment, channels)[0]
         said, seen = course - course.mean(), segment.link_swing - segment.link_swing.mean()
         both, power, swung = both + float(said @ seen), power + float(said @ said), swung + float(seen @ seen)
         count += segment.count

@@ -61,9 +61,9 @@ def leftover(
     power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
     around: list[list[_Around]] = [[] for _ in tones_hz]
     predicted = each_segment(lambda k: predict(model, record, k, layout).currents_a, record)
+    residuals = [s.currents_a - expected for s, expected in zip(record.segments, predicted, strict=True)]
     whitened: list[Array] = []
-    for segment, expected in zip(record.segments, predicted, strict=True):
-        residual = segment.currents_a - expected
+    for segment, residual in zip(record.segments, residuals, strict=True):
         white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
         power += float(white @ white)
         count += int(segment.is_good.sum()) * record.facts.phases
@@ -91,7 +91,6 @@ def leftover(
         float(np.sqrt(max(power / count - noise.rounding_share, 0.0)))
         for power in (line_power, at_tones, _by_state(record, predicted, whitened, noise))
     )
-    residuals = [s.currents_a - expected for s, expected in zip(record.segments, predicted, strict=True)]
     by_bursts = bursts_sigma(residuals, record, noise)
     largest = max(by_power, by_lines, by_tones, by_states, by_bursts)
     return Leftover(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)

@@ -7,7 +7,7 @@ operators of fixed radius, rotor branches of fixed corner frequency.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -193,27 +193,26 @@ class Model:
 
     def without(self, effect: str) -> Model:
         """The model without an effect; R_R gets back what rotor branches had of its conductance."""
-        keep = [k for k, t in enumerate(self.terms) if t.effect != effect]
         r_s, r_r, l_sigma, l_m = self.nominal
         if effect == SKIN_EFFECT:
             r_r = 1.0 / (1.0 / r_r + sum(self.of(effect).values()))
-        return Model((r_s, r_r, l_sigma, l_m), tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+        return replace(self._where(lambda t: t.effect != effect), nominal=(r_s, r_r, l_sigma, l_m))
 
     def only(self, effects: Sequence[str]) -> Model:
-        keep = [k for k, t in enumerate(self.terms) if t.effect in effects]
-        return Model(self.nominal, tuple(self.terms[k] for k in keep), tuple(self.values[k] for k in keep))
+        return self._where(lambda t: t.effect in effects)
 
     def without_kind(self, kind: int) -> Model:
-        pairs = [(t, v) for t, v in zip(self.terms, self.values, strict=True) if t.kind != kind]
-        return Model(self.nominal, tuple(t for t, _ in pairs), tuple(v for _, v in pairs))
+        return self._where(lambda t: t.kind != kind)
 
     def on_channels(self, names: Sequence[str]) -> Model:
         """The model with its numbers pointing into a record with these channels; those whose channel is not there are left out."""
-        pairs = [
-            (replace(t, index=_place(t, names)) if t.channel else t, v)
-            for t, v in zip(self.terms, self.values, strict=True) if not t.channel or t.channel in names
-        ]
-        return Model(self.nominal, tuple(t for t, _ in pairs), tuple(v for _, v in pairs))
+        there = self._where(lambda t: not t.channel or t.channel in names)
+        return replace(there, terms=tuple(replace(t, index=_place(t, names)) if t.channel else t for t in there.terms))
+
+    def _where(self, is_kept: Callable[[Term], bool]) -> Model:
+        """The model with those of its numbers only."""
+        kept = [k for k, t in enumerate(self.terms) if is_kept(t)]
+        return Model(self.nominal, tuple(self.terms[k] for k in kept), tuple(self.values[k] for k in kept))
 
     def of(self, effect: str) -> dict[str, float]:
         return {t.symbol: v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect}

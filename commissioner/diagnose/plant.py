@@ -102,7 +102,7 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
     """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`."""
     segment, channels = record.segments[position], _channels(record, position)
     asked = [wanted[k] for k in _inside(wanted, segment)]
-    drive = _drive(model, segment, channels)
+    drive = modulation(model, segment, channels)
     machine = _machine(model, layout, asked)
     period = segment.period_s
     start = initial_state(model, segment, _decay_tilt(machine[0]))
@@ -163,7 +163,7 @@ def _tangent(
     return out
 
 
-def _drive(model: Model, segment: Segment, channels: Array) -> tuple[Array, Array, Array, Array, Array]:
+def modulation(model: Model, segment: Segment, channels: Array) -> tuple[Array, Array, Array, Array, Array]:
     """Factors on voltage, link, phase resistances and rotor resistance, and the speed, at every sample."""
     n = segment.count
     voltage_factor, rotor_factor = np.ones(n), np.ones(n)

@@ -107,7 +107,7 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     """Sag at rated power and time constant (s) of the one lag whose loss of voltage comes nearest to the sum of these, but for a
 
     constant: that only scales the four numbers, so that several lags in place of one between them have any sum. The lag is of second
-    order where that leaves next to nothing of what a first one does.
+    order where that leaves at most SECOND_ORDER_LEAVES of what a first one does.
     """
     record = setting.record
     first = [s.first(SAG_SAMPLES) for s in record.segments]
