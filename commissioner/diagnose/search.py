@@ -90,68 +90,108 @@ def _searched(
     """Explored on a part, confirmed and completed on all of the record."""
     part, bare = record.beginning(EXPLORED[0]), bare_layout(record)
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
-    losses: tuple[Loss, ...] = ()
     raw = record.segments
+    losses: tuple[Loss, ...] = ()
     if "lost_samples" not in excluded:
         record, nominal, losses = _mended(record, nominal, bare, noise, report)
     if check is not None:
         check(nominal, record)
     report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
-    record, layout, setting = set_up(record, noise, nominal)
+    record, _, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
-    start = nominal
-    seen: Steps | None = None
-    accepted: tuple[str, ...] = ()
+    reached, first = _explored(nominal, Steps(setting, noise, names, report, record, go_on))
+    placed = reached.steps.placed
+    if reached.accepted and losses:
+        reached, losses = _losses_doubted(reached, raw, losses)
+    if reached.accepted and "lost_samples" not in excluded:
+        reached, losses = _losses_completed(reached, losses)
+    return _settled(reached, nominal, first, losses, is_placed=_is_placed(placed, reached.accepted))
+
+
+@dataclass(frozen=True)
+class _Reached:
+    """Where a search stands: its record and dictionaries (in `steps`), the fit, the accepted causes, the last screening."""
+
+    steps: Steps
+    fit: Fit
+    accepted: tuple[str, ...]
+    screening: Screening
+
+    def again_on(self, record: Record, start: Fit) -> _Reached:
+        """Searched once more on the whole of another record, from these causes."""
+        steps = self.steps.on(record)
+        return _Reached(steps, *steps.run(start, self.accepted))
+
+
+def _explored(nominal: Fit, steps: Steps) -> tuple[_Reached, Screening]:
+    """Searched on growing parts of the record and on all of it; with the first screening. `steps`: nothing tried yet."""
+    base, noise, whole = steps.setting, steps.noise, steps.full.samples
+    reached: _Reached | None = None
     first: Screening | None = None
-    regrouped: set[frozenset[str]] = set()
-    placed: frozenset[str] = frozenset()
-    is_hopeless = False
-    for samples in (*(n for n in EXPLORED if n < 0.7 * record.samples), record.samples):
-        part = record if samples == record.samples else record.beginning(samples)
-        here = replace(setting, record=part)
-        if seen is None or not accepted:
-            start = fit(start.model, part, layout, noise)
-        else:
-            start, here = _on_more(seen, start.model, accepted, here, noise)
-        if accepted and not start.chi2 < Trial(nominal.model, part, layout, (), noise).chi2:
-            # what fitted the smaller part runs away beyond it
-            start, here = fit(nominal.model, part, layout, noise), replace(setting, record=part)
-            again = fit(_completed(nominal.model, accepted, here), part, layout, noise)
-            start, accepted = (again, accepted) if again.chi2 < start.chi2 else (start, ())
-        whole = Steps(here, noise, names, report, record, go_on)
-        whole.regrouped, whole.placed = regrouped, placed
-        if accepted or part is record:
-            start = whole.with_new_flux_before(whole.with_new_dictionaries(start))
-        fitted, accepted, last = whole.run(start, accepted, adds=not is_hopeless)
-        is_hopeless = _leaves(HOPELESS_SIGMA, fitted, nominal, noise)
-        first, record, regrouped, placed = first or whole.first, whole.full, whole.regrouped, whole.placed
-        setting, start = replace(setting, record=record, lines_hz=whole.setting.lines_hz), fitted
-        seen = whole
-    if accepted and losses:
-        unmended = _with_the_losses(whole.record, raw, fitted, whole.layout, noise)
-        if unmended is not None:
-            report("what looked like lost samples were the causes named since")
-            losses, (record, start) = (), unmended
-            whole = whole.on(record)
-            fitted, accepted, last = whole.run(start, accepted)
-    if accepted and "lost_samples" not in excluded:
-        least = guard_of_lost_samples(fitted)
-        mended, again, more = _mended(whole.record, fitted, whole.layout, noise, report, least)
-        if more:
-            losses += more
-            whole = whole.on(mended)
-            fitted, accepted, last = whole.run(again, accepted)
-    layout = whole.layout
+    for samples in (*(n for n in EXPLORED if n < 0.7 * whole), whole):
+        part = steps.full if samples == whole else steps.full.beginning(samples)
+        base = replace(base, record=part, lines_hz=steps.setting.lines_hz)
+        start, here, accepted = _start_on(base, reached, nominal, noise)
+        steps = steps.continued(here)
+        if accepted or samples == whole:
+            start = steps.with_new_flux_before(steps.with_new_dictionaries(start))
+        is_hopeless = reached is not None and _leaves(HOPELESS_SIGMA, reached.fit, nominal, noise)
+        reached = _Reached(steps, *steps.run(start, accepted, adds=not is_hopeless))
+        first = first or steps.first
+    assert reached is not None and first is not None, "the whole record is the last part"
+    return reached, first
+
+
+def _start_on(
+    base: Setting, reached: _Reached | None, nominal: Fit, noise: Noise
+) -> tuple[Fit, Setting, tuple[str, ...]]:
+    """The fit on more of the record from which a search goes on, with its dictionaries and the causes it keeps."""
+    part, layout = base.record, base.layout
+    if reached is None or not reached.accepted:
+        return fit((reached.fit if reached else nominal).model, part, layout, noise), base, ()
+    start, here = _on_more(reached, base, noise)
+    if start.chi2 < Trial(nominal.model, part, layout, (), noise).chi2:
+        return start, here, reached.accepted
+    # what fitted the smaller part runs away beyond it
+    start = fit(nominal.model, part, layout, noise)
+    again = fit(_completed(nominal.model, reached.accepted, base), part, layout, noise)
+    return (again, base, reached.accepted) if again.chi2 < start.chi2 else (start, base, ())
+
+
+def _losses_doubted(
+    reached: _Reached, raw: Sequence[Segment], losses: tuple[Loss, ...]
+) -> tuple[_Reached, tuple[Loss, ...]]:
+    """Searched again in the data as they came, where the causes named since explain what looked like lost samples."""
+    steps = reached.steps
+    unmended = _with_the_losses(steps.record, raw, reached.fit, steps.layout, steps.noise)
+    if unmended is None:
+        return reached, losses
+    steps.report("what looked like lost samples were the causes named since")
+    return reached.again_on(*unmended), ()
+
+
+def _losses_completed(reached: _Reached, losses: tuple[Loss, ...]) -> tuple[_Reached, tuple[Loss, ...]]:
+    """Searched again where the named causes make further lost samples visible."""
+    steps, least = reached.steps, guard_of_lost_samples(reached.fit)
+    mended, better, more = _mended(steps.record, reached.fit, steps.layout, steps.noise, steps.report, least)
+    return (reached.again_on(mended, better), losses + more) if more else (reached, losses)
+
+
+def _settled(
+    reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, is_placed: bool
+) -> Found:
+    """The last fit's sides and loops settled, unless too much is left; with all that was seen on the way."""
+    steps, fitted, noise, layout = reached.steps, reached.fit, reached.steps.noise, reached.steps.layout
     if not _leaves(UNKNOWN_SIGMA, fitted, nominal, noise):
-        fitted, layout = settled(fitted, whole.record, layout, noise, is_placed=_is_placed(placed, accepted))
-    iron_wb, leakage_wb = largest_fluxes(whole.record, fitted.model, layout)
-    reached = replace(
-        whole.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
+        fitted, layout = settled(fitted, steps.record, layout, noise, is_placed=is_placed)
+    iron_wb, leakage_wb = largest_fluxes(steps.record, fitted.model, layout)
+    setting = replace(
+        steps.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
     )
     return Found(
-        nominal, fitted, accepted, whole.record, layout, reached, last, first or last,
-        whole.below, losses_of(fitted, accepted), tuple(x for x in losses if not x.is_spike),
-        tuple(x for x in losses if x.is_spike), whole.material_chi2, go_on(),
+        nominal, fitted, reached.accepted, steps.record, layout, setting, reached.screening, first,
+        steps.below, losses_of(fitted, reached.accepted), tuple(x for x in losses if not x.is_spike),
+        tuple(x for x in losses if x.is_spike), steps.material_chi2, steps.go_on(),
     )
 
 
@@ -213,12 +253,12 @@ def _with_the_losses(
     return (record, trial) if gain < guard_of_lost_samples(fitted) else None
 
 
-def _on_more(seen: Steps, model: Model, accepted: Sequence[str], setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
+def _on_more(reached: _Reached, setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
     """The accepted causes of a part fitted to more of the record, in dictionaries spread over the fluxes reached there."""
-    layout = seen.layout
-    there = replace(setting, layout=layout, iron_flux_wb=seen.setting.iron_flux_wb)
-    reached = largest_fluxes(seen.record, model, layout)
-    wider, there = respread(carried_over(_completed(model, accepted, there), layout, reached, layout), there)
+    seen, model = reached.steps, reached.fit.model
+    there = replace(setting, layout=seen.layout, iron_flux_wb=seen.setting.iron_flux_wb)
+    fluxes = largest_fluxes(seen.record, model, seen.layout)
+    wider, there = respread(carried_over(_completed(model, reached.accepted, there), seen.layout, fluxes, seen.layout), there)
     return begun(wider, there, noise), there
 
 

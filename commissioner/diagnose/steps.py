@@ -83,6 +83,12 @@ class Steps:
         """A new search of the whole of another record, with what is known of the machine so far."""
         return Steps(replace(self.setting, record=record), self.noise, self.names, self.report, record, self.go_on)
 
+    def continued(self, setting: Setting) -> Steps:
+        """A search of more of the same record: sets of causes that were looked at as a whole are not looked at again."""
+        steps = Steps(setting, self.noise, self.names, self.report, self.full, self.go_on)
+        steps.regrouped, steps.placed = self.regrouped, self.placed
+        return steps
+
     @property
     def material_chi2(self) -> float:
         """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms, or of what coarse steps may imitate."""
