@@ -26,7 +26,7 @@ from commissioner.diagnose.fit import Fit, inverse
 from commissioner.diagnose.leftover import Leftover, leftover
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.moved import PARAMETERS
-from commissioner.diagnose.noise import Noise, measure_noise
+from commissioner.diagnose.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.refusals import check_before_search, check_one_state
 from commissioner.diagnose.search import Found, search
 from commissioner.diagnose.split import Split, split_lines
@@ -101,7 +101,7 @@ def diagnose(
         return _refused(audit.refusal, audit)
     noise = measure_noise(record)
     if audit.step_a:
-        noise = noise.with_converter_step(np.array(audit.step_a))
+        noise = noise.with_converter_step(np.array(audit.step_a), resting_share(record))
     rms_a = noise.rms_a(max(s.count for s in record.segments), record.facts.sample_period_s)
     report(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))

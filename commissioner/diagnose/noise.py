@@ -69,10 +69,12 @@ class Noise:
             both_sides[-1] = 1.0
         return float(np.sqrt(np.mean(power @ both_sides) / samples))
 
-    def with_converter_step(self, step_a: Array) -> Noise:
+    def with_converter_step(self, step_a: Array, resting: float = 0.0) -> Noise:
         """What coarse steps hide from the noise's measurement is added: the rounding error of a signal that moves is step^2/12
 
-        in all, of which repeats of one test show only what differs between them, and a current that rests shows less.
+        in all, of which repeats of one test show only what differs between them, and a current that rests shows less, or, at
+        the edge of a step (as zero is to a converter that cuts off), up to step^2/4: of the `resting` share of all samples it
+        was seen.
         """
         stepped = replace(self, step_a=float(np.max(step_a)))
         if self.source not in ("repeated segments", "repeated periods", "zero voltage"):
@@ -84,6 +86,8 @@ class Noise:
                 ratio = _solved(seen, float(variance[k]) / step**2)
                 variance[k] = max(variance[k], step**2 * (ratio**2 + 1.0 / 12.0))
                 repeating[k] = step**2 * _repeating(ratio)
+                if "zero voltage" in self.by_source:
+                    variance[k] += resting * max(self.by_source["zero voltage"][k] ** 2 - variance[k], 0.0)
         hidden = float(np.sum(variance) / np.sum(self.sigma_a**2)) - 1.0
         if hidden < RESOLVED:
             return stepped
@@ -224,6 +228,12 @@ def _from_zero_voltage(record: Record) -> list[Array]:
                 slope = (piece @ ramp) / (ramp @ ramp)
                 out.append(piece - piece.mean(axis=1, keepdims=True) - slope[:, None] * ramp)
     return out
+
+
+def resting_share(record: Record) -> float:
+    """Share of all samples in stretches of zero voltage."""
+    resting: int = sum(piece.shape[1] for piece in _from_zero_voltage(record))
+    return resting / sum(s.count for s in record.segments)
 
 
 def _from_zero_sequence(record: Record) -> list[Array]:

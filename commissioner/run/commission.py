@@ -77,7 +77,7 @@ def commission(
 ) -> Commissioned:
     """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
 
-    `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for about so long.
+    `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)

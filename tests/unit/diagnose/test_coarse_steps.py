@@ -40,6 +40,19 @@ def test_a_current_at_rest_gives_the_noise_of_a_moving_one(ratio):
     assert noise.sigma_a == pytest.approx(wanted, rel=0.02)
 
 
+@pytest.mark.parametrize("ratio", [0.05, 0.1, 0.2])
+def test_a_current_that_rests_at_the_edge_of_a_step_toggles_by_half_a_step(ratio):
+    """As zero is to a converter that cuts off: there the error is +-1/2, where the current moves 1/sqrt(12)."""
+    random = np.random.default_rng(2)
+    signal = np.r_[np.zeros(100_000), np.linspace(0.0, 4000.0, 300_000)]
+    a, b = (np.floor(signal + ratio * random.standard_normal(signal.size)) for _ in range(2))
+    wanted = float(np.std(a - signal))
+    one = measured((a - b)[100_000:] / np.sqrt(2.0), "repeated segments")
+    one.by_source["zero voltage"] = [float(np.std(a[:100_000]))] * 3
+    assert one.with_converter_step(np.ones(3), 0.25).sigma_a == pytest.approx(wanted, rel=0.02)
+    assert one.with_converter_step(np.ones(3)).sigma_a.max() < 0.9 * wanted
+
+
 def test_fine_steps_change_nothing():
     noise = measured(np.random.default_rng(2).standard_normal(10_000), "repeated segments")
     assert noise.with_converter_step(np.full(3, 0.02)).sigma_a == pytest.approx(noise.sigma_a, rel=1e-9)
