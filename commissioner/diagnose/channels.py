@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import expm
 from scipy.signal import lfilter, ss2tf
 
-from commissioner.diagnose.lines import found_lines, with_lines, without_lines
+from commissioner.diagnose.lines import found_lines, recorded_sag, with_lines, without_lines
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
@@ -18,6 +18,8 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment
 
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
+RECORDED_LINK, LEAST_SWING = "link_recorded", 1e-5
+"""The swing of a recorded link, without its ripple; and what counts as none, of the link."""
 HEAT_LEAKS_S = {"": np.inf, "_20s": 20.0, "_6s": 6.0}
 """Time constants (s) with which heat leaks away, by how the names end: in sums of these every course with one of 5 s or more is
 
@@ -131,9 +133,13 @@ def _since_start(record: Record, segment: Segment) -> Array:
 
 
 def _sag(record: Record) -> Named:
-    """Minus lagged electrical power over rated power."""
+    """Minus lagged electrical power over rated power; and the link's own course where it was recorded."""
+    names = tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S)
     out = [-np.stack([lagged_power(record, s, lag) for lag in SAG_LAGS_S], axis=1) for s in record.segments]
-    return tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S), out
+    recorded = recorded_sag(record)
+    if not recorded or max(float(np.std(r)) for r in recorded) < LEAST_SWING:
+        return names, out
+    return (*names, RECORDED_LINK), [np.column_stack(pair) for pair in zip(out, recorded, strict=True)]
 
 
 def lagged_power(record: Record, segment: Segment, lag_s: float, shape: float = 0.0) -> Array:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.effects.inverter import without_the_recorded_link
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.translated import scenario
 
@@ -26,8 +27,9 @@ KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstanc
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
     """A JSON/TOML-ready document of the fitted model."""
-    r_s, r_r, l_sigma, l_m = found.fit.model.nominal
-    kept = [(t, v) for t, v in zip(found.fit.model.terms, found.fit.model.values, strict=True) if v]
+    model = without_the_recorded_link(found.fit.model, found.record)
+    r_s, r_r, l_sigma, l_m = model.nominal
+    kept = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if v]
     return {
         "kind": "extended_model",
         "format": FORMAT,
@@ -40,7 +42,7 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
         "terms": [_term(t, v) for t, v in kept],
         "dictionary": _dictionary(found.layout) if kept else {},
         "lines_hz": dict(found.setting.lines_hz),
-        "scenario": scenario(found.fit.model, found.setting, causes),
+        "scenario": scenario(model, found.setting, causes),
     }
 
 

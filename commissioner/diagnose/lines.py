@@ -28,6 +28,8 @@ AT_A_TONE = 4.0
 """Lines beside an excited one that count as its own."""
 BY_CHANCE = 1e-6
 """Chance with which noise makes a line at one frequency that counts as seen."""
+SURELY_A_LINE = 100.0
+"""Times the power beside it that a ripple has in a recorded link."""
 SAME_LINE = 0.02
 """Turns by which two frequencies may come apart in a segment: every segment has its own phase."""
 LINES = {"ripple": "dc_link_ripple", "mains": "mains_pickup"}
@@ -69,6 +71,30 @@ def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise:
         ((base, *_peaks(record, residuals, base)[0]) for base in MAINS_HZ), key=lambda found: found[2]
     )
     return {f"ripple_{ripple:.0f}": (ripple_hz, ripple_ratio), f"mains_{mains:.0f}": (mains_hz, mains_ratio)}
+
+
+def recorded_sag(record: Record) -> list[Array]:
+    """Of a recorded DC link, for every segment, what it deviates from its median without its ripple, (n,); empty where it was not
+
+    recorded. A line that two tones make together is no ripple.
+    """
+    swings = [s.link_swing for s in record.segments if s.link_swing is not None]
+    if len(swings) < len(record.segments):
+        return []
+    tones = np.array(excited_lines(record))
+    together = np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()])
+    span = max(s.count for s in record.segments) * record.facts.sample_period_s
+    for base in RIPPLE_HZ:
+        frequency, ratio = _peaks(record, [swing[None] for swing in swings], base)[0]
+        if ratio > SURELY_A_LINE and np.all(np.abs(together - frequency) > 2.0 / span):
+            swings = [_without_line(s, swing, frequency) for s, swing in zip(record.segments, swings, strict=True)]
+    return swings
+
+
+def _without_line(segment: Segment, signal: Array, frequency: float) -> Array:
+    angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
+    table = np.stack([of(k * angle) for k in (1.0, *HARMONICS["ripple"]) for of in (np.cos, np.sin)], axis=1)
+    return np.asarray(signal - table @ np.linalg.lstsq(table, signal, rcond=None)[0])
 
 
 def without_lines(record: Record) -> Record:

@@ -7,7 +7,7 @@ from typing import Any
 
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.report.diagnose_numbers import PLAIN_NUMBERS, quantity, quantity_name, short, sure
-from commissioner.report.diagnose_plain import LEGS, PLAIN, READ_LATE, Plain
+from commissioner.report.diagnose_plain import LEGS, PLAIN, READ_LATE, RECORDED_SWING, Plain
 
 Cause = Mapping[str, Any]
 TOGETHER = frozenset({"dead_time", "device_drop"})
@@ -103,6 +103,8 @@ def plain_of(cause: Cause) -> Plain:
     own = PLAIN[cause["name"]]
     if cause["name"] == "sampling_delay" and cause["parameters"].get("delay_us", {"value": 0.0})["value"] < 0.0:
         own = READ_LATE
+    if "of_the_recorded_swing" in cause["parameters"]:
+        own = RECORDED_SWING
     if not cause["equivalent"]:
         return own
     if members(cause) == LATE:

@@ -30,6 +30,11 @@ READ_LATE = Plain(
     "The current is read {size} after the instant it is recorded for", FINE,
     measurement="Read the current at the step of the command, or correct its time stamps by that.",
 )
+RECORDED_SWING = Plain(
+    "The DC link's voltage moves as it was recorded, whatever the motor does, and {size} of that reaches the motor",
+    "This is no fault of the motor. Something else moves the link: the mains, or another drive on it.",
+    "Switch DC-link (bus voltage) compensation on; look for what else draws on the link.",
+)
 PLAIN: Mapping[str, Plain] = {
     "dead_time": Plain("The inverter's dead time takes {size} from every leg", LEGS.motor, LEGS.drive, is_normal=True),
     "device_drop": Plain("The inverter's switches and diodes take {size} from every leg", LEGS.motor, LEGS.drive, is_normal=True),

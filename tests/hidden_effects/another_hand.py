@@ -34,6 +34,7 @@ beyond the eighth is a conductance alone.
 """
 SHARE = 0.07
 PAUSE_S = 1.5
+LINK_V = 560.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Machine:
     legs: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """So many times that, each of the three."""
     ripple: float = 0.0
-    """Share of the link that swings at `ripple_hz`."""
+    """Share of the link that swings at `ripple_hz`, at a rectifier's lines or as another drive on it makes it swing."""
     ripple_hz: float = 300.0
     lag_s: float = 0.0
     cut_off_hz: float = math.inf
@@ -83,6 +84,9 @@ class Machine:
     sag_s: float = 0.01
     again_s: float = 0.0
     """A second lag behind that one, as of a choke before the capacitor."""
+    has_diodes: bool = False
+    """No current goes back to the mains: what the machine gives back stays in the capacitor until it is needed."""
+    records_link: bool = False
     swing: float = 0.0
     """Amplitude of the electrical speed, rad/s, of a shaft that swings at `swing_hz`."""
     swing_hz: float = 1.7
@@ -118,12 +122,12 @@ def command(machine: Machine, level: float, bias: float, seconds: float, seed: i
 def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> StandstillRecording:
     """All segments one after the other, the machine at rest and without flux before each."""
     random = np.random.default_rng([seed, 7])
-    times, numbers, axes, volts, currents = [], [], [], [], []
+    times, numbers, axes, volts, currents, links = [], [], [], [], [], []
     begin = 0.0
     for k, (axis, level, bias) in enumerate(SEGMENTS):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
-        seen = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), *_numbers(machine))
+        seen, lost = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), *_numbers(machine))
         t = begin + np.arange(volt.size) * PERIOD_S
         phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
         hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
@@ -134,11 +138,12 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
         numbers.append(np.full(volt.size, k))
         axes.append(np.full(volt.size, axis))
         volts.append(volt)
+        links.append(LINK_V * (1.0 - lost) if machine.records_link else np.full(volt.size, LINK_V))
         begin += seconds + PAUSE_S
     u, v, w = np.concatenate(currents, axis=1)
     return StandstillRecording(
         np.concatenate(times), np.concatenate(numbers), np.concatenate(axes), np.concatenate(volts), u, v, w,
-        np.full(u.size, 560.0), PERIOD_S, PLATE,
+        np.concatenate(links), PERIOD_S, PLATE,
     )  # fmt: skip
 
 
@@ -146,7 +151,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
+    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.has_diodes, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
 
 
 @njit(cache=True)
@@ -205,20 +210,22 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, bar, diffusion, ripple, ripple_hz, swing, swings):
-    """Current (n,) that the sensors see, `delay` old, before noise."""
+def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
+    """Current (n,) that the sensors see, `delay` old, before noise; and what the link has lost then, of it."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     x[0], x[1], x[2] = left, left * (l_m + l_r) / l_m, left
     late, after = round(delay / h), round(read_late / h)
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)
+    lost = np.zeros(n)
     at = 0
     v = 0.0j
     load = drops = 0.0
     for k in range(n):
         omega = swing * math.cos(swings * (begin + k * period))
         r_s = cold * (1.0 + warming * (begin + k * period))
+        lost[k] = sag * drops - ripple * math.cos(2.0 * math.pi * ripple_hz * (k + 0.5) * period)
         for step in range(fine):
             # the sample shows what was before the voltage stepped
             k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
@@ -226,17 +233,15 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
-                v = volts[k] * (1.0 - sag * drops)
+                v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * k * period))
                 k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             at += 1
             k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            if ripple > 0.0:
-                v = volts[k] * (1.0 + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 0.5) / fine) * period))
             if sag > 0.0:
-                load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - load)
+                load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - (0.0 if diodes and load < 0.0 else load))
                 drops = drops + h / again_s * (load - drops) if again_s > 0.0 else load
-                v = volts[k] * (1.0 - sag * drops)
-    return out
+            v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 1.5) / fine) * period))
+    return out, lost

@@ -85,6 +85,22 @@ def test_a_sagging_link_has_its_size_whatever_its_lags(lag_s, again_s):
     assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(0.4, rel=0.03)
 
 
+def test_a_link_that_something_else_moves_is_named_where_it_was_recorded():
+    """Without its trace the error has no name; with it the trace says how much of it reaches the motor."""
+    about = {"ripple": 0.01, "ripple_hz": 7.3}
+    seen, names = named(Machine(**about))
+    assert not names and seen.verdict.value == "unexplained"
+    seen, names = named(Machine(records_link=True, **about))
+    assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
+    assert seen.causes[0].sizes["of_the_recorded_swing"][0] == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.campaign
+def test_a_recorded_link_that_sags_and_ripples_is_two_causes_with_their_sizes():
+    _, names = named(Machine(sag=0.3, sag_s=5e-3, has_diodes=True, ripple=0.006, records_link=True))
+    assert set(names) == {"dc_link_sag", "dc_link_ripple"}
+
+
 @pytest.mark.parametrize(("about", "wanted"), [({}, set()), long({"iron_ohm": 900.0}, {"iron_loss"}), ({"lag_s": 1.2e-4}, {"sensor_lag"})])
 def test_a_sweep_shows_linear_causes_as_tones_do(about, wanted):
     """It had been audited as a single tone, which bars them."""

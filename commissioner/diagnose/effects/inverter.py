@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channels import SAG_LAGS_S, lagged_power
+from commissioner.diagnose.channels import RECORDED_LINK, SAG_LAGS_S, lagged_power
 from commissioner.diagnose.effects.effect import (
     Effect,
     Setting,
@@ -22,11 +23,14 @@ from commissioner.diagnose.effects.effect import (
 )
 from commissioner.diagnose.kinds import CABLE
 from commissioner.diagnose.model import Layout, Model, Term
+from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]
 MOST_UNEQUAL = 0.4
 """Of the mean of the three legs, by which one may differ."""
-MOST_OF_A_LAG = 5.0
+MOST_OF_A_LAG, MOST_OF_THE_LINK = 5.0, 2.0
+LEFT_BY_THE_LOAD = 0.5
+"""Of the power of a recorded link's course: what leaves more is no sag under the motor's load."""
 SAG_SAMPLES = 4000
 """Of every segment, on which a sag of several lags is read as one of a single lag."""
 SECOND_ORDER_LEAVES, LEAST_RINGING, MOST_RINGING = 0.25, 0.01, 2.0
@@ -132,7 +136,39 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
 
 
 def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
+    """The sag at rated power; of a recorded link whose course the motor's own power hardly makes, the part that reaches the motor."""
+    if values.get(RECORDED_LINK) and _as_lags(setting.record)[1] > LEFT_BY_THE_LOAD:
+        return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
     return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
+
+
+def _as_lags(record: Record) -> tuple[dict[str, float], float]:
+    """The sum of lagged powers that comes nearest to the recorded link's course but for a constant, each instant weighed by the command,
+
+    and the share of its power that this leaves.
+    """
+    some = [slice(None, None, max(s.count // SAG_SAMPLES, 1)) for s in record.segments]
+    weight = np.concatenate([s.voltage_axis_v[at] for s, at in zip(record.segments, some, strict=True)])[:, None]
+    names = [n for n in record.channel_names if n.startswith("sag_")]
+    columns = [record.channel(n) for n in (*names, RECORDED_LINK)]
+    *lags, course = (weight * np.vstack([c[at][:, columns] for c, at in zip(record.channels, some, strict=True)])).T
+    table = np.column_stack([weight, *lags])
+    found, *_ = np.linalg.lstsq(table, course, rcond=None)
+    left, whole = (course - table[:, :n] @ np.linalg.lstsq(table[:, :n], course, rcond=None)[0] for n in (table.shape[1], 1))
+    return dict(zip(names, map(float, found[1:]), strict=True)), float(left @ left / max(whole @ whole, 1e-300))
+
+
+def without_the_recorded_link(model: Model, record: Record) -> Model:
+    """The model in which a sag rides on lagged power alone, as it comes nearest: for currents beside which no link was recorded."""
+    swing = model.of("dc_link_sag").get(RECORDED_LINK, 0.0)
+    if not swing:
+        return model
+    lags, _ = _as_lags(record)
+    values = tuple(
+        0.0 if t.symbol == RECORDED_LINK else v + swing * lags[t.symbol] if t.effect == "dc_link_sag" else v
+        for t, v in zip(model.terms, model.values, strict=True)
+    )
+    return replace(model, values=values)
 
 
 @effect(
@@ -145,12 +181,18 @@ def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
 
-    alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference.
+    alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference. Where the link was
+    recorded, the part of its own swing that reaches the motor as well: 1 where the drive leaves it as it is.
     """
-    names = [n for n in setting.record.channel_names if n.startswith("sag_")]
-    return tuple(
-        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n) for n in names
+    record = setting.record
+    lags = tuple(
+        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n)
+        for n in record.channel_names if n.startswith("sag_")
     )
+    if RECORDED_LINK not in record.channel_names:
+        return lags
+    seen = Term("dc_link_sag", RECORDED_LINK, "1", kinds.VOLTAGE_MOD, record.channel(RECORDED_LINK), 0.1, 0.0, MOST_OF_THE_LINK, channel=RECORDED_LINK)
+    return (*lags, seen)
 
 
 def _ripple_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
