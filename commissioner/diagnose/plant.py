@@ -17,7 +17,7 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.spline import cells_of
 from commissioner.diagnose.tangent import sensitivities
 from commissioner.diagnose.terminals import sense
-from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying
+from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying, rates_of_unit_states
 
 Array = NDArray[np.float64]
 
@@ -120,8 +120,9 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
         rate = _fastest(model, *branches) * period
         steps = max(int(np.ceil(rate)), 1) * layout.substeps
         factors = (drive[0], *drive[2:])
+        whole = _whole_step(drive[2], drive[3], drive[4], period, base, branches)
         states, current, after, before, rotor = propagate_varying(
-            va, vb, *factors, period, steps, _taylor_order(rate / steps), base, *branches, start
+            va, vb, *factors, period, steps, _taylor_order(rate / steps), whole, base, *branches, start
         )
         return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
@@ -268,6 +269,21 @@ def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:
     r_s, r_r, l_sigma, l_m = model.nominal
     rate = (r_s + r_r) / l_sigma + r_r / l_m
     return max(rate, *((1.0 + max(r_r, r_s) * branch_gain) / np.abs(branch_time))) if branch_time.size else rate
+
+
+def _whole_step(
+    phase_factor: Array, rotor_factor: Array, omega: Array, period_s: float, base: Array, branches: tuple[Array, Array]
+) -> Array:
+    """The exact step of a linear machine in which nothing varies, (size, size + 2) of states and held voltage; empty where
+
+    something does. Strong paths beside a cage of hardly any conductance are a hundred times faster than the sampling.
+    """
+    if np.ptp(phase_factor, axis=0).any() or np.ptp(rotor_factor) or np.ptp(omega):
+        return np.zeros((0, 0))
+    rates = rates_of_unit_states(phase_factor[0], float(rotor_factor[0]), float(omega[0]), base, *branches)
+    size = rates.shape[0]
+    step = expm(np.vstack([rates, np.zeros((2, size + 2))]) * period_s)
+    return np.ascontiguousarray(step[:size]) if np.isfinite(step).all() else np.zeros((0, 0))
 
 
 def _taylor_order(rate_times_step: float) -> int:

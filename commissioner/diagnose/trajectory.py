@@ -322,27 +322,52 @@ def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+def rates_of_unit_states(phase_factor, rotor_factor, omega, base, branch_gain, branch_time):
+    """(size, size + 2): d x/dt of `propagate_varying` for each state alone and each voltage alone, at constant factors."""
+    size = 4 + 2 * branch_gain.shape[0]
+    out, x, k, unused, a = np.zeros((size, size + 2)), np.zeros(size), np.zeros(size), np.zeros(2), np.zeros(3)
+    _resistances(base, phase_factor, a)
+    for c in range(size + 2):
+        x[:] = 0.0
+        if c < size:
+            x[c] = 1.0
+        va, vb = 1.0 if c == size else 0.0, 1.0 if c == size + 1 else 0.0
+        _rate(x, k, va, vb, a, base[1] * rotor_factor, omega, base, branch_gain, branch_time, unused)
+        out[:, c] = k
+    return out
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+def _resistances(base, phase_factor, a):
+    """Stator resistance tensor aa, ab, bb of three phases into `a`."""
+    ru, rv, rw = base[0] * phase_factor[0], base[0] * phase_factor[1], base[0] * phase_factor[2]
+    a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
 def propagate_varying(
-    voltage_a, voltage_b, voltage_factor, phase_factor, rotor_factor, omega_rad_per_s, period, steps, order,
+    voltage_a, voltage_b, voltage_factor, phase_factor, rotor_factor, omega_rad_per_s, period, steps, order, whole_step,
     base, branch_gain, branch_time, initial_state,
 ):
-    """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms."""
+    """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
+
+    varies the exact step itself, `whole_step` (size, size + 2) of states and held voltage (empty otherwise).
+    """
     samples = voltage_a.shape[0]
     size = 4 + 2 * branch_gain.shape[0]
     states = np.zeros((samples + 1, size))
     current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
     slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
     x, k, k_next, a = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(3)
-    i_now, unused = np.zeros(2), np.zeros(2)
+    i_now, unused, moved = np.zeros(2), np.zeros(2), np.zeros(size)
     x[0:4] = initial_state
-    h = period / steps
+    h, is_exact = period / steps, whole_step.shape[0] > 0
     gs, shrink = base[2], 1.0 / (1.0 + base[5] * base[0])
     iaa, iab, ibb = gs * (1.0 + base[8]) * shrink, gs * base[9] * shrink, gs * (1.0 - base[8]) * shrink
     last_a = last_b = 0.0
     for t in range(samples):
         va, vb = voltage_a[t] * voltage_factor[t], voltage_b[t] * voltage_factor[t]
-        ru, rv, rw = base[0] * phase_factor[t, 0], base[0] * phase_factor[t, 1], base[0] * phase_factor[t, 2]
-        a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
+        _resistances(base, phase_factor[t], a)
         rr, omega = base[1] * rotor_factor[t], omega_rad_per_s[t]
         states[t] = x
         _rate(x, k, last_a, last_b, a, rr, omega, base, branch_gain, branch_time, i_now)
@@ -358,6 +383,13 @@ def propagate_varying(
                 ua, ub = k[0] - k[2], k[1] - k[3]
                 slope_after[0, t], slope_after[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
                 _add_eddy_slope(k, branch_gain, branch_time, shrink, slope_after, t)
+            if is_exact:
+                for r in range(size):
+                    moved[r] = whole_step[r, size] * va + whole_step[r, size + 1] * vb
+                    for c in range(size):
+                        moved[r] += whole_step[r, c] * x[c]
+                x[:] = moved
+                break
             factor = h
             for j in range(order):
                 for c in range(size):
