@@ -46,7 +46,8 @@ ALIKE_ON_ALL_AXES = frozenset({"linear", "axis"})
 EXACT_GUARD = 2e-3
 """As CLASS_GUARD, beside an accepted cause of exact form."""
 APART = 0.1
-"""Factor on a guard where what the one may leave and what the other makes lie at other frequencies, or axes."""
+"""Factor on a guard where what the one may leave and what the other makes lie at other frequencies, or axes; or where the one leaves what is
+in proportion to the command, and the other is a curve."""
 EXACT = frozenset({
     "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
 })
@@ -95,7 +96,8 @@ def _share_left(accepted: str, name: str) -> float:
     if accepted in EXACT:
         return 0.0
     families = {mine.family, other.family}
-    is_apart = len(families) == 2 and (families & LINES_OF_THEIR_OWN or families == ALIKE_ON_ALL_AXES)
+    is_curve_beside_linear = mine.family == "linear" and name in SHAPED
+    is_apart = len(families) == 2 and (families & LINES_OF_THEIR_OWN or families == ALIKE_ON_ALL_AXES or is_curve_beside_linear)
     return APART * RIGID_GUARD if is_apart else RIGID_GUARD
 
 

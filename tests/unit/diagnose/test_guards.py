@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.guards import CLOCK_RATES, MOST_CONSTANT, constancy, is_plausible
+from commissioner.diagnose.guards import CLOCK_RATES, MOST_CONSTANT, constancy, guard, is_plausible
 from commissioner.diagnose.reading import clock_courses
 
 
@@ -61,3 +61,11 @@ def test_no_link_gives_its_rated_power_while_it_loses_more_than_half(setting, no
     for size, is_sound in ((0.4, True), (0.7, False)):
         model = replace(nominal, terms=terms, values=tuple(size * (t.symbol == "sag_10ms") for t in terms))
         assert is_plausible(model, "dc_link_sag", setting) is is_sound
+
+
+@pytest.mark.parametrize("accepted", ["rotor_skin_effect", "sensor_lag", "iron_loss"])
+def test_a_curve_beside_a_linear_cause_may_be_weaker_than_a_memory(accepted):
+    """What a linear cause of another form leaves is in proportion to the command, as no curve is; a memory is below its radius."""
+    left = {accepted: 1e6}
+    for curve in ("magnetizing_saturation", "leakage_saturation", "dead_time"):
+        assert 0.0 < guard(left, curve) < 0.2 * guard(left, "magnetic_hysteresis")
