@@ -153,16 +153,16 @@ def _link_stands_still(model: Model, name: str, record: Record) -> bool:
 
 
 def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:
-    """Whether a clock only makes currents late alike; where the command moves too briefly to show a drift, nobody knows."""
+    """Whether a clock only makes currents late alike (or early, as a conductance does); where the command moves too briefly to show a
+
+    drift, nobody knows.
+    """
     shows_drifts = constancy({"drift": 1.0}, record) < LEAST_SHOWN
     return shows_drifts and constancy(rates, record) > MOST_CONSTANT
 
 
 def constancy(rates: Mapping[str, float], record: Record) -> float:
-    """Share of what a clock's delay does that a constant delay would do as well, each instant weighed by how fast the command
-
-    moves; none where it makes currents early.
-    """
+    """Share of what a clock's delay does that a constant one would do as well, each instant weighed by how fast the command moves."""
     mean = square = weight = 0.0
     for segment in record.segments:
         delay = np.array([rates.get(n, 0.0) for n in CLOCK_RATES]) @ clock_courses(segment)
@@ -170,7 +170,7 @@ def constancy(rates: Mapping[str, float], record: Record) -> float:
         mean, square, weight = (
             total + float(x) for total, x in ((mean, moves @ delay), (square, moves @ delay**2), (weight, moves.sum()))
         )
-    return float(max(mean, 0.0) ** 2 / (square * weight)) if square * weight > 0.0 else 0.0
+    return float(mean**2 / (square * weight)) if square * weight > 0.0 else 0.0
 
 
 def losses_of(fitted: Fit, names: Sequence[str]) -> dict[str, float]:

@@ -44,6 +44,9 @@ LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 2.0
 
 this share is left as it is."""
 
+ENTIRELY = 0.98
+"""Of a large rest: a cause that takes so much of it is no part of another's form."""
+
 Report = Callable[[str], None]
 
 
@@ -90,14 +93,28 @@ class Steps:
         return steps
 
     @property
+    def count(self) -> float:
+        """Samples of all phases."""
+        return float(self.record.samples * self.record.facts.phases)
+
+    @property
     def material_chi2(self) -> float:
         """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms, or of what coarse steps may imitate."""
-        count = sum(s.count for s in self.record.segments) * self.record.facts.phases
         material = (MATERIAL_SHARE * self.rms_a) ** 2 * float(np.mean(self.noise.sigma_a**-2.0))
-        return float(count * max(material, STEPS_GUARD * self.noise.rounding_share))
+        return self.count * max(material, STEPS_GUARD * self.noise.rounding_share)
 
-    def _guard(self, losses: Mapping[str, float], name: str) -> float:
-        return guard(losses, name, ripple_meets_tones=self.ripple_meets_tones)
+    def _guard(self, losses: Mapping[str, float], name: str, rest: float) -> float:
+        """What a cause must gain beside others that have these losses, where without it the chi2 of `rest` is not explained: no more than
+
+        nearly all of a large rest, for what the form of another cause leaves behind no simple cause takes entirely.
+        """
+        left = guard(losses, name, ripple_meets_tones=self.ripple_meets_tones)
+        is_large = rest > LARGE_REST**2 * self.count
+        return min(left, ENTIRELY * rest) if is_large else left
+
+    def _rest(self, fitted: Fit) -> float:
+        """Chi2 that is surely not explained."""
+        return max(surely_left(fitted, self.noise), 0.0) * self.count
 
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)
@@ -106,6 +123,7 @@ class Steps:
         """The fit, the accepted causes and the last screening from a start that has some; `adds` False: none is added."""
         current, self.setting = with_finer_curves(start, self.setting, self.noise, self.report)
         refused: set[str] = set()
+        idle: set[str] = set()
         while True:
             absent = [n for n in self.names if n not in accepted]
             screening = screen(current.model, self.record, self.layout, self.noise, self.setting, absent)
@@ -113,7 +131,12 @@ class Steps:
             is_over = not adds or len(accepted) >= MOST_CAUSES or not self.go_on()
             step = None if is_over else self._forward(current, screening, refused)
             if step is None:
-                current, accepted, _ = self._backward(current, accepted, accepted)
+                current, accepted, dropped = self._backward(current, accepted, accepted)
+                if dropped and not is_over:
+                    # what it stood for may have another name
+                    idle |= set(dropped)
+                    refused |= idle
+                    continue
                 other = None if is_over else self._exchanged(current, accepted)
                 if other is None and not is_over and accepted:
                     clearer = self._with_clearer_lines(current, accepted)
@@ -134,7 +157,7 @@ class Steps:
             if kinds.STOP in of:
                 current, self.setting = with_closer_radii(current, self.setting, self.noise, self.report)
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
-            refused = set(dropped)
+            refused = idle | set(dropped)
 
     def _with_clearer_lines(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit where ripple or mains lie at other frequencies than were looked at so far, once the causes are in the model."""
@@ -165,15 +188,16 @@ class Steps:
             s for s in screening.ranked() if s.name not in refused and self.implausible.count(s.name) < IMPLAUSIBLE
         ]
         losses = losses_of(current, effects_of(current.model))
+        rest = self._rest(current)
         promising = [
-            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name))
+            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name, rest))
         ]
         best = None if "sampling_delay" in refused else self._large_delay(current)
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
-            wanted = max(self._guard(losses, score.name), self.threshold(score.numbers))
+            wanted = max(self._guard(losses, score.name, rest), self.threshold(score.numbers))
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
             trial = self._tried(current, score, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
@@ -251,7 +275,7 @@ class Steps:
         for name in doubted:
             loss, losses = every[name], {n: x for n, x in every.items() if n != name}
             numbers = sum(1 for t in current.model.terms if t.effect == name)
-            wanted = max(self._guard(losses, name), self.threshold(numbers))
+            wanted = max(self._guard(losses, name, self._rest(current) + loss), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
             is_sound = is_plausible(current.model, name, self.setting)

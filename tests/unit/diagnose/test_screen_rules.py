@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.guards import guard
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import joint_net, screen
+from commissioner.diagnose.steps import ENTIRELY, Steps
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
@@ -45,3 +47,11 @@ def test_a_group_promises_at_least_what_each_of_it_does(late, setting, nominal):
     assert joint_net(screening, ["sampling_delay"]) == pytest.approx(delay.net, rel=1e-6)
     both = joint_net(screening, ["sampling_delay", "cable_capacitance"])
     assert both + 30.0 >= delay.net * (1.0 - 1e-9)
+
+
+def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_form(setting):
+    steps = Steps(setting, WHITE, ["inductance_anisotropy"], print, setting.record, lambda: True)
+    losses = {"shaft_motion": 1e8}
+    large, small = 0.05 * steps.count, 0.005 * steps.count
+    asked = [steps._guard(losses, "inductance_anisotropy", rest) for rest in (large, small, 1e9)]
+    assert asked == pytest.approx([ENTIRELY * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")])
