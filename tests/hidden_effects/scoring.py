@@ -121,7 +121,8 @@ def wilson(count: int, total: int, z: float = 1.96) -> tuple[float, float]:
     rate, shrink = count / total, 1.0 + z * z / total
     middle = (rate + z * z / (2 * total)) / shrink
     half = z * math.sqrt(rate * (1 - rate) / total + z * z / (4 * total * total)) / shrink
-    return max(middle - half, 0.0), min(middle + half, 1.0)
+    # of none and of all by definition, whatever is rounded
+    return max(min(middle - half, rate), 0.0), min(max(middle + half, rate), 1.0)
 
 
 def _precision_recall(title: str, rows: Sequence[Row], target: str) -> list[Line]:

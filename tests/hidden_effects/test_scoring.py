@@ -76,6 +76,10 @@ def test_the_calibration_error_is_small_for_honest_and_large_for_boasting_confid
 
 
 def test_wilson_contains_the_rate_and_narrows():
+    for total in range(1, 200):
+        for count in (0, total // 3, total):
+            low, high = scoring.wilson(count, total)
+            assert 0.0 <= low <= count / total <= high <= 1.0
     assert scoring.wilson(0, 600)[1] < 0.007
     low, high = scoring.wilson(50, 100)
     assert low < 0.5 < high and high - low < 0.2
