@@ -87,7 +87,9 @@ class Noise:
                 variance[k] = max(variance[k], step**2 * (ratio**2 + 1.0 / 12.0))
                 repeating[k] = step**2 * _repeating(ratio)
                 if "zero voltage" in self.by_source:
-                    variance[k] += resting * max(self.by_source["zero voltage"][k] ** 2 - variance[k], 0.0)
+                    # no more than rounding makes there: what decays at zero voltage is no noise
+                    at_rest = min(self.by_source["zero voltage"][k] ** 2, step**2 * (ratio**2 + 0.25))
+                    variance[k] += resting * max(at_rest - variance[k], 0.0)
         hidden = float(np.sum(variance) / np.sum(self.sigma_a**2)) - 1.0
         if hidden < RESOLVED:
             return stepped

@@ -51,6 +51,8 @@ def test_a_current_that_rests_at_the_edge_of_a_step_toggles_by_half_a_step(ratio
     one.by_source["zero voltage"] = [float(np.std(a[:100_000]))] * 3
     assert one.with_converter_step(np.ones(3), 0.25).sigma_a == pytest.approx(wanted, rel=0.02)
     assert one.with_converter_step(np.ones(3)).sigma_a.max() < 0.9 * wanted
+    one.by_source["zero voltage"] = [30.0] * 3  # a flux that decays
+    assert one.with_converter_step(np.ones(3), 0.25).sigma_a == pytest.approx(wanted, rel=0.05)
 
 
 def test_fine_steps_change_nothing():
