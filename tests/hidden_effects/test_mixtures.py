@@ -68,6 +68,13 @@ def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
     assert seen.verdict.value == "unexplained", seen.reason
 
 
+@pytest.mark.campaign
+def test_no_cause_gains_more_than_all_together():
+    """A course of speed that had run far promised ten times the whole error, and was named for it beside an unknown cause."""
+    seen, _ = diagnosed(Case("absent", 2500012), 3.0)
+    assert seen.verdict.value == "unexplained" and not seen.causes
+
+
 def test_a_forbidden_cause_is_not_replaced_by_a_wrong_name_that_explains_everything():
     case = Case("absent", 61, "sensor_gain_mismatch", noise="white", excluded=("sensor_gain_mismatch",))
     assert diagnosed(case)[0].verdict.value == "unexplained"
