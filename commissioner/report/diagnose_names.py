@@ -44,6 +44,8 @@ def class_name(cause: Cause) -> str:
     """`dead time + device drop, together`; `sampling delay or sensor lag`; a cause alone by its own name."""
     if members(cause) == TOGETHER:
         return "dead time + device drop, together"
+    if "of_the_recorded_swing" in cause.get("parameters", {}):
+        return "DC link's recorded swing"
     return " or ".join(spoken(n) for n in (cause["name"], *cause["equivalent"]))
 
 
