@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.audit import excited_lines
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.effects.sensing import RESTARTS, RUNS_ON
 from commissioner.diagnose.fit import Fit
+from commissioner.diagnose.lines import is_made_by_tones
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.plant import modulation
 from commissioner.diagnose.reading import clock_courses
@@ -102,12 +102,9 @@ def _share_left(accepted: str, name: str) -> float:
 
 
 def meets_tones(record: Record, setting: Setting) -> bool:
-    """Whether two excited tones lie the ripple's frequency (or twice it) apart, within two lines of the longest segment."""
-    tones = np.array(excited_lines(record))
-    apart = np.abs(np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()]))
-    width = 2.0 / max(s.count * record.facts.sample_period_s for s in record.segments)
+    """Whether two excited tones lie the ripple's frequency (or twice it) apart."""
     ripples = [m * f for name, f in setting.lines_hz.items() if name.startswith("ripple") for m in (1.0, 2.0)]
-    return any(bool((np.abs(apart - f) < width).any()) for f in ripples)
+    return is_made_by_tones(record, *ripples)
 
 
 def is_plausible(model: Model, name: str, setting: Setting) -> bool:

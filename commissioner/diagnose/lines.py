@@ -81,19 +81,23 @@ def recorded_sag(record: Record) -> list[Array]:
     swings = [s.link_swing for s in record.segments if s.link_swing is not None]
     if len(swings) < len(record.segments):
         return []
-    tones = np.array(excited_lines(record))
-    together = np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()])
-    span = max(s.count for s in record.segments) * record.facts.sample_period_s
     for base in RIPPLE_HZ:
         frequency, ratio = _peaks(record, [swing[None] for swing in swings], base)[0]
-        if ratio > SURELY_A_LINE and np.all(np.abs(together - frequency) > 2.0 / span):
+        if ratio > SURELY_A_LINE and not is_made_by_tones(record, frequency):
             swings = [_without_line(s, swing, frequency) for s, swing in zip(record.segments, swings, strict=True)]
     return swings
 
 
+def is_made_by_tones(record: Record, *hertz: float) -> bool:
+    """Whether two excited tones lie so far apart, or make so much together, as one of these, within two lines of the longest segment."""
+    tones = np.array(excited_lines(record))
+    made = np.abs(np.concatenate([(tones[:, None] - tones).ravel(), (tones[:, None] + tones).ravel()]))
+    width = 2.0 / max(s.count * record.facts.sample_period_s for s in record.segments)
+    return any(bool((np.abs(made - f) < width).any()) for f in hertz)
+
+
 def _without_line(segment: Segment, signal: Array, frequency: float) -> Array:
-    angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
-    table = np.stack([of(k * angle) for k in (1.0, *HARMONICS["ripple"]) for of in (np.cos, np.sin)], axis=1)
+    table = np.hstack([_cos_and_sin(segment, k * frequency) for k in (1.0, *HARMONICS["ripple"])])
     return np.asarray(signal - table @ np.linalg.lstsq(table, signal, rcond=None)[0])
 
 
@@ -225,9 +229,10 @@ def _zoom(signal: Array, frequency: Array, period: float) -> Array:
 
 
 def _line(record: Record, name: str, frequency: float) -> tuple[tuple[str, ...], tuple[Array, ...]]:
-    """Cosine and sine of the time within the segment: phases need not carry over pauses."""
-    out = []
-    for segment in record.segments:
-        angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
-        out.append(np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    return (f"{name}_cos", f"{name}_sin"), tuple(out)
+    return (f"{name}_cos", f"{name}_sin"), tuple(_cos_and_sin(s, frequency) for s in record.segments)
+
+
+def _cos_and_sin(segment: Segment, frequency: float) -> Array:
+    """(n, 2) of the time within the segment: phases need not carry over pauses."""
+    angle = 2.0 * np.pi * frequency * (segment.time_s - segment.time_s[0])
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -153,8 +153,8 @@ def _as_lags(record: Record) -> tuple[dict[str, float], float]:
     columns = [record.channel(n) for n in (*names, RECORDED_LINK)]
     *lags, course = (weight * np.vstack([c[at][:, columns] for c, at in zip(record.channels, some, strict=True)])).T
     table = np.column_stack([weight, *lags])
-    found, *_ = np.linalg.lstsq(table, course, rcond=None)
-    left, whole = (course - table[:, :n] @ np.linalg.lstsq(table[:, :n], course, rcond=None)[0] for n in (table.shape[1], 1))
+    found, constant = (np.linalg.lstsq(t, course, rcond=None)[0] for t in (table, table[:, :1]))
+    left, whole = course - table @ found, course - table[:, :1] @ constant
     return dict(zip(names, map(float, found[1:]), strict=True)), float(left @ left / max(whole @ whole, 1e-300))
 
 
