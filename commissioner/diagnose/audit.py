@@ -33,6 +33,8 @@ MOST_CLIPPED = 0.3
 REST_SAMPLES = 1
 LEAST_AT_PEAKS = 0.5
 """Of a command's power, where it consists of tones: the rest of their lines is beside them by the window alone."""
+MOST_TONES = 200
+"""Of one segment: a random binary command has thousands of lines, and none is free of sums of others."""
 
 
 @dataclass(frozen=True)
@@ -284,7 +286,7 @@ def _bridge(segment: Segment, period: float) -> Segment:
 def excited_lines(record: Record) -> list[float]:
     """Frequencies the command excites, Hz: spectral peaks within 40 dB of the largest, merged over segments; none where most of its
 
-    power lies between them, as a sweep's does.
+    power lies between them, as a sweep's does; a segment with more than tones are, as a random binary command has, adds none.
     """
     found: list[float] = []
     at_peaks = power = 0.0
@@ -298,9 +300,12 @@ def excited_lines(record: Record) -> list[float]:
         frequency = np.fft.rfftfreq(n, record.facts.sample_period_s)
         peaks = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
         strong = peaks[spectrum[peaks] > 1e-2 * spectrum.max()]
+        power += float((spectrum**2).sum())
+        if strong.size > MOST_TONES:
+            continue
         is_near = np.zeros(spectrum.size, dtype=np.bool_)
         is_near[np.clip(strong[:, None] + np.arange(-2, 3), 0, spectrum.size - 1)] = True
-        at_peaks, power = at_peaks + float((spectrum[is_near] ** 2).sum()), power + float((spectrum**2).sum())
+        at_peaks += float((spectrum[is_near] ** 2).sum())
         for f in frequency[strong]:
             if all(abs(f - g) > 2.5 / (n * record.facts.sample_period_s) for g in found):
                 found.append(float(f))

@@ -1,5 +1,5 @@
-"""Errors that come and go: moments in which much more is left than in most, which no repeat of the test shows and a spectrum
-takes for noise (a link that dips, a command that is skipped)."""
+"""Errors that come and go: moments in which much more is left than in most (a link that dips, a command that is skipped), and levels
+that jump (an offset of two values). No repeat of the test shows them, and a spectrum takes them for noise."""
 
 from __future__ import annotations
 
@@ -21,12 +21,44 @@ RESTING = 0.05
 APART, TIMES, LEAST_MOMENTS = 6.0, 2.0, 3
 """A moment stands out by so many of the usual scatter of moments (their logarithms), and has so many times the power of the median
 one; fewer than these are chance or a start."""
+LEVEL = 400
+"""Samples of a level."""
 
 
 def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
-    """Root mean square over the whole record of what the moments that stand out have above the median one, over that one's; 0 where
+    """Root mean square of what comes and goes, over the noise's: moments or levels, whichever is more; 0 where there is none."""
+    return max(_moments_sigma(residuals, record, noise), _jumps_sigma(residuals, record, noise))
 
-    there are none. `residuals` (phases, n) per segment; each moment is taken about a straight line, for noise rises towards low
+
+def _jumps_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
+    """Half of what the medians of neighbouring stretches jump by, where some jump by far more than most move: of an offset that has two
+
+    values, its root mean square. Noise of any colour moves from stretch to stretch as a normal number does. The first stretch of a segment
+
+    holds its start and does not count.
+    """
+    moves = []
+    for segment, residual in zip(record.segments, residuals, strict=True):
+        count = segment.count // LEVEL
+        levels = np.median(residual[:, : count * LEVEL].reshape(residual.shape[0], count, LEVEL), axis=2)
+        good = np.asarray(segment.is_good[: count * LEVEL].reshape(count, LEVEL).all(axis=1))
+        both = np.flatnonzero(good[1:] & good[:-1])
+        moves.append(np.diff(levels, axis=1)[:, both[both > 0]])
+    moved = np.abs(np.hstack(moves))
+    if moved.shape[1] == 0:
+        return 0.0
+    # two medians of white noise differ by sqrt(pi / LEVEL) of it
+    least = np.maximum(np.sqrt(np.pi / LEVEL) * noise.sigma_a, noise.step_a)
+    usual = np.maximum(1.4826 * np.median(moved, axis=1), least)
+    jumps = [row[row > APART * scale] for row, scale in zip(moved, usual, strict=True)]
+    power = [0.25 * np.mean(j**2) / s**2 if j.size >= LEAST_MOMENTS else 0.0 for j, s in zip(jumps, noise.sigma_a, strict=True)]
+    return float(np.sqrt(np.mean(power)))
+
+
+def _moments_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
+    """Root mean square over the whole record of what the moments that stand out have above the median one, over that one's.
+
+    `residuals` (phases, n) per segment; each moment is taken about a straight line, for noise rises towards low
     frequencies. A current that rests between two steps of the converter is half of one off, all of the time.
     """
     line = np.stack([np.ones(BLOCK), np.linspace(-1.0, 1.0, BLOCK)])

@@ -37,9 +37,6 @@ from commissioner.records import StandstillRecording
 UNEXPLAINED_SIGMA = 0.3
 WORSE_THAN_NONE, WEAK_SIGMA = -0.5, 0.1
 """Share of the error of left-out segments, and of the noise: causes that make less, and these so much worse, are none."""
-REPEATS, MOST_REPEATED = ("repeated segments", "repeated periods"), 1.2
-"""The error of a model holds the noise: noise that is larger than it by more than this was not measured on noise (up to 1.09 with
-noise that rises towards low frequencies)."""
 UNEXPLAINED_STATE_SIGMA = 0.03
 """Of what goes with the state or comes and goes, where nothing is named and no cause that is too small to matter makes it: means over states show
 
@@ -136,12 +133,6 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
     is_seen = max(rest.from_states_sigma, rest.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
     verdict, reason = _verdict(causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), is_complete=found.is_complete)
-    is_overstated = noise.source in REPEATS and not found.losses  # samples put right since make equal tests differ
-    if verdict is not Verdict.UNEXPLAINED and is_overstated and held.noise_a > MOST_REPEATED * held.rmse_before_a:
-        verdict, reason = Verdict.UNEXPLAINED, (
-            f"Equal tests differ by {held.noise_a * 1e3:.3g} mA, more than the whole error of the plain simulation "
-            f"({held.rmse_before_a * 1e3:.3g} mA): something acts that the test does not repeat, and it hides the rest."
-        )
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,

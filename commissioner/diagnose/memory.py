@@ -28,9 +28,15 @@ def remembered(za, zb, da, db, radius):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
-def widened(pa, pb, rate):
-    """Factor on a memory current at flux (pa, pb): 1, or `rate` |flux|^2 where loops widen with flux, as measured ones do."""
-    return 1.0 if rate == 0.0 else rate * (pa * pa + pb * pb)
+def loop_width(pa, pb, rate):
+    """Factor on a memory current at flux (pa, pb), and its derivative by |flux|^2: `rate` |flux|^2 where loops widen with flux, as measured
+
+    ones do below the knee; (1 + `rate` |flux|^2)^2, `rate` < 0, where they narrow, as the branches of a loop meet in saturation; else 1.
+    """
+    if rate == 0.0:
+        return 1.0, 0.0
+    power = rate * (pa * pa + pb * pb)
+    return (power, rate) if rate > 0.0 else ((1.0 + power) ** 2, 2.0 * rate * (1.0 + power))
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", nogil=True)

@@ -28,8 +28,8 @@ SKIRT_BINS = 4
 MOST_LEAK_RATIO = 0.35
 """Of L_sigma over L_M: no more is believed where L_M is hardly seen."""
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
-WIDENING = (-0.03, -0.1, -0.3)
-"""Radii of stops and, negative, scales of exponential operators, over the largest iron flux; and those whose loops widen."""
+WIDENING, NARROWING = (-0.03, -0.1, -0.3), (0.03, 0.1, 0.25, 0.5)
+"""Radii of stops and, negative, scales of exponential operators, over the largest iron flux; those whose loops widen, and narrow."""
 
 
 def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
@@ -72,6 +72,7 @@ def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> 
         stop_radius_wb=np.array([
             *((share * iron_flux_wb, 0.0) for share in STOP_SHARES),
             *((share * iron_flux_wb, iron_flux_wb**-2.0) for share in WIDENING),
+            *((share * iron_flux_wb, -(iron_flux_wb**-2.0)) for share in NARROWING),
         ]),
     )
 

@@ -7,7 +7,7 @@ from numba import njit
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose import samples as row
-from commissioner.diagnose.memory import widened
+from commissioner.diagnose.memory import loop_width
 from commissioner.diagnose.spline import curve
 from commissioner.diagnose.trajectory import SQRT3
 
@@ -116,7 +116,7 @@ def pushes(
             current[0, m], current[1, m] = fa, fb
             rotor[0, m], rotor[1, m] = waa * qa + wab * qb, wab * qa + wbb * qb
         elif kind == kinds.STOP:
-            f = widened(at[row.IRON_A, m], at[row.IRON_B, m], stop_radius[n, 1]) / abs(stop_radius[n, 0])
+            f = loop_width(at[row.IRON_A, m], at[row.IRON_B, m], stop_radius[n, 1])[0] / abs(stop_radius[n, 0])
             magnetizing[0, m], magnetizing[1, m] = f * stop_states[t, n, 0], f * stop_states[t, n, 1]
         elif kind == kinds.BRANCH:
             qa, qb = states[t, 4 + 2 * n], states[t, 5 + 2 * n]

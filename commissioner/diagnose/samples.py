@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from commissioner.diagnose.memory import susceptibility, widened
+from commissioner.diagnose.memory import loop_width, susceptibility
 from commissioner.diagnose.spline import blend, place, saturating
 from commissioner.diagnose.trajectory import EDDY, ROTOR, SQRT3, branch_current, leg_loss
 
@@ -91,11 +91,12 @@ def at_samples(
             f = stop_gain[s] / abs(stop_radius[s, 0])
             za, zb = stop_states[t, s, 0], stop_states[t, s, 1]
             # a loop that widens with flux: its factor grows along the flux (symmetric part)
-            grown = f * stop_radius[s, 1]
+            wide, grown = loop_width(pa, pb, stop_radius[s, 1])
+            grown *= f
             grown_aa += 2.0 * grown * za * pa
             grown_ab += grown * (za * pb + zb * pa)
             grown_bb += 2.0 * grown * zb * pb
-            f *= widened(pa, pb, stop_radius[s, 1])
+            f *= wide
             ja += f * za
             jb += f * zb
             naa, nab, nbb, haa, hab, hbb = susceptibility(

@@ -94,8 +94,8 @@ class Steps:
 
     @property
     def count(self) -> float:
-        """Samples of all phases."""
-        return float(self.record.samples * self.record.facts.phases)
+        """Good samples of all phases."""
+        return float(sum(int(s.is_good.sum()) for s in self.record.segments) * self.record.facts.phases)
 
     @property
     def material_chi2(self) -> float:
@@ -109,12 +109,14 @@ class Steps:
         nearly all of a large rest, for what the form of another cause leaves behind no simple cause takes entirely.
         """
         left = guard(losses, name, ripple_meets_tones=self.ripple_meets_tones)
-        is_large = rest > LARGE_REST**2 * self.count
-        return min(left, ENTIRELY * rest) if is_large else left
+        return min(left, ENTIRELY * rest) if self._is_large(rest) else left
 
     def _rest(self, fitted: Fit) -> float:
         """Chi2 that is surely not explained."""
         return max(surely_left(fitted, self.noise), 0.0) * self.count
+
+    def _is_large(self, rest: float) -> bool:
+        return rest > LARGE_REST**2 * self.count
 
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)
@@ -176,7 +178,7 @@ class Steps:
 
     def _with_faster_speed(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit in which a shaft swings faster, where it does; tried once something is left beside all other causes."""
-        is_left = surely_left(current, self.noise) * float(current.normal.count.sum()) > self.threshold(1)
+        is_left = self._rest(current) > self.threshold(1)
         if "shaft_motion" not in accepted or not is_left or any(n.startswith(FINE_HAT) for n in self.record.channel_names):
             return None
         again, self.full, self.setting = with_faster_speed(current, self.full, self.setting, self.noise, self.report)
@@ -238,8 +240,8 @@ class Steps:
 
     def _is_crumb(self, current: Fit, trial: Fit) -> bool:
         """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
-        rest = surely_left(current, self.noise)
-        return rest > LARGE_REST**2 and current.chi2 - trial.chi2 < CRUMB * rest * float(current.normal.count.sum())
+        rest = self._rest(current)
+        return self._is_large(rest) and current.chi2 - trial.chi2 < CRUMB * rest
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None

@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from commissioner.diagnose.memory import remembered, susceptibility, widened
+from commissioner.diagnose.memory import loop_width, remembered, susceptibility
 from commissioner.diagnose.spline import blend, curve, place, rise, saturating
 
 SQRT3 = np.sqrt(3.0)
@@ -68,7 +68,7 @@ def _memory_current(pa, pb, moved_a, moved_b, z, stop_gain, stop_radius):
     for s in range(stop_gain.shape[0]):
         if stop_gain[s] != 0.0:
             ya, yb = remembered(z[s, 0], z[s, 1], moved_a, moved_b, stop_radius[s, 0])
-            f = stop_gain[s] / abs(stop_radius[s, 0]) * widened(pa, pb, stop_radius[s, 1])
+            f = stop_gain[s] / abs(stop_radius[s, 0]) * loop_width(pa, pb, stop_radius[s, 1])[0]
             ja += f * ya
             jb += f * yb
     return ja, jb
@@ -143,8 +143,8 @@ def _current_slope(
         if stop_gain[s] != 0.0:
             naa, nab, nbb, _, _, _ = susceptibility(z[s, 0], z[s, 1], 0.0, 0.0, qa, qb, stop_radius[s, 0])
             f = stop_gain[s] / abs(stop_radius[s, 0])
-            wide = widened(pa, pb, stop_radius[s, 1])
-            growth = 2.0 * stop_radius[s, 1] * (pa * qa + pb * qb)
+            wide, growth = loop_width(pa, pb, stop_radius[s, 1])
+            growth *= 2.0 * (pa * qa + pb * qb)
             dja += f * (wide * (naa * qa + nab * qb) + growth * z[s, 0])
             djb += f * (wide * (nab * qa + nbb * qb) + growth * z[s, 1])
     ua, ub = k[0] - k[2], k[1] - k[3]

@@ -131,6 +131,55 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
     return (value if known >= 0.0 else -value), slope
 
 
+# Inlined, for a call per sample would cost `advance` half as much again.
+@njit(cache=True, inline="always")
+def has_stable_real_poles(theta_1: float, theta_2: float, f1: float, f2: float) -> bool:
+    """Whether A(z) keeps two different real poles between 0 and 1, as every machine has."""
+    g1, g2 = 1.0 - f1, 1.0 - f2
+    half = 0.5 * (f1 + f2 + theta_1 * g1 + theta_2 * g2)
+    a0 = f1 * f2 + theta_1 * g1 * f2 + theta_2 * g2 * f1
+    return half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0
+
+
+@njit(cache=True, inline="always")
+def weigh(psi: Array, first: int, r: float, upper: Array, diagonal: Array, ff: Array, v: Array, k_gain: Array) -> float:
+    """Bierman's first half: f = U^T psi and v = D f, the gain U v (not yet divided), and its divisor, the variance of the error.
+
+    Numbers before `first` take no part.
+    """
+    for j in range(first, PARAMETERS):
+        s = psi[j]
+        for i in range(first, j):
+            s += upper[i, j] * psi[i]
+        ff[j] = s
+        v[j] = diagonal[j] * s
+    alpha = r
+    for j in range(first, PARAMETERS):
+        alpha = alpha + ff[j] * v[j]
+    for i in range(first, PARAMETERS):
+        s = v[i]
+        for j in range(i + 1, PARAMETERS):
+            s += upper[i, j] * v[j]
+        k_gain[i] = s
+    return alpha
+
+
+@njit(cache=True, inline="always")
+def update_factors(first: int, r: float, ff: Array, v: Array, upper: Array, diagonal: Array, k_gain: Array) -> None:
+    """Bierman's second half: the factors after the sample that `weigh` was given, column by column (`k_gain` is scratch)."""
+    alpha = r
+    for j in range(first, PARAMETERS):
+        alpha_last = alpha
+        alpha = alpha_last + ff[j] * v[j]
+        diagonal[j] *= alpha_last / alpha
+        low = -ff[j] / alpha_last
+        k_gain[j] = v[j]
+        for i in range(first, j):
+            old = upper[i, j]
+            upper[i, j] = old + k_gain[i] * low
+            k_gain[i] += v[j] * old
+
+
 @njit(cache=True)
 def advance(
     u: Array,
@@ -224,32 +273,12 @@ def advance(
                 first = 0
                 psi[0] = t1 * d11 + t2 * d21
                 psi[1] = t1 * d12 + t2 * d22
-            # Bierman: f = U^T psi, v = D f, then column by column.
-            for j in range(first, PARAMETERS):
-                s = psi[j]
-                for i in range(first, j):
-                    s += upper[i, j] * psi[i]
-                ff[j] = s
-                v[j] = diagonal[j] * s
-                if law == REVIEW:
+            if law == REVIEW:
+                for j in range(first, PARAMETERS):
                     e -= psi[j] * deviation[j]
-            alpha = r
-            for j in range(first, PARAMETERS):
-                alpha_last = alpha
-                alpha = alpha_last + ff[j] * v[j]
-                k_gain[j] = v[j]
-            step = e / alpha
-            # The gain K = b / alpha needs the whole sweep; first see whether the step is allowed.
-            # b_i accumulates U rows: b = U v.
-            for i in range(first, PARAMETERS):
-                s = v[i]
-                for j in range(i + 1, PARAMETERS):
-                    s += upper[i, j] * v[j]
-                k_gain[i] = s
+            step = e / weigh(psi, first, r, upper, diagonal, ff, v, k_gain)
             n1, n2 = t1 + k_gain[3] * step, t2 + k_gain[4] * step
-            half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
-            a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
-            if law == REVIEW or (half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0):
+            if law == REVIEW or has_stable_real_poles(n1, n2, f1, f2):
                 if law == REVIEW:
                     for j in range(first, PARAMETERS):
                         deviation[j] += k_gain[j] * step
@@ -262,31 +291,18 @@ def advance(
                         s1, s2 = k_gain[0] * step, k_gain[1] * step
                         z1 += d11 * s1 + d12 * s2
                         z2 += d21 * s1 + d22 * s2
-                alpha = r
-                for j in range(first, PARAMETERS):
-                    alpha_last = alpha
-                    alpha = alpha_last + ff[j] * v[j]
-                    diagonal[j] *= alpha_last / alpha
-                    low = -ff[j] / alpha_last
-                    k_gain[j] = v[j]
-                    for i in range(first, j):
-                        old = upper[i, j]
-                        upper[i, j] = old + k_gain[i] * low
-                        k_gain[i] += v[j] * old
+                update_factors(first, r, ff, v, upper, diagonal, k_gain)
             else:
                 rejected += 1.0
         elif law == LYAPUNOV:
             err = e - dead_zone if e > dead_zone else (e + dead_zone if e < -dead_zone else 0.0)
             if err != 0.0:
-                power = 0.0
                 for i in range(4):
                     ff[i] = gamma[i, 0] * z1 + gamma[i, 1] * z2 + gamma[i, 2] * x1 + gamma[i, 3] * x2
                 power = ff[0] * z1 + ff[1] * z2 + ff[2] * x1 + ff[3] * x2
                 step = err / (1.0 + power)
                 n1, n2 = t1 + ff[0] * step, t2 + ff[1] * step
-                half = 0.5 * (f1 + f2 + n1 * g1 + n2 * g2)
-                a0 = f1 * f2 + n1 * g1 * f2 + n2 * g2 * f1
-                if half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0:
+                if has_stable_real_poles(n1, n2, f1, f2):
                     t1, t2 = n1, n2
                     t3 += ff[2] * step
                     t4 += ff[3] * step

@@ -51,6 +51,14 @@ class Machine:
     foot: float = 0.0
     """Part by which that current is larger at little flux, where the sheet is less permeable: exp(-(flux / foot_wb)^2) of it."""
     foot_wb: float = 0.2
+    loop_a: float = 0.0
+    """Half the width of the iron's loops at no flux, far from their ends: a Preisach model along the axis, whose relays are 2 h wide,
+
+    h exponentially distributed about `loop_wb`, and fewer the further their middle is from no flux: 1 / cosh^2 of it over `meet_wb`,
+    so that the branches of a loop meet in saturation.
+    """
+    loop_wb: float = 0.1
+    meet_wb: float = 0.6
     iron_ohm: float = math.inf
     leg_v: float = 0.0
     leg_a: float = 0.2
@@ -127,7 +135,7 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
     for k, (axis, level, bias) in enumerate(SEGMENTS):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
-        seen, lost = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), *_numbers(machine))
+        seen, lost = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), along, *_numbers(machine))
         t = begin + np.arange(volt.size) * PERIOD_S
         phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
         hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
@@ -151,7 +159,7 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.has_diodes, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
+    return (m.loop_a, m.loop_wb, m.meet_wb, m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.has_diodes, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
 
 
 @njit(cache=True)
@@ -171,19 +179,37 @@ def _leg_loss(current, leg_v, leg_a, legs):
 
 
 @njit(cache=True)
-def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
+def _relays(flux, plays, loop_a, loop_wb, meet_wb):
+    """Extra magnetizing current of the loops at a flux along the axis; every play follows it."""
+    most = 0.0
+    total = 0.0
+    for k in range(plays.size):
+        half = (k + 0.5) / plays.size * 5.0 * loop_wb
+        weight = math.exp(-half / loop_wb)
+        plays[k] = min(max(plays[k], flux - half), flux + half)
+        most += weight
+        total += weight * math.tanh(plays[k] / meet_wb)
+    return loop_a * (meet_wb / loop_wb) * (math.tanh(flux / meet_wb) - total / most)
+
+
+@njit(cache=True)
+def _middle(x, own, l_s, l_m, knee, foot, foot_wb, loops):
+    """Flux of the magnetizing branch."""
+    middle = (x[0] / l_s + x[1] / own - loops) / (1.0 / l_s + 1.0 / own + 1.0 / l_m)
+    for _ in range(12 if knee > 0.0 or foot > 0.0 else 0):
+        wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee, foot, foot_wb) - loops
+        middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8 + foot * math.exp(-((abs(middle) / foot_wb) ** 2))) / l_m)
+    return middle
+
+
+@njit(cache=True)
+def _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
 
     currents of the bar's layers.
     """
     own = (1.0 - bar) * l_r
-    if iron > 0.0:
-        middle = x[2]
-    else:
-        middle = (x[0] / l_s + x[1] / own) / (1.0 / l_s + 1.0 / own + 1.0 / l_m)
-        for _ in range(12 if knee > 0.0 or foot > 0.0 else 0):
-            wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee, foot, foot_wb)
-            middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8 + foot * math.exp(-((abs(middle) / foot_wb) ** 2))) / l_m)
+    middle = x[2] if iron > 0.0 else _middle(x, own, l_s, l_m, knee, foot, foot_wb, loops)
     i_s, i_r = (x[0] - middle) / l_s, (x[1] - middle) / own
     d = np.zeros(7 + LAYERS.size, dtype=np.complex128)
     d[0] = v - r_s * i_s - (_leg_loss(i_s, leg_v, leg_a, legs) if leg_v > 0.0 else 0.0)
@@ -199,7 +225,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_
         d[1] = -r_r * i_r
     d[1] += 1j * omega * x[1]
     if iron > 0.0:
-        d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee, foot, foot_wb))
+        d[2] = iron * (i_s + i_r - _magnetizing(middle, l_m, knee, foot, foot_wb) - loops)
     if lag > 0.0:
         d[4] = (i_s - x[4]) / lag
     if turn > 0.0:
@@ -210,7 +236,7 @@ def _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
+def _simulated(volts, period, fine, begin, left, along, loop_a, loop_wb, meet_wb, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
     """Current (n,) that the sensors see, `delay` old, before noise; and what the link has lost then, of it."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -222,24 +248,28 @@ def _simulated(volts, period, fine, begin, left, cold, warming, r_r, l_s, l_r, l
     at = 0
     v = 0.0j
     load = drops = 0.0
+    loops, plays = 0.0j, np.zeros(60)
     for k in range(n):
         omega = swing * math.cos(swings * (begin + k * period))
         r_s = cold * (1.0 + warming * (begin + k * period))
         lost[k] = sag * drops - ripple * math.cos(2.0 * math.pi * ripple_hz * (k + 0.5) * period)
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k1, seen, drawn = _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             memory[at % (late + 1)] = seen
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
                 v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * k * period))
-                k1, seen, drawn = _rates(x, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+                k1, seen, drawn = _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             at += 1
-            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k4, seen, drawn = _rates(x + h * k3, v, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k4, seen, drawn = _rates(x + h * k3, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            if loop_a > 0.0:
+                flux = x[2] if iron > 0.0 else _middle(x, (1.0 - bar) * l_r, l_s, l_m, knee, foot, foot_wb, loops)
+                loops = along * _relays((flux * along.conjugate()).real, plays, loop_a, loop_wb, meet_wb)
             if sag > 0.0:
                 load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - (0.0 if diodes and load < 0.0 else load))
                 drops = drops + h / again_s * (load - drops) if again_s > 0.0 else load

@@ -125,6 +125,14 @@ def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(foot)
     assert set(names) == {"magnetizing_saturation"} and seen.left.sigma < 0.1
 
 
+@pytest.mark.parametrize("meet_wb", [0.6, long(3.0)])
+def test_iron_whose_loops_meet_in_saturation_is_hysteresis_alone(meet_wb):
+    """Where loops could only widen with flux, such iron left 0.1 of the noise, and a sag and a saturation were likely beside it."""
+    seen, names = named(Machine(loop_a=0.1, meet_wb=meet_wb), 2.0)
+    assert set(names) == {"magnetic_hysteresis"} and seen.left.sigma < 0.05
+    assert seen.causes[0].sizes["coercive_current_a"][0] == pytest.approx(0.1, rel=0.15)
+
+
 def test_legs_that_differ_are_told_apart():
     """Where all three had to be alike, legs 8 % apart were an error without a name."""
     seen, names = named(Machine(leg_v=4.0, legs=(0.97, 1.08, 0.95)))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import FINE_HAT, HAT
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
+from commissioner.diagnose.memory import loop_width
 from commissioner.diagnose.model import Term
 from commissioner.diagnose.record import Record
 
@@ -65,13 +66,12 @@ def _split(effect_name: str) -> Term:
 
 
 def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    """Largest current of the memory at the largest flux reached."""
+    """Largest current of the memory, and the flux at which it is, of those reached."""
     rates = setting.layout.stop_radius_wb[:, 1]
-    factors = np.where(rates == 0.0, 1.0, rates * setting.iron_flux_wb**2)
-    return {
-        "coercive_current_a": (float(listed(values, "loop", rates.size) @ factors), "A"),
-        "at_flux_wb": (setting.iron_flux_wb, "Wb"),
-    }
+    fluxes = np.linspace(setting.iron_flux_wb, 0.0, 21)
+    currents = np.array([[loop_width(flux, 0.0, rate)[0] for rate in rates] for flux in fluxes]) @ listed(values, "loop", rates.size)
+    widest = int(np.argmax(currents))
+    return {"coercive_current_a": (float(currents[widest]), "A"), "at_flux_wb": (float(fluxes[widest]), "Wb")}
 
 
 @effect(
@@ -84,7 +84,7 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
     """Extra current sum h_k w_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
 
-    ones) with fixed scales r_k, some of them with a factor w_k that grows with the square of the flux.
+    ones) with fixed scales r_k, some of them with a factor w_k that grows with the flux, or falls (`memory.loop_width`).
 
     `split` as with saturation.
     """

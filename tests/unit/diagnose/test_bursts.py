@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from commissioner.diagnose.bursts import BLOCK, bursts_sigma
+from commissioner.diagnose.bursts import BLOCK, LEVEL, bursts_sigma
 from commissioner.diagnose.noise import Noise
 
 SIGMA = 0.01
@@ -57,6 +57,16 @@ def test_moments_with_three_times_the_noise_are_seen(record, kind):
         for start in (10, 25):
             row[:, start * BLOCK : (start + 2) * BLOCK] *= 12.0 if kind == "red" else 4.0
     assert bursts_sigma(rows, record, noise_of()) > 0.3
+
+
+@pytest.mark.parametrize("kind", ["white", "red"])
+def test_an_offset_of_two_values_jumps(record, kind):
+    """For some levels each, 0.7 of the noise off their mean: to the spectrum of two equal tests that is slow noise."""
+    size = 2.0 if kind == "red" else 0.7
+    rows = residuals(record, kind)
+    for row in rows:
+        row[1] += size * SIGMA * np.where(np.arange(row.shape[1]) // LEVEL % 10 < 5, 1.0, -1.0)
+    assert bursts_sigma(rows, record, noise_of()) == pytest.approx(size / np.sqrt(3.0), rel=0.2)
 
 
 def test_spikes_and_masked_samples_are_no_moments(record):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.audit import prepare
+from commissioner.diagnose.audit import excited_lines, prepare
 from tests.unit.diagnose.conftest import recording
 
 
@@ -77,6 +77,15 @@ def test_one_tone_is_said_to_carry_little():
     t = source.time_s
     one = replace(source, voltage_axis_v=20.0 * np.sin(2 * np.pi * 30.0 * t))
     assert any("single tone" in sentence for sentence in prepare([one])[1].sentences)
+
+
+def test_a_random_binary_command_has_no_tones_and_tones_beside_it_keep_theirs():
+    """Thousands of lines are no tones: any two of them make every ripple's frequency, and looking at them all took minutes."""
+    tones, random = recording(seconds=6.0), np.random.default_rng(3)
+    levels = np.repeat(random.choice([-30.0, 30.0], tones.time_s.size // 4 + 1), 4)[: tones.time_s.size]
+    assert excited_lines(prepare([replace(tones, voltage_axis_v=levels)])[0]) == []
+    one = np.where(tones.segment == 1, 0.3 * levels, tones.voltage_axis_v)
+    assert excited_lines(prepare([replace(tones, voltage_axis_v=one)])[0]) == pytest.approx([2.3, 41.9, 331.7], abs=0.1)
 
 
 def test_what_carries_nothing_is_refused_with_the_reason():

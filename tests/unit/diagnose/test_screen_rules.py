@@ -55,3 +55,14 @@ def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_fo
     large, small = 0.05 * steps.count, 0.005 * steps.count
     asked = [steps._guard(losses, "inductance_anisotropy", rest) for rest in (large, small, 1e9)]
     assert asked == pytest.approx([ENTIRELY * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")])
+
+
+def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
+    def asked(record):
+        steps = Steps(replace(setting, record=record), WHITE, [], print, record, lambda: True)
+        return steps.count, steps.material_chi2
+
+    record = setting.record
+    half = tuple(replace(s, is_good=np.arange(s.count) % 2 == 0) for s in record.segments)
+    whole, left_out = asked(record), asked(replace(record, segments=half))
+    assert left_out == pytest.approx([0.5 * x for x in whole], rel=1e-3)
