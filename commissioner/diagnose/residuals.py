@@ -96,7 +96,7 @@ def residuals(
     for k, segment in enumerate(record.segments):
         one, two = predict(nominal, record, k, layout), predict(extended, record, k, layout)
         errors.append(_Errors(segment, segment.currents_a - one.currents_a, segment.currents_a - two.currents_a, two))
-    parts: dict[str, list[Array]] = {k: [] for k in (*LABELS, "before", "after", "before_along", "after_along")}
+    parts: dict[str, list[Array]] = {k: [] for k in (*LABELS, *(f"{name}{of}" for name in ("before", "after") for of in ("", "_along", "_size")))}
     axes: dict[float, list[tuple[float, float, int]]] = {}
     blocks: list[tuple[float, float, float]] = []
     for error in errors:
@@ -122,7 +122,10 @@ LABELS: Mapping[str, str] = {
 
 
 def _collect(parts: dict[str, list[Array]], error: _Errors) -> None:
-    """Phase by phase against the phase's own current and slope; along the axis against its voltage and the flux."""
+    """Phase by phase against the phase's own current and slope; along the axis against its voltage; of all phases against the flux,
+
+    for along the axis two sensors show their noise larger on some axes than on others.
+    """
     segment, prediction = error.segment, error.prediction
     good, count = segment.is_good, error.before.shape[0]
     slope = np.gradient(prediction.currents_a, segment.period_s, axis=1)
@@ -130,6 +133,7 @@ def _collect(parts: dict[str, list[Array]], error: _Errors) -> None:
     parts["voltage"].append(segment.voltage_axis_v[good])
     for name, value, along in zip(("before", "after"), (error.before, error.after), error.along(), strict=True):
         parts[f"{name}_along"].append(along[good])
+        parts[f"{name}_size"].append(np.sqrt(np.mean(value[:, good] ** 2, axis=0)))
         parts[name].append(value[:, good].ravel())
     parts["current"].append(prediction.currents_a[:, good].ravel())
     parts["slope"].append(slope[:count, good].ravel())
@@ -137,7 +141,7 @@ def _collect(parts: dict[str, list[Array]], error: _Errors) -> None:
 
 def _curve(label: str, x: Array, parts: Mapping[str, list[Array]]) -> Curve:
     """Equal-count bins. Against flux (never negative) the size of the error is shown."""
-    which_error = "_along" if label in (LABELS["voltage"], LABELS["flux"]) else ""
+    which_error = {LABELS["voltage"]: "_along", LABELS["flux"]: "_size"}.get(label, "")
     before, after = (np.concatenate(parts[f"{name}{which_error}"]) for name in ("before", "after"))
     every = max(x.size // 50_000, 1)
     edges = np.unique(np.quantile(x[::every], np.linspace(0.0, 1.0, BINS + 1)))

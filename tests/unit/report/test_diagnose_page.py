@@ -90,6 +90,10 @@ def test_a_named_cause_is_shown_though_it_stands_alone():
 
 @pytest.fixture(scope="module")
 def seen():
+    return seen_by(3)
+
+
+def seen_by(sensors):
     """Residuals of a true and of a wrong model (R_R 20 % off) on a multisine with white noise and one masked stretch."""
     from commissioner.diagnose.plant import predict
 
@@ -98,16 +102,16 @@ def seen():
     good = np.ones(SAMPLES, bool)
     good[1000:1010] = False
     random = np.random.default_rng(4)
-    facts = Facts(PERIOD, 5.0, 1500.0, 0.8, 5.0, 4000.0, 540.0, 3)
+    facts = Facts(PERIOD, 5.0, 1500.0, 0.8, 5.0, 4000.0, 540.0, sensors)
     segments = []
     for k, axis in enumerate((0.0, 60.0)):
-        segment = Segment(k, 0, axis, time + 2.0 * k, voltage, np.zeros((3, SAMPLES)), good, np.ones(SAMPLES))
+        segment = Segment(k, 0, axis, time + 2.0 * k, voltage, np.zeros((sensors, SAMPLES)), good, np.ones(SAMPLES))
         current = predict(Model(TRUE), Record((segment,), facts), 0, NO_DICTIONARY).currents_a
         noisy = current + SIGMA * random.standard_normal(current.shape)
         noisy[:, ~good] = 99.0
         segments.append(Segment(k, 0, axis, time + 2.0 * k, voltage, noisy, good, np.ones(SAMPLES)))
     flat = np.array([1.0, 1000.0])
-    noise = Noise(np.full(3, SIGMA), flat, np.ones((3, 2)), "test", True, 0.01, True)
+    noise = Noise(np.full(sensors, SIGMA), flat, np.ones((sensors, 2)), "test", True, 0.01, True)
     wrong = Model((TRUE[0], 1.2 * TRUE[1], TRUE[2], TRUE[3]))
     return residuals(Record(tuple(segments), facts), NO_DICTIONARY, wrong, Model(TRUE), noise, TONES)
 
@@ -129,6 +133,12 @@ def test_the_error_of_a_wrong_resistance_is_at_the_excited_lines_and_noise_is_on
 def test_masked_samples_make_no_error(seen):
     assert seen.time_after_a.max() < 1.2 * SIGMA
     assert seen.by_axis_after_a == pytest.approx(SIGMA, rel=0.05)
+
+
+@pytest.mark.parametrize("sensors", [2, 3])
+def test_what_is_left_against_the_flux_is_the_noise_on_every_axis(sensors):
+    flux = next(c for c in seen_by(sensors).curves if "flux" in c.label)
+    assert flux.after_a == pytest.approx(SIGMA, rel=0.2) and np.mean(flux.after_a) == pytest.approx(SIGMA, rel=0.02)
 
 
 @pytest.mark.parametrize("has_causes", [True, False])
