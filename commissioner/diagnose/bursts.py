@@ -25,34 +25,37 @@ LEVEL = 400
 """Samples of a level."""
 
 
-def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
-    """Root mean square of what comes and goes, over the noise's: moments or levels, whichever is more; 0 where there is none."""
-    return max(_moments_sigma(residuals, record, noise), _jumps_sigma(residuals, record, noise))
+def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise, *, has_causes: bool = False) -> float:
+    """Root mean square of what comes and goes, over the noise's: moments or levels, whichever is more; 0 where there is none.
+
+    What named causes leave, like a shaft that swings faster than its knots, moves from level to level as well: there only moments count.
+    """
+    moments = _moments_sigma(residuals, record, noise)
+    return moments if has_causes else max(moments, _jumps_sigma(residuals, record, noise))
 
 
 def _jumps_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
-    """Half of what the medians of neighbouring stretches jump by, where some jump by far more than most move: of an offset that has two
+    """Root mean square of the levels, medians of neighbouring stretches, where some jump by far more than most move: an offset that has
 
-    values, its root mean square. Noise of any colour moves from stretch to stretch as a normal number does. The first stretch of a segment
-
-    holds its start and does not count.
+    two values. Noise of any colour moves from stretch to stretch as a normal number does. The first stretch of a segment holds its
+    start and does not count.
     """
-    moves = []
+    every, moves = [], []
     for segment, residual in zip(record.segments, residuals, strict=True):
         count = segment.count // LEVEL
         levels = np.median(residual[:, : count * LEVEL].reshape(residual.shape[0], count, LEVEL), axis=2)
         good = np.asarray(segment.is_good[: count * LEVEL].reshape(count, LEVEL).all(axis=1))
         both = np.flatnonzero(good[1:] & good[:-1])
+        every.append(levels[:, good])
         moves.append(np.diff(levels, axis=1)[:, both[both > 0]])
-    moved = np.abs(np.hstack(moves))
+    levels, moved = np.hstack(every), np.abs(np.hstack(moves))
     if moved.shape[1] == 0:
         return 0.0
     # two medians of white noise differ by sqrt(pi / LEVEL) of it
     least = np.maximum(np.sqrt(np.pi / LEVEL) * noise.sigma_a, noise.step_a)
     usual = np.maximum(1.4826 * np.median(moved, axis=1), least)
-    jumps = [row[row > APART * scale] for row, scale in zip(moved, usual, strict=True)]
-    power = [0.25 * np.mean(j**2) / s**2 if j.size >= LEAST_MOMENTS else 0.0 for j, s in zip(jumps, noise.sigma_a, strict=True)]
-    return float(np.sqrt(np.mean(power)))
+    jumps = (moved > APART * usual[:, None]).sum(axis=1) >= LEAST_MOMENTS
+    return float(np.sqrt(np.mean(np.where(jumps, np.mean(levels**2, axis=1) / noise.sigma_a**2, 0.0))))
 
 
 def _moments_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:

@@ -91,7 +91,7 @@ def leftover(
         float(np.sqrt(max(power / count - noise.rounding_share, 0.0)))
         for power in (line_power, at_tones, _by_state(record, predicted, whitened, noise))
     )
-    by_bursts = bursts_sigma(residuals, record, noise)
+    by_bursts = bursts_sigma(residuals, record, noise, has_causes=any(t.effect for t in model.terms))
     largest = max(by_power, by_lines, by_tones, by_states, by_bursts)
     return Leftover(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)
 

@@ -67,6 +67,7 @@ def test_an_offset_of_two_values_jumps(record, kind):
     for row in rows:
         row[1] += size * SIGMA * np.where(np.arange(row.shape[1]) // LEVEL % 10 < 5, 1.0, -1.0)
     assert bursts_sigma(rows, record, noise_of()) == pytest.approx(size / np.sqrt(3.0), rel=0.2)
+    assert bursts_sigma(rows, record, noise_of(), has_causes=True) == 0.0
 
 
 def test_spikes_and_masked_samples_are_no_moments(record):
