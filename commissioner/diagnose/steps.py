@@ -21,7 +21,7 @@ from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, gua
 from commissioner.diagnose.lines import LINES, with_clearer_lines
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import with_flux_before
+from commissioner.diagnose.nominal import impedance_starts, with_flux_before
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import Score, Screening, price, required_chi2, screen
 from commissioner.diagnose.settle import placed
@@ -44,6 +44,9 @@ LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 2.0
 
 this share is left as it is."""
 
+WRONG_VALLEY = 1.0
+"""A rest above this multiple of the noise, once the first cause is in the model: what it made of the currents may have led the four
+parameters astray."""
 ENTIRELY = 0.98
 """Of a large rest: a cause that takes so much of it is no part of another's form."""
 
@@ -151,6 +154,8 @@ class Steps:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
+            if len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count:
+                current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
                 current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
             current = self.with_new_dictionaries(self.with_new_flux_before(current))
@@ -160,6 +165,17 @@ class Steps:
                 current, self.setting = with_closer_radii(current, self.setting, self.noise, self.report)
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = idle | set(dropped)
+
+    def _from_other_starts(self, current: Fit) -> Fit:
+        """The best fit of the same causes beside what the impedance at the tones says of the four: a dead time of thirty times the noise
+
+        had left them in a valley without a magnetizing inductance.
+        """
+        starts = [replace(current.model, nominal=start) for start in impedance_starts(self.record)]
+        best = min((current, *(fit(m, self.record, self.layout, self.noise) for m in starts)), key=lambda f: f.chi2)
+        if best is not current:
+            self.report(f"  the four parameters from another start: gained {current.chi2 - best.chi2:.4g}")
+        return best
 
     def _with_clearer_lines(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit where ripple or mains lie at other frequencies than were looked at so far, once the causes are in the model."""

@@ -85,3 +85,9 @@ def test_a_loss_of_leg_voltage_is_a_tie_with_the_experiment_that_splits_it():
     assert seen.verdict.value == "not_distinguishable"
     assert {"dead_time", "device_drop"} == {seen.causes[0].name, *seen.causes[0].equivalent}
     assert "switching frequency" in seen.next_experiment["do"] and seen.next_experiment["predicted_sigma"] >= 10.0
+
+
+def test_a_dead_time_that_leads_the_four_parameters_astray_is_named_alone():
+    """Thirty times the noise: fitted alone the four had lost their magnetizing inductance, and a skin effect of 3.3 brought it back."""
+    seen, _ = diagnosed(Case("one", 2700032, "dead_time"), 3.0)
+    assert {c.name for c in seen.causes} == {"dead_time"} and seen.left.sigma < 0.05
