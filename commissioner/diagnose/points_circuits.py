@@ -59,9 +59,15 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     return np.array(start), np.array(low), np.array(high)
 
 
+LONGEST_STEP = 100.0
+"""Of the logarithms of resistance (or loss) and inductance."""
+
+
 def _predicted(x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]) -> tuple[Array, Array]:
     """Current (A rms) and power (W) at the points' voltage and frequency."""
     numbers: dict[str, Array] = {}
+    # a trial step may be far too long, on one processor and not on another
+    x = np.r_[np.clip(x[:2], -LONGEST_STEP, LONGEST_STEP), x[2:]]
     at = 2
     for extension in extensions:
         numbers[extension.name] = x[at : at + extension.numbers]
