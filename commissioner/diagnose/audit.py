@@ -33,7 +33,7 @@ MOST_CLIPPED = 0.3
 REST_SAMPLES = 1
 LEAST_AT_PEAKS = 0.5
 """Of a command's power, where it consists of tones: the rest of their lines is beside them by the window alone."""
-MOST_TONES = 200
+MOST_LINES = 200
 """Of one segment: a random binary command has thousands of lines, and none is free of sums of others."""
 
 
@@ -301,7 +301,7 @@ def excited_lines(record: Record) -> list[float]:
         peaks = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
         strong = peaks[spectrum[peaks] > 1e-2 * spectrum.max()]
         power += float((spectrum**2).sum())
-        if strong.size > MOST_TONES:
+        if strong.size > MOST_LINES:
             continue
         is_near = np.zeros(spectrum.size, dtype=np.bool_)
         is_near[np.clip(strong[:, None] + np.arange(-2, 3), 0, spectrum.size - 1)] = True

@@ -37,8 +37,8 @@ def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise, *, ha
 def _jumps_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
     """Root mean square of the levels, medians of neighbouring stretches, where some jump by far more than most move: an offset that has
 
-    two values. Noise of any colour moves from stretch to stretch as a normal number does. The first stretch of a segment holds its
-    start and does not count.
+    two values. Noise of any colour moves from stretch to stretch as a normal number does. From the first stretch of a segment,
+    which holds its start, no move is counted.
     """
     every, moves = [], []
     for segment, residual in zip(record.segments, residuals, strict=True):

@@ -57,7 +57,7 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
             model = _without_segment(one, k, layout) if many else one.model
             residual = segment.currents_a - predict(model, record, k, layout).currents_a
             left.append(float((residual[:, segment.is_good] ** 2).sum()))
-        return left[0], left[1], int(segment.is_good.sum()) * record.facts.phases
+        return left[0], left[1], segment.good_count * record.facts.phases
 
     table = np.array(each_segment(of_segment, record))
     period = record.facts.sample_period_s

@@ -66,7 +66,7 @@ def leftover(
     for segment, residual in zip(record.segments, residuals, strict=True):
         white = whiten(residual, segment.is_good, noise, record.facts.sample_period_s)
         power += float(white @ white)
-        count += int(segment.is_good.sum()) * record.facts.phases
+        count += segment.good_count * record.facts.phases
         period = record.facts.sample_period_s
         n = segment.count
         transform = np.fft.rfft(np.where(segment.is_good, residual, 0.0), axis=1) / noise.weights(n, period)

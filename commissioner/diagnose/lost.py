@@ -105,11 +105,11 @@ class _Mending:
 
     @property
     def excess(self) -> float:
-        return self.chi2 - float(self.segment.is_good.sum()) * self.record.facts.phases
+        return self.chi2 - float(self.segment.good_count) * self.record.facts.phases
 
     def _gain(self, repaired: Segment, chi2: float) -> float:
         """What the repair gains beyond the samples that no longer count."""
-        masked = max(int(self.segment.is_good.sum()) - int(repaired.is_good.sum()), 0)
+        masked = max(self.segment.good_count - repaired.good_count, 0)
         return self.chi2 - chi2 - 3.0 * masked * self.record.facts.phases
 
     def put_skips_right(self, *, begins_anywhere: bool) -> list[Loss]:

@@ -17,6 +17,10 @@ ROUNDS = 9
 """Fixed-point rounds from the measured current; each takes off nine tenths of the error and more."""
 
 
+FARTHEST = 50.0
+"""From its start, of the logarithm of a resistance (or loss) or inductance: a trial step beyond overflows."""
+
+
 @dataclass(frozen=True)
 class Extension:
     """A candidate: how many numbers, and whether the points can show it."""
@@ -42,7 +46,7 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     known = 0.0 if points.resistance_ohm is None else points.resistance_ohm
     first = np.median(np.maximum(resistance - known, 0.05 * resistance)) if points.is_locked else np.median(points.power_w)
     start = [float(np.log(first)), float(np.log(np.median(reactance / points.omega)))]
-    low, high = [-np.inf, -np.inf], [np.inf, np.inf]
+    low, high = [x - FARTHEST for x in start], [x + FARTHEST for x in start]
     for extension in extensions:
         if extension.name == "magnetizing_saturation":
             start += [0.3, 5.0]
@@ -59,15 +63,9 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     return np.array(start), np.array(low), np.array(high)
 
 
-LONGEST_STEP = 100.0
-"""Of the logarithms of resistance (or loss) and inductance."""
-
-
 def _predicted(x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]) -> tuple[Array, Array]:
     """Current (A rms) and power (W) at the points' voltage and frequency."""
     numbers: dict[str, Array] = {}
-    # a trial step may be far too long, on one processor and not on another
-    x = np.r_[np.clip(x[:2], -LONGEST_STEP, LONGEST_STEP), x[2:]]
     at = 2
     for extension in extensions:
         numbers[extension.name] = x[at : at + extension.numbers]

@@ -53,6 +53,11 @@ class Segment:
     def count(self) -> int:
         return int(self.time_s.shape[0])
 
+    @cached_property
+    def good_count(self) -> int:
+        """Samples that are not masked."""
+        return int(self.is_good.sum())
+
     @property
     def voltage_ab_v(self) -> NDArray[np.float64]:
         angle = np.deg2rad(self.axis_deg)

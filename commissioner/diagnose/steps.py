@@ -98,7 +98,7 @@ class Steps:
     @property
     def count(self) -> float:
         """Good samples of all phases."""
-        return float(sum(int(s.is_good.sum()) for s in self.record.segments) * self.record.facts.phases)
+        return float(sum(s.good_count for s in self.record.segments) * self.record.facts.phases)
 
     @property
     def material_chi2(self) -> float:

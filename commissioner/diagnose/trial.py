@@ -132,7 +132,7 @@ class Trial:
             gram, slope = np.zeros((self._size, self._size)), np.zeros(self._size)
             gram[np.ix_(rows, rows)] = product[:-1, :-1]
             slope[rows] = product[:-1, -1]
-            return gram, slope, float(product[-1, -1]), int(segment.is_good.sum()) * self._record.facts.phases
+            return gram, slope, float(product[-1, -1]), segment.good_count * self._record.facts.phases
 
         grams, slopes, chi2, counts = (list(column) for column in zip(*each_segment(of_segment, self._record), strict=True))
         if self._prior.any():
