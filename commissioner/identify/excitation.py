@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,6 @@ def design(
     sample_period_s: float,
     inverter: InverterError = IDEAL_INVERTER,
     seconds: float | None = None,
-    dc_bias_v: float = 0.0,
 ) -> DesignedExcitation:
     """The minimax multitone for this machine under the limits.
 
@@ -96,30 +95,42 @@ def design(
     voltage is added to the command so that the motor sees about what was designed.
     """
     time_s = seconds or DEFAULT_SECONDS * max(1.0, estimate.rotor_time_constant_s / 0.5)
-    frequencies, shares = _minimax(estimate, limits, time_s, sample_period_s)
+    # the search has several nearly equal optima: what differs by rounding alone must end at the same tones
+    about = InverseGamma(*(_rounded(value) for value in estimate.as_tuple()))
+    frequencies, shares = _minimax(about, _rounded_limits(limits), _rounded(time_s), sample_period_s)
     grid_hz = 10.0 ** math.floor(math.log10(min(frequencies) / 3.0))
     frequencies = np.array(separated(frequencies.tolist(), grid_hz))
     phases = _schroeder_phases(shares)
     amplitudes = _scaled(estimate, frequencies, shares, limits)
+    steady = _excitation(amplitudes, frequencies, phases, time_s)
+    flux, current = predicted_peaks(estimate, steady, sample_period_s)
+    # the start's transient passes what the steady peaks keep
+    inside = min(1.0, limits.flux_wb / flux, limits.current_a / current)
+    amplitudes = inside * amplitudes
     information = _information(estimate, frequencies, amplitudes) * time_s / (2.0 * sample_period_s * limits.noise_a**2)
-    relative = np.sqrt(np.diag(np.linalg.inv(information)))
+    r = [float(v) for v in np.sqrt(np.diag(np.linalg.inv(information)))]
     commanded = amplitudes * np.abs(
         1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a)
     )
     top = min(1.0, (1.0 - 1e-9) * limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
-    tones = tuple(
-        Tone(float(a * top), float(f), float(p)) for a, f, p in zip(commanded, frequencies, phases, strict=True)
-    )
-    excitation = Excitation(tones, dc_bias_v, time_s)
-    peak_flux, peak_current = predicted_peaks(estimate, replace_tones(excitation, amplitudes), sample_period_s)
-    r = [float(v) for v in relative]
-    return DesignedExcitation(excitation, peak_flux, peak_current, (r[0], r[1], r[2], r[3]), time_s, limits.noise_a)
+    excitation = _excitation(top * commanded, frequencies, phases, time_s)
+    std = (r[0], r[1], r[2], r[3])
+    return DesignedExcitation(excitation, inside * flux, inside * current, std, time_s, limits.noise_a)
 
 
-def replace_tones(excitation: Excitation, amplitudes: Sequence[float] | NDArray[np.float64]) -> Excitation:
-    """The same excitation with other amplitudes."""
-    tones = tuple(replace(t, amplitude_v=float(a)) for t, a in zip(excitation.tones, amplitudes, strict=True))
-    return replace(excitation, tones=tones)
+def _excitation(amplitudes: Signal, frequencies: Signal, phases: Signal, seconds: float) -> Excitation:
+    """Without a bias."""
+    tones = zip(amplitudes.tolist(), frequencies.tolist(), phases.tolist(), strict=True)
+    return Excitation(tuple(Tone(*tone) for tone in tones), 0.0, seconds)
+
+
+def _rounded(value: float) -> float:
+    """To three digits."""
+    return float(f"{value:.3g}")
+
+
+def _rounded_limits(limits: ExcitationLimits) -> ExcitationLimits:
+    return ExcitationLimits(**{name: _rounded(value) for name, value in vars(limits).items()})
 
 
 def predicted_peaks(machine: InverseGamma, excitation: Excitation, period_s: float) -> tuple[float, float]:
@@ -163,13 +174,17 @@ def _misses(candidate: int, others: Sequence[int]) -> bool:
 def _minimax(
     machine: InverseGamma, limits: ExcitationLimits, seconds: float, period_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(frequencies, amplitude shares) that minimise the worst relative standard error, by simplex search in
-    logarithms."""
+    """(frequencies, amplitude shares) that minimise the worst relative standard error, by simplex search in logarithms.
+
+    It starts near what all such optima look like (most of the flux on a tone below the rotor's corner, one above it, little
+    on the others) and is begun anew where it ended, as a simplex may have collapsed (W. H. Press et al., Numerical
+    Recipes, 3rd ed., 10.5).
+    """
     slow, fast = (-p / (2.0 * math.pi) for p in poles_per_s(machine))
     lowest = max(3.0 / seconds, 0.15 * slow)
     highest = min(0.05 / period_s, 3.0 * fast)  # above, skin effect and timing say more than the machine
-    start_f = np.clip(np.array([0.5 * slow, 2.0 * slow, math.sqrt(slow * fast), fast, 3.0 * fast]), lowest, highest)
-    start = np.concatenate([np.log(start_f), np.log([0.2, 0.2, 0.2, 0.3, 0.3])])
+    start_f = np.clip(np.array([0.5 * slow, fast / 6.0, fast / 3.0, fast, 3.0 * fast]), lowest, highest)
+    start = np.concatenate([np.log(start_f), np.log([0.6, 0.2, 0.06, 0.06, 0.06])])
 
     def worst(point: NDArray[np.float64]) -> float:
         f = np.exp(np.clip(point[:TONE_COUNT], math.log(lowest), math.log(highest)))
@@ -185,7 +200,10 @@ def _minimax(
         )
         return float(math.log(np.max(errors)) + 5.0 * crowding)
 
-    found = minimize(worst, start, method="Nelder-Mead", options={"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}).x
+    found = start
+    for _ in range(2):
+        options = {"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}
+        found = minimize(worst, found, method="Nelder-Mead", options=options).x
     f = np.exp(np.clip(found[:TONE_COUNT], math.log(lowest), math.log(highest)))
     order = np.argsort(f)
     return f[order], _shares(found[TONE_COUNT:])[order]

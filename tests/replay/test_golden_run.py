@@ -20,9 +20,6 @@ from tests.support.sim_process import SimProcess
 
 ROUNDING = 1e-6
 """Other processors add up in another order."""
-AS_GOOD = 0.05
-"""The design of an excitation is the end of a search with several nearly equal optima: started 1e-8 beside, as on another processor, it
-ends at other tones. They must promise the same; what follows was recorded under the old ones: only the order of decisions is the same."""
 
 
 @pytest.fixture
@@ -69,16 +66,7 @@ def test_the_golden_run_is_decided_again(golden):
     replayed = list(replaying._decide_again(replaying._job(job), Findings(), journal, golden))
     assert [line["kind"] for line in archived] == [line["kind"] for line in replayed]
     for old, new in zip(archived, replayed, strict=True):
-        if old["kind"] == "excitation_chosen" and is_another_design(old["record"], new["record"]):
-            break
         assert_alike(old["record"], new["record"], old["kind"])
-
-
-def is_another_design(old, new):
-    """Whether the search ended at other tones, which must promise the worst parameter the same standard error."""
-    worst_old, worst_new = (max(one["predicted_std_percent"].values()) for one in (old, new))
-    assert worst_new == pytest.approx(worst_old, rel=AS_GOOD)
-    return not np.allclose(np.array(old["tones"])[:, 0], np.array(new["tones"])[:, 0], rtol=ROUNDING, atol=1e-9)
 
 
 def assert_alike(old, new, where):

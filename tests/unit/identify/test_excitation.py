@@ -30,8 +30,8 @@ def test_true_flux_and_current_stay_under_the_limits_and_use_them(motor):
     time = np.arange(round(chosen.seconds / PERIOD_S)) * PERIOD_S
     current, rotor = linear_response(motor.truth, chosen.excitation.voltage_v(time), PERIOD_S)
     stator = np.max(np.abs(rotor + motor.truth[2] * current))
-    assert stator <= 1.02 * limits.flux_wb
-    assert np.max(np.abs(current)) <= 1.02 * limits.current_a
+    assert stator <= 1.0001 * limits.flux_wb
+    assert np.max(np.abs(current)) <= 1.0001 * limits.current_a
     assert max(stator / limits.flux_wb, np.max(np.abs(current)) / limits.current_a) > 0.7
     assert (chosen.peak_flux_wb, chosen.peak_current_a) == pytest.approx((stator, np.max(np.abs(current))), rel=1e-6)
 
@@ -45,6 +45,25 @@ def test_at_least_four_tones_on_a_common_grid_and_at_most_twelve_seconds_with_th
     assert np.allclose(np.array(frequencies) / grid, np.round(np.array(frequencies) / grid), atol=1e-6)
     assert chosen.seconds <= 12.0 * max(1.0, motor.rotor_time_constant_s / 0.5)
     assert chosen.seconds_for_half == 4 * chosen.seconds
+
+
+def designed(motor, factor):
+    """For its estimate times the factor; no parameter lies on a rounding boundary."""
+    return design(InverseGamma(*(1.0003 * factor * np.array(motor.truth))), limits_of(motor), PERIOD_S, seconds=2.0)
+
+
+@pytest.mark.parametrize("motor", MOTORS[::6], ids=lambda m: m.name)
+def test_an_estimate_that_differs_by_rounding_gets_the_same_tones(motor):
+    for one, other in zip(*(designed(motor, k).excitation.tones for k in (1.0, 1.0 + 1e-8)), strict=True):
+        assert (one.frequency_hz, one.phase_rad) == (other.frequency_hz, other.phase_rad)
+        assert one.amplitude_v == pytest.approx(other.amplitude_v, rel=1e-6)
+
+
+@pytest.mark.parametrize("motor", MOTORS[::6], ids=lambda m: m.name)
+def test_the_search_ends_at_an_optimum_from_a_start_beside(motor):
+    """A hundredth of every parameter moves the worst standard error by a hundredth: where it moves more, a search stopped short."""
+    worst = [max(designed(motor, k).relative_std) for k in (1.0, 1.01)]
+    assert worst[0] == pytest.approx(worst[1], rel=0.02)
 
 
 def test_stated_standard_errors_are_what_a_fit_scatters():
