@@ -11,13 +11,18 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from commissioner.diagnose import kinds
+from commissioner.diagnose.kernels.pushes import tilted
+from commissioner.diagnose.kernels.spline import cells_of
+from commissioner.diagnose.kernels.tangent import sensitivities
+from commissioner.diagnose.kernels.trajectory import (
+    propagate,
+    propagate_linear,
+    propagate_varying,
+    rates_of_unit_states,
+)
 from commissioner.diagnose.model import Layout, Model, Term
-from commissioner.diagnose.pushes import tilted
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
-from commissioner.diagnose.spline import cells_of
-from commissioner.diagnose.tangent import sensitivities
 from commissioner.diagnose.terminals import sense
-from commissioner.diagnose.trajectory import propagate, propagate_linear, propagate_varying, rates_of_unit_states
 
 Array = NDArray[np.float64]
 

@@ -131,6 +131,37 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
     return (value if known >= 0.0 else -value), slope
 
 
+@njit(cache=True)
+def forecast(
+    u: Array,
+    period: float,
+    matrix: Array,
+    gain: Array,
+    r_s: float,
+    leakage: float,
+    lost_v: Array,
+    lost_span: float,
+    i: float,
+    psi_r: float,
+    free: float,
+) -> tuple[float, float]:
+    """(largest |stator flux|, largest |current|) under the voltages u, `(n,)`, held for `period` each: of the linear
+    machine from (i, psi_R); the flux also of `free`, which integrates u - F(i) - R_s i.
+
+    `matrix`, `gain`: held-input model of (i, psi_R). F, the inverter's loss, tabulated over 0 ... `lost_span`, is taken
+    at the end of each period: i' + g F(i') = i' without loss.
+    """
+    top, top_a = abs(free), abs(i)
+    for k in range(u.size):
+        known = matrix[0, 0] * i + matrix[0, 1] * psi_r + gain[0] * u[k]
+        loss, _ = implicit_loss(lost_v, lost_span, known, gain[0])
+        free += period * (u[k] - loss - r_s * i)
+        psi_r = matrix[1, 0] * i + matrix[1, 1] * psi_r + gain[1] * (u[k] - loss)
+        i = known - gain[0] * loss
+        top, top_a = max(top, abs(psi_r + leakage * i), abs(free)), max(top_a, abs(i))
+    return top, top_a
+
+
 # Inlined, for a call per sample would cost `advance` half as much again.
 @njit(cache=True, inline="always")
 def has_stable_real_poles(theta_1: float, theta_2: float, f1: float, f2: float) -> bool:

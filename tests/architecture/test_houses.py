@@ -7,7 +7,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LAYERS = [
-    {"errors", "records"},
+    {"compiled", "errors", "records"},
     {"motor"},
     {"identify", "registers"},
     {"diagnose", "monitor"},

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import FINE_HAT, HAT
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed, spline_value
-from commissioner.diagnose.memory import loop_width
+from commissioner.diagnose.kernels.memory import loop_width
 from commissioner.diagnose.model import Term
 from commissioner.diagnose.record import Record
 

@@ -17,14 +17,14 @@ made for a block of samples at once; then one parameter after the other is pushe
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from commissioner.compiled import kernel
 from commissioner.diagnose import kinds
-from commissioner.diagnose import samples as row
-from commissioner.diagnose.march import forced, marched, marched_with_memory
-from commissioner.diagnose.pushes import INTO_FLUX, pushes, starts, through_the_circuit
-from commissioner.diagnose.samples import at_samples
-from commissioner.diagnose.trajectory import SQRT3
+from commissioner.diagnose.kernels import samples as row
+from commissioner.diagnose.kernels.march import forced, marched, marched_with_memory
+from commissioner.diagnose.kernels.pushes import INTO_FLUX, pushes, starts, through_the_circuit
+from commissioner.diagnose.kernels.samples import at_samples
+from commissioner.diagnose.kernels.trajectory import SQRT3
 
 BLOCK = 256
 """Samples whose matrices are held at once: with a parameter's pushes they stay in the second-level cache."""
@@ -32,7 +32,7 @@ SIDE_BY_SIDE = 4
 """Parameters marched at once where something remembers: one waits for its own sum, four fill the processor."""
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage, cage_push):
     """(8) solved for the end of the period before each sample, of states x = (d psi_s, d psi_R) with pushes into the current
     (t), the rotor voltage (w) and the flux (v):
@@ -104,7 +104,7 @@ def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage
                 push[r, 4 + c, m] = period * back[r, c]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _solved(v, amp, cage, half, om, back):
     """Inverse (4, 4) of I - T/2 [V amp; -cage + omega J], by the Schur complement of the rotor block."""
     a00, a01 = 1.0 - half * (v[0, 0] * amp[0, 0] + v[0, 1] * amp[1, 0]), -half * (v[0, 0] * amp[0, 1] + v[0, 1] * amp[1, 1])
@@ -131,7 +131,7 @@ def _solved(v, amp, cage, half, om, back):
         back[2, c], back[3, c] = i00 * ya + i01 * yb, i10 * ya + i11 * yb
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def sensitivities(
     states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor,
     omega_rad_per_s, channels, period,

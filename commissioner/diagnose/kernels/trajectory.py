@@ -27,17 +27,17 @@ model without nonlinearity is stepped by the Taylor series of its matrix exponen
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from commissioner.diagnose.memory import loop_width, remembered, susceptibility
-from commissioner.diagnose.spline import blend, curve, place, rise, saturating
+from commissioner.compiled import inlined, kernel
+from commissioner.diagnose.kernels.memory import loop_width, remembered, susceptibility
+from commissioner.diagnose.kernels.spline import blend, curve, place, rise, saturating
 
 SQRT3 = np.sqrt(3.0)
 ROTOR, EDDY = 1.0, -1.0
 """Sign of the time constants of rotor branches, and of eddy-current paths fed by the stator flux."""
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def branch_current(x, branch_gain, branch_time, side):
     """Current (or its slope) of all branches on that `side`, from a state `x` (or its derivative)."""
     qa = qb = 0.0
@@ -48,7 +48,7 @@ def branch_current(x, branch_gain, branch_time, side):
     return qa, qb
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def leg_loss(i, legs, top, knee):
     """Voltage a leg loses at current i (odd), and its slope: cells over asinh(|i|/knee)."""
     size = abs(i) / knee
@@ -61,7 +61,7 @@ def leg_loss(i, legs, top, knee):
     return sign * curve(legs, j, u), slope
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _memory_current(pa, pb, moved_a, moved_b, z, stop_gain, stop_radius):
     """Current of the memory operators at flux (pa, pb), moved so far since their states `z`."""
     ja = jb = 0.0
@@ -74,7 +74,7 @@ def _memory_current(pa, pb, moved_a, moved_b, z, stop_gain, stop_radius):
     return ja, jb
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
     """(6), (7) from the current (ca, cb) into the cage, into k from 2 on; k[0:2] is d psi_s/dt."""
     wa = rr * ((1.0 + base[6]) * ca + base[7] * cb)
@@ -87,7 +87,7 @@ def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
         k[5 + 2 * n] = (fed_b - x[5 + 2 * n]) / abs(branch_time[n])
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _rates(
     x, k, va, vb, ru, rv, rw, rr, omega, base, legs, has_legs, legs_top, legs_knee, iron, iron_top, leak, leak_top,
     ma, mb, branch_gain, branch_time,
@@ -130,7 +130,7 @@ def _rates(
     return ta, tb, jaa, jab, jbb, eaa, eab, ebb
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _current_slope(
     x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time
 ):
@@ -156,7 +156,7 @@ def _current_slope(
     return da * shrink, db * shrink
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, legs_top, legs_knee, fewest, most):
     """Steps fine enough for the steepest part of the leg curve that the currents may meet in this period."""
     steep = 0.0
@@ -171,7 +171,7 @@ def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, le
     return max(fewest, min(most, int(steep * slope_gain * period / 0.3) + 1))
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def propagate(
     voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega_rad_per_s,
     period, substeps, crossing_substeps,
@@ -261,7 +261,7 @@ def propagate(
     return states, stop_states, current, slope_after, slope_before, rotor_current
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, initial_state):
     """The four-parameter model stepped exactly, the same four-by-four answers as `propagate`, states (n+1, 4).
 
@@ -293,7 +293,7 @@ def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, init
     return states, current, slope_after, slope_before
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
     """(3)-(7) without nonlinear terms: d x/dt into k, terminal current into `current`; `a` resistances aa, ab, bb."""
     gs, gm, g = base[2], base[3], base[5]
@@ -314,14 +314,14 @@ def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
     _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
     qa, qb = branch_current(k, branch_gain, branch_time, EDDY)
     slope[0, t] += shrink * qa
     slope[1, t] += shrink * qb
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def rates_of_unit_states(phase_factor, rotor_factor, omega, base, branch_gain, branch_time):
     """(size, size + 2): d x/dt of `propagate_varying` for each state alone and each voltage alone, at constant factors."""
     size = 4 + 2 * branch_gain.shape[0]
@@ -337,14 +337,14 @@ def rates_of_unit_states(phase_factor, rotor_factor, omega, base, branch_gain, b
     return out
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _resistances(base, phase_factor, a):
     """Stator resistance tensor aa, ab, bb of three phases into `a`."""
     ru, rv, rw = base[0] * phase_factor[0], base[0] * phase_factor[1], base[0] * phase_factor[2]
     a[0], a[1], a[2] = (4.0 * ru + rv + rw) / 6.0, (rw - rv) / (2.0 * SQRT3), 0.5 * (rv + rw)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def propagate_varying(
     voltage_a, voltage_b, voltage_factor, phase_factor, rotor_factor, omega_rad_per_s, period, steps, order, whole_step,
     base, branch_gain, branch_time, initial_state,

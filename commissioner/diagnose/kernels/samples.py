@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from commissioner.diagnose.memory import loop_width, susceptibility
-from commissioner.diagnose.spline import blend, place, saturating
-from commissioner.diagnose.trajectory import EDDY, ROTOR, SQRT3, branch_current, leg_loss
+from commissioner.compiled import kernel
+from commissioner.diagnose.kernels.memory import loop_width, susceptibility
+from commissioner.diagnose.kernels.spline import blend, place, saturating
+from commissioner.diagnose.kernels.trajectory import EDDY, ROTOR, SQRT3, branch_current, leg_loss
 
 (
     VOLT_A, VOLT_B, AMP_A, AMP_B, RATE, SPEED, LEAK_A, LEAK_B, IRON_A, IRON_B, MAG_A, MAG_B, MAG_AA, MAG_AB, MAG_BB, PATH_A, PATH_B,
@@ -21,14 +21,14 @@ derivative, current into the cage, derivative of all magnetizing currents, growt
 """
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _phases(a, b, out):
     out[0] = a
     out[1] = -0.5 * a + 0.5 * SQRT3 * b
     out[2] = -0.5 * a - 0.5 * SQRT3 * b
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def _leg_path(i0, i1, top, knee, intervals, mean):
     """Mean B-spline weights (signed) of a leg along the straight path of its current from i0 to i1, into mean[:]."""
     near = min(abs(i0), abs(i1))
@@ -45,7 +45,7 @@ def _leg_path(i0, i1, top, knee, intervals, mean):
         mean[j + 3] += share * u * u * u
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def at_samples(
     start, stop, states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega,
     base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top, stop_gain, stop_radius, branch_gain, branch_time,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from numba import njit
+from commissioner.compiled import kernel
+from commissioner.diagnose.kernels import samples as row
 
-from commissioner.diagnose import samples as row
 
-
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def forced(last, jump, has_flux, has_more, push, at, terminal, flux, rotor, both, force):
     """What the pushes before and after each period do to the states at its end, (4, B+1); `both` (4, B+1) is room to work in."""
     for c in range(2):
@@ -28,7 +27,7 @@ def forced(last, jump, has_flux, has_more, push, at, terminal, flux, rotor, both
                 force[r, m] += push[r, 6, m] * flux[2, m] + push[r, 7, m] * flux[3, m]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def marched(first, last, x, step, amp, force, terminal, out):
     """States (4,) marched through rows `first` ... `last` - 1, derivatives of the current into `out` (2, rows)."""
     x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
@@ -44,7 +43,7 @@ def marched(first, last, x, step, amp, force, terminal, out):
     x[0], x[1], x[2], x[3] = x0, x1, x2, x3
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def marched_with_memory(
     first, last, own, nu, shrink, beta, branch, x, z, q, flux, rate, fed, step, push, amp, cage, cage_push, at, memory,
     force, terminal, rotor, out,

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from commissioner.compiled import kernel
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def remembered(za, zb, da, db, radius):
     """State z after the input has moved straight by (da, db)."""
     if radius > 0.0:
@@ -27,7 +28,7 @@ def remembered(za, zb, da, db, radius):
     return za * (1.0 - forgotten) + f * da, zb * (1.0 - forgotten) + f * db
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def loop_width(pa, pb, rate):
     """Factor on a memory current at flux (pa, pb), and its derivative by |flux|^2: `rate` |flux|^2 where loops widen with flux, as measured
 
@@ -39,7 +40,7 @@ def loop_width(pa, pb, rate):
     return (power, rate) if rate > 0.0 else ((1.0 + power) ** 2, 2.0 * rate * (1.0 + power))
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def susceptibility(za, zb, da, db, qa, qb, radius):
     """Derivative of `remembered` by (da, db), symmetric aa, ab, bb, and by (za, zb) likewise; (qa, qb) is the direction of
 

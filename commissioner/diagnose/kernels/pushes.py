@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from commissioner.compiled import kernel
 from commissioner.diagnose import kinds
-from commissioner.diagnose import samples as row
-from commissioner.diagnose.memory import loop_width
-from commissioner.diagnose.spline import curve
-from commissioner.diagnose.trajectory import SQRT3
+from commissioner.diagnose.kernels import samples as row
+from commissioner.diagnose.kernels.memory import loop_width
+from commissioner.diagnose.kernels.spline import curve
+from commissioner.diagnose.kernels.trajectory import SQRT3
 
 INTO_FLUX = (kinds.R_S, kinds.PHASE_RESISTANCE, kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE, kinds.VOLTAGE_MOD, kinds.OMEGA)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def tilted(cosine, sine, a, b):
     """The tensor [c s; s -c] of an axis times (a, b)."""
     return cosine * a + sine * b, sine * a - cosine * b
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def starts(kind_of, indices, flux_before, coupled, splits_a, splits_b, x):
     """Derivatives (P, 4) of the state that a segment begins with."""
     fa, fb, ta, tb = flux_before[0, 0], flux_before[0, 1], flux_before[1, 0], flux_before[1, 1]
@@ -45,7 +45,7 @@ def starts(kind_of, indices, flux_before, coupled, splits_a, splits_b, x):
             x[p, n - 2] = 1.0
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def pushes(
     kind, n, start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels, base, branch_time,
     stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost, magnetizing, current, terminal, flux, rotor,
@@ -147,7 +147,7 @@ def pushes(
             rotor[0, m], rotor[1, m] = tilted(rr * splits_a, rr * splits_b, ca, cb)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", nogil=True)
+@kernel
 def through_the_circuit(last, nu, shrink, cage_push, magnetizing, current, terminal, rotor):
     """What pushes inside the machine are at its terminals and in w, added to `terminal` and in place of `rotor`."""
     for m in range(1, last):

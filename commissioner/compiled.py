@@ -1,0 +1,29 @@
+"""How the kernels of the extended model are compiled, and that none is older than what was compiled into it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+
+FAST: Any = {"cache": True, "fastmath": True, "error_model": "numpy", "nogil": True}
+kernel: Any = njit(**FAST)
+"""Cached beside its file; other threads run meanwhile."""
+inlined: Any = njit(inline="always", **FAST)
+"""A part of a kernel too small to be called."""
+
+
+def forget_stale_kernels(folder: str, beside: str) -> None:
+    """Drop the cached kernels of a folder that are older than any source there, or than `beside` one level up.
+
+    numba looks at a kernel's own file only: after an update it would go on with what it had inlined from another.
+    Where `NUMBA_CACHE_DIR` sends the caches elsewhere, they are its owner's to drop.
+    """
+    here = Path(folder)
+    newest = max(path.stat().st_mtime for path in (*here.glob("*.py"), here.parent / beside))
+    for index in (here / "__pycache__").glob("*.nbi"):
+        with suppress(OSError):
+            if index.stat().st_mtime < newest:
+                index.unlink()

@@ -1,0 +1,42 @@
+"""A cached kernel goes when a source it may have been made of is younger; the others stay."""
+
+import os
+
+import pytest
+
+from commissioner.compiled import forget_stale_kernels
+
+NAMES = ("kernels/one.py", "kernels/two.py", "numbers.py")
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Sources of an instant, and kernels cached a second later."""
+    cache = tmp_path / "kernels" / "__pycache__"
+    cache.mkdir(parents=True)
+    for name in (*NAMES, "kernels/__pycache__/one.f-1.py311.nbi"):
+        path = tmp_path / name
+        path.touch()
+        os.utime(path, (1000.0, 1001.0 if path.suffix == ".nbi" else 1000.0))
+    return tmp_path
+
+
+def cached(package):
+    forget_stale_kernels(str(package / "kernels"), "numbers.py")
+    return [path.name for path in (package / "kernels" / "__pycache__").iterdir()]
+
+
+def test_kernels_younger_than_every_source_stay(package):
+    assert cached(package) == ["one.f-1.py311.nbi"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_younger_source_drops_them(package, name):
+    os.utime(package / name, (1002.0, 1002.0))
+    assert cached(package) == []
+
+
+def test_a_folder_without_a_cache_is_left_alone(tmp_path):
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "numbers.py").touch()
+    forget_stale_kernels(str(tmp_path / "kernels"), "numbers.py")
