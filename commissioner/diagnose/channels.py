@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,21 +136,30 @@ def _since_start(record: Record, segment: Segment) -> Array:
 def _sag(record: Record) -> Named:
     """Minus lagged electrical power over rated power; and the link's own course where it was recorded."""
     names = tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S)
-    out = [-np.stack([lagged_power(record, s, lag) for lag in SAG_LAGS_S], axis=1) for s in record.segments]
+    period = record.facts.sample_period_s
+    powers = [power_drawn(record, s) for s in record.segments]
+    out = [-np.stack([behind_lag(power, period, lag) for lag in SAG_LAGS_S], axis=1) for power in powers]
     recorded = recorded_sag(record)
     if not recorded or max(float(np.std(r)) for r in recorded) < LEAST_SWING:
         return names, out
     return (*names, RECORDED_LINK), [np.column_stack(pair) for pair in zip(out, recorded, strict=True)]
 
 
-def lagged_power(record: Record, segment: Segment, lag_s: float, shape: float = 0.0) -> Array:
-    """Mean over each period, (n,), of the electrical power over rated power behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`,
-
-    q = `shape`; the command of a sample acts on the current until the next.
-    """
+def power_drawn(record: Record, segment: Segment) -> Array:
+    """Mean over each period, (n,), of the electrical power over rated power; the command of a sample acts on the current until the next."""
     current = segment.axis_current_a
     over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
-    power = 1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w
+    return np.asarray(1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w)
+
+
+def behind_lag(power: Array, period_s: float, lag_s: float, shape: float = 0.0) -> Array:
+    """Mean over each period of a power, held over each, behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`, q = `shape`."""
+    return np.asarray(lfilter(*_lag_filter(period_s, lag_s, shape), power))
+
+
+@lru_cache(maxsize=64)
+def _lag_filter(period_s: float, lag_s: float, shape: float) -> tuple[Array, Array]:
+    """Numerator and denominator per sample."""
     # state (output, S times its slope if there is one), input, and the output's integral
     order = 2 if shape > 0.0 else 1
     rates = np.zeros((order + 2, order + 2))
@@ -157,10 +167,10 @@ def lagged_power(record: Record, segment: Segment, lag_s: float, shape: float = 
         rates[0, 1], rates[1, :3] = 1.0 / lag_s, np.array([-1.0, -1.0, 1.0]) / (shape * lag_s)
     else:
         rates[0, :2] = -1.0 / lag_s, 1.0 / lag_s
-    rates[-1, 0] = 1.0 / record.facts.sample_period_s
-    step = expm(rates * record.facts.sample_period_s)
+    rates[-1, 0] = 1.0 / period_s
+    step = expm(rates * period_s)
     top, bottom = ss2tf(step[:order, :order], step[:order, [order]], step[[-1], :order], step[[-1], [order]])
-    return np.asarray(lfilter(top[0], bottom, power))
+    return top[0], bottom
 
 
 def _hats(record: Record, name: str) -> Named:

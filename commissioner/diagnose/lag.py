@@ -78,7 +78,7 @@ def by_shape(current: Between, lag: float, shape: float, late: Array) -> Array:
     return np.asarray((more - less) / (shape + SHAPE_STEP - low))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _unforced(u, lag, shape, out):
     """The filter without input, `u` samples on: values from a value and from a slope of 1, then the slopes of both."""
     if shape == 0.0:
@@ -102,7 +102,7 @@ def _unforced(u, lag, shape, out):
     out[3] = out[0] - out[1] / (shape * lag)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _forced(y0, y1, m0, m1, u, lag, shape, out):
     """Value and slope, `u` samples after y0, of the filter's polynomial answer to the cubic from y0 to y1 with slopes m0, m1."""
     a, b = 2.0 * (y0 - y1) + m0 + m1, 3.0 * (y1 - y0) - 2.0 * m0 - m1
@@ -112,7 +112,7 @@ def _forced(y0, y1, m0, m1, u, lag, shape, out):
     out[1] = rise - lag * bend + second * twist
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _behind(values, after, before, held, late, lag, shape, value, slope):
     rows, n = values.shape
     lagged, rate = np.zeros((rows, n)), np.zeros((rows, n))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _hermite(values, after, before, late, period, out, slope):
     rows, n = values.shape
     for k in range(n):
@@ -47,7 +47,7 @@ def resample_hermite(values: Array, after: Array, before: Array, late: Array, pe
     return out, slope
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lagrange(values, late, out):
     rows, n = values.shape
     for k in range(n):

@@ -50,7 +50,7 @@ def sense(
         slope_of_sensor = 1.0 + gain + s * (2.0 * even + 3.0 * s * odd)
         for row in rows:
             jacobian[row] *= slope_of_sensor
-    ages = _ages(record, segment)
+    ages = _ages(record, segment) if DRIFT in {t.kind for t in (*model.terms, *listed)} else []
     drift = model.sum_kind(DRIFT, 3 * len(ages)).reshape(len(ages), 3)[:, :phases]
     if drift.any():
         sensed += drift.T @ np.stack(ages)

@@ -137,7 +137,8 @@ def nearest_course(course: Array, of: Callable[[float], Array], tried: Array, we
 
 def as_much_of(one: Array, course: Array, weight: float | Array = 1.0) -> tuple[float, Array]:
     """How much >= 0 of `one` comes nearest to `course` but for a constant, and what is left of it, times the weight."""
-    table = np.stack([one, np.ones(course.size)], axis=1) * np.broadcast_to(weight, course.size)[:, None]
-    found, *_ = np.linalg.lstsq(table, weight * course, rcond=None)
-    found[0] = max(found[0], 0.0)
-    return float(found[0]), np.asarray(weight * course - table @ found)
+    constant = np.broadcast_to(np.asarray(weight, dtype=np.float64), course.shape)
+    power = float(constant @ constant)
+    one, course = (constant * x - constant * (float(constant @ (constant * x)) / power) for x in (one, course))
+    size = max(float(one @ course) / max(float(one @ one), 1e-300), 0.0)
+    return size, course - size * one

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channels import RECORDED_LINK, SAG_LAGS_S, lagged_power
+from commissioner.diagnose.channels import RECORDED_LINK, SAG_LAGS_S, behind_lag, power_drawn
 from commissioner.diagnose.effects.effect import (
     Effect,
     Setting,
@@ -120,8 +120,10 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
     ])
 
+    powers, period = [power_drawn(record, s) for s in first], record.facts.sample_period_s
+
     def lagged(log_lag: float, shape: float = 0.0) -> Array:
-        return -np.concatenate([lagged_power(record, s, float(np.exp(log_lag)), shape) for s in first])
+        return -np.concatenate([behind_lag(power, period, float(np.exp(log_lag)), float(shape)) for power in powers])
 
     size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
     left = as_much_of(lagged(log_lag), course, weight)[1]
