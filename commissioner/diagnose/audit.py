@@ -33,6 +33,8 @@ MOST_CLIPPED = 0.3
 REST_SAMPLES = 1
 LEAST_AT_PEAKS = 0.5
 """Of a command's power, where it consists of tones: the rest of their lines is beside them by the window alone."""
+LONGEST_REST_S = 1.0
+"""Of a rest before the first command, which tells the noise and nothing else."""
 MOST_LINES = 200
 """Of one segment: a random binary command has thousands of lines, and none is free of sums of others."""
 
@@ -69,6 +71,7 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
             pieces, lost = _pieces(recording, currents, good, link, swing, part, file, facts)
             holes.extend(lost)
             segments.extend(pieces)
+    segments = [_after_long_rest(s, round(LONGEST_REST_S / facts.sample_period_s)) for s in segments]
     kept = [s for s in segments if s.count >= SHORTEST_STRETCH]
     if len(kept) < len(segments):
         sentences.append(f"{len(segments) - len(kept)} stretches shorter than {SHORTEST_STRETCH} samples are left out.")
@@ -258,6 +261,10 @@ def _pieces(
             period,
         ))
     return out, holes
+
+
+def _after_long_rest(segment: Segment, most: int) -> Segment:
+    return segment.between(segment.idle - most, segment.count) if segment.idle > most else segment
 
 
 def _is_at_rest(currents: NDArray[np.float64], facts: Facts) -> bool:

@@ -133,7 +133,7 @@ def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
 def with_faster_speed(current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]) -> tuple[Fit, Record, Setting]:
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz."""
     record = with_fine_hats(full, setting.lines_hz)
-    there = replace(setting, record=record.first(max(s.count for s in setting.record.segments)))
+    there = replace(setting, record=record.first(setting.record.commanded))
     speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
     wanted = current.chi2 - max(required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained)

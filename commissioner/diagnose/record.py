@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -71,12 +71,21 @@ class Segment:
         projected: Signal = weights @ self.currents_a / float(weights @ weights)
         return projected
 
+    @cached_property
+    def idle(self) -> int:
+        """Samples before the first command."""
+        return int(np.argmax(self.voltage_axis_v != 0.0))
+
     def first(self, samples: int) -> Segment:
-        """The segment cut after so many samples."""
-        return Segment(
-            self.number, self.file, self.axis_deg, self.time_s[:samples], self.voltage_axis_v[:samples],
-            self.currents_a[:, :samples], self.is_good[:samples], self.link_ratio[:samples], self.starts_at_rest, self.uid,
-            self.flux_before_wb, self.age_s, None if self.link_swing is None else self.link_swing[:samples],
+        """The segment cut so many samples after its first command."""
+        return self.between(0, self.idle + samples)
+
+    def between(self, begin: int, end: int) -> Segment:
+        here = slice(begin, end)
+        return replace(
+            self, time_s=self.time_s[here], voltage_axis_v=self.voltage_axis_v[here], currents_a=self.currents_a[:, here],
+            is_good=self.is_good[here], link_ratio=self.link_ratio[here],
+            link_swing=None if self.link_swing is None else self.link_swing[here],
         )
 
 
@@ -108,6 +117,11 @@ class Record:
     def samples(self) -> int:
         return sum(segment.count for segment in self.segments)
 
+    @property
+    def commanded(self) -> int:
+        """Samples of the longest segment from its first command on: `first(commanded)` leaves it as it is."""
+        return max(s.count - s.idle for s in self.segments)
+
     def channel(self, name: str) -> int:
         return self.channel_names.index(name)
 
@@ -118,7 +132,7 @@ class Record:
         return Record(self.segments, self.facts, self.channel_names + names, channels)
 
     def subset(self, keep: tuple[int, ...], samples: int | None = None) -> Record:
-        """Only the segments at the positions `keep`, each cut after `samples`."""
+        """Only the segments at the positions `keep`, each cut `samples` after its first command."""
         cut = [self.segments[k] if samples is None else self.segments[k].first(samples) for k in keep]
         if not self.channels:
             return Record(tuple(cut), self.facts)
@@ -126,7 +140,7 @@ class Record:
         return Record(tuple(cut), self.facts, self.channel_names, channels)
 
     def first(self, samples: int) -> Record:
-        """So many samples from the beginning of every segment."""
+        """So many samples of every segment from its first command on, and the rest before it."""
         return self.subset(tuple(range(len(self.segments))), samples)
 
     def share_of(self, samples: int) -> int:

@@ -309,7 +309,7 @@ class Steps:
         return current, accepted, dropped
 
     def _part_of(self, full: Record) -> Record:
-        return full.first(max(s.count for s in self.record.segments))
+        return full.first(self.record.commanded)
 
     def with_new_flux_before(self, current: Fit) -> Fit:
         """The flux each segment inherits, by the improved model: a wrong one would pass for remanence."""

@@ -101,6 +101,8 @@ class Machine:
     left_wb: complex = 0.0
     """Flux of the open rotor's current, at the stator, when each segment begins."""
     tones_hz: tuple[float, ...] = field(default=TONES_HZ)
+    rest_s: float = 0.0
+    """Without a command before each segment's."""
     sweeps: bool = False
     """From the first of these to the last, in equal times for equal ratios, instead of all at once."""
 
@@ -124,7 +126,7 @@ def command(machine: Machine, level: float, bias: float, seconds: float, seed: i
         hertz = machine.tones_hz[0] * np.exp(rate * t)
         sizes = SHARE * len(machine.tones_hz) * level * PEAK_A * np.array([abs(impedance(machine, hz)) for hz in hertz])
         out += sizes * np.cos(2.0 * math.pi * (hertz - machine.tones_hz[0]) / rate + random.uniform(-math.pi, math.pi))
-    return np.asarray(out * np.clip(t / 0.1, 0.0, 1.0))
+    return np.concatenate([np.zeros(round(machine.rest_s / PERIOD_S)), out * np.clip(t / 0.1, 0.0, 1.0)])
 
 
 def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> StandstillRecording:
@@ -147,7 +149,7 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
         axes.append(np.full(volt.size, axis))
         volts.append(volt)
         links.append(LINK_V * (1.0 - lost) if machine.records_link else np.full(volt.size, LINK_V))
-        begin += seconds + PAUSE_S
+        begin += machine.rest_s + seconds + PAUSE_S
     u, v, w = np.concatenate(currents, axis=1)
     return StandstillRecording(
         np.concatenate(times), np.concatenate(numbers), np.concatenate(axes), np.concatenate(volts), u, v, w,

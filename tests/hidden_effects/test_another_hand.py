@@ -56,6 +56,13 @@ def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbo
         assert seen.causes[0].sizes[symbol][0] == pytest.approx(size, rel=0.01)
 
 
+def test_a_rest_before_every_command_hides_nothing():
+    """What is explored first is a second of every segment: of its command, whatever was waited for before."""
+    seen, names = named(Machine(sag=0.15, rest_s=1.5), 2.0)
+    assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
+    assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(0.15, rel=0.05)
+
+
 @pytest.mark.parametrize("diffusion_s", [6e-3, long(1.5e-3), long(2e-2)])
 def test_a_solid_bar_is_never_called_iron_loss_alone(diffusion_s):
     """Its layers lie between the paths of the dictionary: judged on the first ones, iron loss had won by thousandths."""

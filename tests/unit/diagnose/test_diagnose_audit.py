@@ -79,6 +79,18 @@ def test_one_tone_is_said_to_carry_little():
     assert any("single tone" in sentence for sentence in prepare([one])[1].sentences)
 
 
+def test_of_a_long_rest_before_the_first_command_the_last_second_is_kept_and_parts_begin_with_the_command():
+    source = measured(seconds=2.4)
+    period, starts = source.sample_period_s, np.r_[True, np.diff(source.segment) != 0]
+    since = np.arange(source.segment.size) - np.flatnonzero(starts)[np.cumsum(starts) - 1]
+    silent = np.where(source.segment == source.segment[0], since * period < 1.3, since == 0)
+    record, _ = prepare([replace(source, voltage_axis_v=np.where(silent, 0.0, source.voltage_axis_v + 1e-9))])
+    assert [s.idle for s in record.segments] == [round(1.0 / period), *(1 for _ in record.segments[1:])]
+    part = record.first(100)
+    assert [s.count for s in part.segments] == [s.idle + 100 for s in record.segments]
+    assert [s.count for s in record.first(part.commanded).segments] == [s.count for s in part.segments]
+
+
 def test_a_random_binary_command_has_no_tones_and_tones_beside_it_keep_theirs():
     """Thousands of lines are no tones: any two of them make every ripple's frequency, and looking at them all took minutes."""
     tones, random = recording(seconds=6.0), np.random.default_rng(3)
@@ -110,5 +122,5 @@ def test_units_that_no_motor_of_the_nameplate_has_are_refused(volts, amps, said)
 def test_of_a_long_record_the_first_part_of_every_segment_is_used(monkeypatch):
     monkeypatch.setattr("commissioner.diagnose.audit.MOST_SAMPLES", 9000)
     record, audit = prepare([measured()])
-    assert [s.count for s in record.segments] == [3000] * 3
+    assert [s.count - s.idle for s in record.segments] == [3000] * 3
     assert any("first 0.6 s of every segment" in sentence for sentence in audit.sentences)
