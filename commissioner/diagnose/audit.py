@@ -252,7 +252,7 @@ def _pieces(
     out = []
     for begin, end in itertools.pairwise(bounds):
         inner = slice(part.start + int(begin), part.start + int(end))
-        out.append(_bridge(
+        out.append(_on_grid(
             Segment(
                 number, file, float(axis[begin]), recording.time_s[inner], recording.voltage_axis_v[inner],
                 currents[:, inner], good[inner], link[inner], bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
@@ -271,12 +271,17 @@ def _is_at_rest(currents: NDArray[np.float64], facts: Facts) -> bool:
     return float(np.abs(currents[:, :REST_SAMPLES]).max()) < 0.05 * facts.current_peak_a
 
 
-def _bridge(segment: Segment, period: float) -> Segment:
-    """Missing rows put back as masked samples; the command there is the smooth curve through its neighbours."""
-    index = np.round((segment.time_s - segment.time_s[0]) / period).astype(int)
-    if index.size < 2 or index[-1] == index.size - 1:
-        return segment
+def _on_grid(segment: Segment, period: float) -> Segment:
+    """On the grid of the period, whatever the time stamps were rounded to. Missing rows are put back as masked samples; the command there
+
+    is the smooth curve through its neighbours.
+    """
+    # step by step: a clock that is not quite the period's is no loss
+    index = np.r_[0, np.cumsum(np.maximum(np.round(np.diff(segment.time_s) / period).astype(int), 1))]
     every = np.arange(index[-1] + 1)
+    time_s = segment.time_s[0] + every * period
+    if every.size == index.size:
+        return replace(segment, time_s=time_s)
     good = np.zeros(every.size, dtype=bool)
     good[index] = segment.is_good
     currents = np.zeros((segment.currents_a.shape[0], every.size))
@@ -284,7 +289,7 @@ def _bridge(segment: Segment, period: float) -> Segment:
     command = CubicSpline(index, segment.voltage_axis_v)(every)
     command[index] = segment.voltage_axis_v
     return Segment(
-        segment.number, segment.file, segment.axis_deg, segment.time_s[0] + every * period, command, currents, good,
+        segment.number, segment.file, segment.axis_deg, time_s, command, currents, good,
         np.interp(every, index, segment.link_ratio), segment.starts_at_rest,
         link_swing=None if segment.link_swing is None else np.interp(every, index, segment.link_swing),
     )

@@ -47,7 +47,7 @@ class Segment:
 
     @cached_property
     def period_s(self) -> float:
-        return float(np.median(np.diff(self.time_s))) if self.count > 1 else 1e-4
+        return float(self.time_s[-1] - self.time_s[0]) / (self.count - 1) if self.count > 1 else 1e-4
 
     @property
     def count(self) -> int:

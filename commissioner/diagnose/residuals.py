@@ -104,7 +104,7 @@ def residuals(
         good = error.segment.is_good
         before, after = error.before[:, good], error.after[:, good]
         axes.setdefault(error.segment.axis_deg, []).append((float((before**2).sum()), float((after**2).sum()), before.size))
-        blocks.extend(_blocks(error.segment.time_s[good], before, after))
+        blocks.extend(_blocks(error.segment.time_s[good] - record.segments[0].time_s[0], before, after))
     order = sorted(axes)
     power = np.array([np.sum(axes[a], axis=0) for a in order])
     table = np.array(blocks)

@@ -25,8 +25,8 @@ from commissioner.recordings.whole import whole_file
 from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES, RunningRecording, Signal, StandstillRecording
 
 MAX_METADATA_LINES = 1000
-STEP_TOLERANCE = 0.02
-"""Time stamps may deviate from the grid by this fraction of a sample period (printed digits, not jitter)."""
+STEP_TOLERANCE, MOST_ROUNDED = 0.02, 0.1
+"""Of a period, by which time steps may differ; and by how much more at most where the time stamps are rounded."""
 
 TEXT_KEYS = frozenset({"connection", "name", "drive", "source", "note", "motor", "scenario", "run", "kind"})
 
@@ -194,19 +194,31 @@ def sample_period(table: Table, segment: Signal) -> float:
             "sort the rows by time and number the segments",
         )
     named = table.metadata.get("sample_period_s")
-    period = float(named) if named not in (None, "") else float(np.median(steps))
+    period = float(named) if named not in (None, "") else _mean_step(steps)
     multiple = steps / period
     deviation = np.abs(multiple - np.maximum(np.round(multiple), 1.0))
     worst = int(np.argmax(deviation))
-    if deviation[worst] > STEP_TOLERANCE:
+    tolerance = STEP_TOLERANCE + min(_resolution(time) / period, MOST_ROUNDED)
+    if deviation[worst] > tolerance:
         raise _refuse(
             table.source,
             "the time steps are not equal",
             float(steps[worst]),
-            f"multiples of {period:.6g} s within {STEP_TOLERANCE:.0%}",
+            f"multiples of {period:.6g} s within {tolerance:.0%}",
             "record at a fixed rate, or resample with known time stamps",
         )
     return period
+
+
+def _mean_step(steps: Signal) -> float:
+    """Of those over one period: time stamps are rounded, and the median is one of two values beside it."""
+    return float(np.mean(steps[np.round(steps / np.median(steps)) <= 1.0]))
+
+
+def _resolution(time: Signal) -> float:
+    """Of time stamps, s: of the last decimal that they are written with, or of the number that holds them."""
+    decimals = (10.0**-d for d in range(3, 10) if np.all(np.abs(time / 10.0**-d - np.round(time / 10.0**-d)) < 1e-3))
+    return max(next(decimals, 0.0), float(np.spacing(np.abs(time).max())))
 
 
 def _read_parquet(path: Path) -> Table:
