@@ -26,8 +26,13 @@ SLOW_BINS = 6.0
 """Below so many bins of the shortest noise record the window smears the spectrum; the power law takes over."""
 SLOW_MARGIN = 1.6
 """Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
-RESOLVED = 1e-6
-"""Share of the current's peak below which nothing counts: no sensor is so good, nor is the model stepped more finely."""
+RESOLVED = 3e-5
+"""Share of the current's peak below which nothing counts: 15 bits. No drive's converter resolves more, nor does a law's form, where a
+
+simulation adds no noise.
+"""
+NOTHING_MORE = 1e-6
+"""Of the variance."""
 SPIKE, RARE = 12.0, 1e-3
 """Of the median deviation, and of the samples: fewer than these beyond that are spikes, not noise."""
 WHITE_WITHIN = 0.12
@@ -91,7 +96,7 @@ class Noise:
                     at_rest = min(self.by_source["zero voltage"][k] ** 2, step**2 * (ratio**2 + 0.25))
                     variance[k] += resting * max(at_rest - variance[k], 0.0)
         hidden = float(np.sum(variance) / np.sum(self.sigma_a**2)) - 1.0
-        if hidden < RESOLVED:
+        if hidden < NOTHING_MORE:
             return stepped
         uncertainty = max(self.uncertainty, min(hidden, 0.1))
         share = float(np.sum(repeating) / np.sum(variance))

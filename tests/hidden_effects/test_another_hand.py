@@ -56,6 +56,12 @@ def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbo
         assert seen.causes[0].sizes[symbol][0] == pytest.approx(size, rel=0.01)
 
 
+def test_a_recording_without_any_noise_has_what_is_in_it():
+    """A law's form is matched to some parts in 1e5 of the peak: what that leaves is no unknown cause."""
+    seen, names = named(Machine(leg_v=3.0, noise=0.0))
+    assert names == {"dead_time": {"dead_time", "device_drop"}} and seen.left.sigma < 0.5
+
+
 def test_a_rest_before_every_command_hides_nothing():
     """What is explored first is a second of every segment: of its command, whatever was waited for before."""
     seen, names = named(Machine(sag=0.15, rest_s=1.5), 2.0)
