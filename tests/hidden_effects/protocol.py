@@ -2,7 +2,8 @@
 
 Draws machines, causes, shapes and noise from seeds, gives the diagnosis the recording alone, opens the key afterwards and
 scores. Rows are appended to the JSON-lines file as they come, so a killed campaign continues where it stopped; beside it
-a markdown table and a reliability diagram are written. `--from-rows` scores what is there and runs nothing.
+a markdown table and a reliability diagram are written. `--from-rows` scores what is there and runs nothing; with
+`--jobs 1` a diagnosis has all cores, as its user's has.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def campaign(cases: Sequence[Case], seconds: float, jobs: int, rows_file: Path) 
     names = {c.name for c in cases}
     rows = [r for r in rows if r["case"] in names and r["segment_seconds"] == seconds]
     with (
-        ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _worker) as pool,
+        ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _worker, (jobs > 1,)) as pool,
         rows_file.open("a") as file,
     ):
         waiting = [pool.submit(run, case, seconds) for case in todo]
@@ -114,9 +115,9 @@ def campaign(cases: Sequence[Case], seconds: float, jobs: int, rows_file: Path) 
     return rows
 
 
-def _worker() -> None:
-    """One thread of arithmetic, warnings as errors, and no life beyond the campaign's."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+def _worker(has_others: bool) -> None:
+    """One thread of arithmetic, one in all beside others; warnings as errors, and no life beyond the campaign's."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", *(["NUMBA_NUM_THREADS"] if has_others else [])):
         os.environ[name] = "1"
     warnings.simplefilter("error")
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
