@@ -81,6 +81,7 @@ class Segment:
         return self.between(0, self.idle + samples)
 
     def between(self, begin: int, end: int) -> Segment:
+        """Its samples from `begin` on, before `end`."""
         here = slice(begin, end)
         return replace(
             self, time_s=self.time_s[here], voltage_axis_v=self.voltage_axis_v[here], currents_a=self.currents_a[:, here],

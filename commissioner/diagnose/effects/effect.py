@@ -138,7 +138,7 @@ def nearest_course(course: Array, of: Callable[[float], Array], tried: Array, we
 def as_much_of(one: Array, course: Array, weight: float | Array = 1.0) -> tuple[float, Array]:
     """How much >= 0 of `one` comes nearest to `course` but for a constant, and what is left of it, times the weight."""
     constant = np.broadcast_to(np.asarray(weight, dtype=np.float64), course.shape)
-    power = float(constant @ constant)
+    power = max(float(constant @ constant), 1e-300)
     one, course = (constant * x - constant * (float(constant @ (constant * x)) / power) for x in (one, course))
     size = max(float(one @ course) / max(float(one @ one), 1e-300), 0.0)
     return size, course - size * one
