@@ -27,8 +27,11 @@ from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.search import EXPLORED, Found
 
 MOSTLY_EXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.95
-COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.003, 0.1
-"""Named as a cause: steps beyond a share of the rated peak current that make a hundredth of the noise power."""
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
+"""Named as a cause: steps beyond a share of the rated peak current (12 bits over 3.7 times that, either way) that make a hundredth of the
+
+noise power.
+"""
 TRUNCATION_SLACK = 0.15
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 LEAST_CONFIDENCE = 0.5

@@ -1,13 +1,14 @@
 """Names and sizes in recordings that another author's machine made, whose laws and integrator are not `sim`'s."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import diagnose
-from tests.hidden_effects.another_hand import TONES_HZ, Machine, recorded
+from tests.hidden_effects.another_hand import PEAK_A, TONES_HZ, Machine, recorded
 from tests.hidden_effects.cases import class_of
 
 
@@ -229,3 +230,10 @@ def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(about):
     _, names = named(Machine(iron_ohm=700.0, **about), 3.0)
     true = class_of("sensor_lag") | class_of("iron_loss")
     assert names and all(found & true for found in names.values()), names
+
+
+@pytest.mark.parametrize(("step", "wanted"), [(2.3e-3, {"quantization"}), (1.4e-3, set())])
+def test_steps_coarser_than_those_of_twelve_bits_are_named(step, wanted):
+    seen = recorded(Machine(noise=3e-4), 1.5)
+    u, v, w = (step * PEAK_A * np.round(i / (step * PEAK_A)) for i in (seen.current_u_a, seen.current_v_a, seen.current_w_a))
+    assert {c.name for c in diagnose([replace(seen, current_u_a=u, current_v_a=v, current_w_a=w)]).causes} == wanted
