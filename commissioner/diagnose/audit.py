@@ -243,9 +243,10 @@ def _pieces(
 ) -> tuple[list[Segment], list[tuple[int, float, int]]]:
     time, period = recording.time_s[part], recording.sample_period_s
     number = int(recording.segment[part][0])
-    missing = np.round(np.diff(time) / period).astype(int) - 1
-    holes = [(number, float(time[k + 1]), int(missing[k])) for k in np.flatnonzero(missing > 0)]
-    cuts = np.flatnonzero(missing > BRIDGED_SAMPLES) + 1
+    # step by step: a clock that is not quite the period's is no loss
+    steps = np.maximum(np.round(np.diff(time) / period).astype(int), 1)
+    holes = [(number, float(time[k + 1]), int(steps[k]) - 1) for k in np.flatnonzero(steps > 1)]
+    cuts = np.flatnonzero(steps > 1 + BRIDGED_SAMPLES) + 1
     axis = recording.axis_deg[part]
     turns = np.flatnonzero(np.diff(axis) != 0) + 1
     bounds = np.unique(np.r_[0, cuts, turns, time.shape[0]])
@@ -258,7 +259,7 @@ def _pieces(
                 currents[:, inner], good[inner], link[inner], bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
                 link_swing=None if swing is None else swing[inner],
             ),
-            period,
+            np.r_[0, np.cumsum(steps[begin : end - 1])], period,
         ))
     return out, holes
 
@@ -271,13 +272,11 @@ def _is_at_rest(currents: NDArray[np.float64], facts: Facts) -> bool:
     return float(np.abs(currents[:, :REST_SAMPLES]).max()) < 0.05 * facts.current_peak_a
 
 
-def _on_grid(segment: Segment, period: float) -> Segment:
-    """On the grid of the period, whatever the time stamps were rounded to. Missing rows are put back as masked samples; the command there
+def _on_grid(segment: Segment, index: NDArray[np.int64], period: float) -> Segment:
+    """Rows at `index` of the period's grid, whatever the time stamps were rounded to. Missing ones are put back as masked samples; the
 
-    is the smooth curve through its neighbours.
+    command there is the smooth curve through its neighbours.
     """
-    # step by step: a clock that is not quite the period's is no loss
-    index = np.r_[0, np.cumsum(np.maximum(np.round(np.diff(segment.time_s) / period).astype(int), 1))]
     every = np.arange(index[-1] + 1)
     time_s = segment.time_s[0] + every * period
     if every.size == index.size:
@@ -288,9 +287,9 @@ def _on_grid(segment: Segment, period: float) -> Segment:
     currents[:, index] = segment.currents_a
     command = CubicSpline(index, segment.voltage_axis_v)(every)
     command[index] = segment.voltage_axis_v
-    return Segment(
-        segment.number, segment.file, segment.axis_deg, time_s, command, currents, good,
-        np.interp(every, index, segment.link_ratio), segment.starts_at_rest,
+    return replace(
+        segment, time_s=time_s, voltage_axis_v=command, currents_a=currents, is_good=good,
+        link_ratio=np.interp(every, index, segment.link_ratio),
         link_swing=None if segment.link_swing is None else np.interp(every, index, segment.link_swing),
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,9 +135,9 @@ def _since_start(record: Record, segment: Segment) -> Array:
 def _sag(record: Record) -> Named:
     """Minus lagged electrical power over rated power; and the link's own course where it was recorded."""
     names = tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S)
-    period = record.facts.sample_period_s
     powers = [power_drawn(record, s) for s in record.segments]
-    out = [-np.stack([behind_lag(power, period, lag) for lag in SAG_LAGS_S], axis=1) for power in powers]
+    lagged = [behind_lag(powers, record.facts.sample_period_s, lag) for lag in SAG_LAGS_S]
+    out = [-np.stack(courses, axis=1) for courses in zip(*lagged, strict=True)]
     recorded = recorded_sag(record)
     if not recorded or max(float(np.std(r)) for r in recorded) < LEAST_SWING:
         return names, out
@@ -152,14 +151,8 @@ def power_drawn(record: Record, segment: Segment) -> Array:
     return np.asarray(1.5 * segment.voltage_axis_v * over_the_period / record.facts.rated_power_w)
 
 
-def behind_lag(power: Array, period_s: float, lag_s: float, shape: float = 0.0) -> Array:
-    """Mean over each period of a power, held over each, behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`, q = `shape`."""
-    return np.asarray(lfilter(*_lag_filter(period_s, lag_s, shape), power))
-
-
-@lru_cache(maxsize=64)
-def _lag_filter(period_s: float, lag_s: float, shape: float) -> tuple[Array, Array]:
-    """Numerator and denominator per sample."""
+def behind_lag(powers: Sequence[Array], period_s: float, lag_s: float, shape: float = 0.0) -> list[Array]:
+    """Means over each period of powers (n,), held over each, behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`, q = `shape`."""
     # state (output, S times its slope if there is one), input, and the output's integral
     order = 2 if shape > 0.0 else 1
     rates = np.zeros((order + 2, order + 2))
@@ -170,7 +163,7 @@ def _lag_filter(period_s: float, lag_s: float, shape: float) -> tuple[Array, Arr
     rates[-1, 0] = 1.0 / period_s
     step = expm(rates * period_s)
     top, bottom = ss2tf(step[:order, :order], step[:order, [order]], step[[-1], :order], step[[-1], [order]])
-    return top[0], bottom
+    return [np.asarray(lfilter(top[0], bottom, power)) for power in powers]
 
 
 def _hats(record: Record, name: str) -> Named:

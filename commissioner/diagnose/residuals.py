@@ -67,6 +67,7 @@ class Residuals:
     by_axis_before_a: Array
     by_axis_after_a: Array
     time_s: Array
+    """Since the first sample."""
     time_before_a: Array
     time_after_a: Array
     spectrum: Spectrum

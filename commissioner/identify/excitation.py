@@ -108,14 +108,13 @@ def design(
     inside = min(1.0, limits.flux_wb / flux, limits.current_a / current)
     amplitudes = inside * amplitudes
     information = _information(estimate, frequencies, amplitudes) * time_s / (2.0 * sample_period_s * limits.noise_a**2)
-    r = [float(v) for v in np.sqrt(np.diag(np.linalg.inv(information)))]
+    r_s, r_r, l_s, l_m = np.sqrt(np.diag(np.linalg.inv(information))).tolist()
     commanded = amplitudes * np.abs(
         1.0 + _lost_resistance(estimate, frequencies, amplitudes, inverter, limits.current_a)
     )
     top = min(1.0, (1.0 - 1e-9) * limits.voltage_v / max(float(np.sum(commanded)), 1e-12))
     excitation = _excitation(top * commanded, frequencies, phases, time_s)
-    std = (r[0], r[1], r[2], r[3])
-    return DesignedExcitation(excitation, inside * flux, inside * current, std, time_s, limits.noise_a)
+    return DesignedExcitation(excitation, inside * flux, inside * current, (r_s, r_r, l_s, l_m), time_s, limits.noise_a)
 
 
 def _excitation(amplitudes: Signal, frequencies: Signal, phases: Signal, seconds: float) -> Excitation:
@@ -200,9 +199,8 @@ def _minimax(
         )
         return float(math.log(np.max(errors)) + 5.0 * crowding)
 
-    found = start
+    found, options = start, {"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}
     for _ in range(2):
-        options = {"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}
         found = minimize(worst, found, method="Nelder-Mead", options=options).x
     f = np.exp(np.clip(found[:TONE_COUNT], math.log(lowest), math.log(highest)))
     order = np.argsort(f)

@@ -198,7 +198,9 @@ def sample_period(table: Table, segment: Signal) -> float:
     multiple = steps / period
     deviation = np.abs(multiple - np.maximum(np.round(multiple), 1.0))
     worst = int(np.argmax(deviation))
-    tolerance = STEP_TOLERANCE + min(_resolution(time) / period, MOST_ROUNDED)
+    tolerance = STEP_TOLERANCE
+    if deviation[worst] > tolerance:
+        tolerance += min(_resolution(time) / period, MOST_ROUNDED)
     if deviation[worst] > tolerance:
         raise _refuse(
             table.source,

@@ -123,7 +123,7 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     powers, period = [power_drawn(record, s) for s in first], record.facts.sample_period_s
 
     def lagged(log_lag: float, shape: float = 0.0) -> Array:
-        return -np.concatenate([behind_lag(power, period, float(np.exp(log_lag)), float(shape)) for power in powers])
+        return -np.concatenate(behind_lag(powers, period, float(np.exp(log_lag)), shape))
 
     size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
     left = as_much_of(lagged(log_lag), course, weight)[1]
