@@ -12,7 +12,7 @@ from commissioner.diagnose.audit import Audit
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.evidence import (
     TIE_CHI2,
-    Rival,
+    Dropped,
     alternatives,
     claim_features,
     confidence,
@@ -69,9 +69,10 @@ def causes_of(
 
     `trust`: factor on every confidence (see `doubt`).
     """
-    rivals = _rivals(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
-    causes = [_cause(found, name, rest, rivals.get(name, {}), noise, excluded, trust) for name in found.accepted]
-    causes = _without_truncation(_with_open_ties(causes, rivals), audit)
+    refitted = _refitted_without(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
+    without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
+    causes = [_cause(found, name, rest, without[name], noise, excluded, trust) for name in found.accepted]
+    causes = _without_truncation(_with_open_ties(causes, without), audit)
     losses = () if rest.from_bursts_sigma > 0.0 and not found.accepted else found.losses
     causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
@@ -101,12 +102,12 @@ def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
     return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
 
 
-def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, dict[str, Rival]]:
-    """Alternatives of the causes `asked` about, tried on the first part of every segment where that shows them as well."""
+def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
+    """Fits without each of the causes `asked` about, on the first part of every segment where that shows them as well."""
     if not asked:
         return {}
     record, layout = found.record, found.layout
-    out: dict[str, dict[str, Rival]] = {}
+    out: dict[str, Dropped] = {}
     for samples in (*EXPLORED, record.samples):
         if len(out) == len(asked):
             break
@@ -120,16 +121,16 @@ def _rivals(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence
 
 
 def _cause(
-    found: Found, name: str, rest: Leftover, rivals: Mapping[str, Rival], noise: Noise, excluded: Sequence[str],
-    trust: float,
+    found: Found, name: str, rest: Leftover, without: Dropped, noise: Noise, excluded: Sequence[str], trust: float,
 ) -> Cause:
-    gain = found.gains[name]
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    # where the way to a cause bends, the loss foretold at its end falls short of a fit's
+    gain = total if found.accepted == (name,) else max(found.gains[name], min(without.loss, total))
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
     close = tuple(
-        n for n, r in rivals.items() if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
+        n for n, r in without.rivals.items() if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
     )
     features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
@@ -141,15 +142,15 @@ def _cause(
     return Cause(
         name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
         strength, gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
-        {n: r.loss for n, r in rivals.items()}, tuple(features),
+        {n: r.loss for n, r in without.rivals.items()}, tuple(features),
     )
 
 
-def _with_open_ties(causes: Sequence[Cause], rivals: Mapping[str, Mapping[str, Rival]]) -> list[Cause]:
+def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> list[Cause]:
     """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one: either may be true."""
     out = []
     for cause in causes:
-        tied = [rivals[c.name][n] for c in causes if c is not cause for n in c.equivalent if n in rivals.get(c.name, {})]
+        tied = [without[c.name].rivals[n] for c in causes if c is not cause for n in c.equivalent if n in without[c.name].rivals]
         sizes = {}
         for key, (value, spread, unit) in cause.sizes.items():
             moved = [0.5 * r.moved.get(cause.name, {}).get(key, 0.0) for r in tied]

@@ -94,12 +94,21 @@ class Rival:
     moved: Mapping[str, Mapping[str, float]]
 
 
+@dataclass(frozen=True)
+class Dropped:
+    """A fit without one cause: the loss in chi2, scaled to the whole recording, and what of the rest takes its place."""
+
+    loss: float
+    rivals: Mapping[str, Rival]
+
+
 def alternatives(
     found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
     excluded: Sequence[str], asked: Sequence[str],
-) -> dict[str, dict[str, Rival]]:
-    """For every accepted cause that is `asked` about: what of the rest (but for `excluded`) takes its place."""
-    out: dict[str, dict[str, Rival]] = {}
+) -> dict[str, Dropped]:
+    """For every accepted cause that is `asked` about: the fit without it, and with one of the rest (but for `excluded`) in its place."""
+    scale = whole / record.samples
+    out: dict[str, Dropped] = {}
     for name in asked:
         enough = max(ROUGHLY * loss_without(found, name), 1.0)
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=enough)
@@ -118,13 +127,12 @@ def alternatives(
             if trial.chi2 - found.chi2 > TIE_CHI2:
                 trial, there = with_closer_paths(trial, there, noise, wanted)
             if is_plausible(trial.model, score.name, there):
-                loss = (trial.chi2 - found.chi2) * whole / record.samples
-                rivals[score.name] = Rival(loss, _moved(found.model, trial.model, [n for n in accepted if n != name], there))
+                rivals[score.name] = Rival((trial.chi2 - found.chi2) * scale, _moved(found.model, trial.model, [n for n in accepted if n != name], there))
         if EDGE.symbol in found.model.of(name) and "sampling_delay" in absent:
             late = fit(read_late(found.model, found.model.nominal[2]), record, layout, noise, wanted_chi2=wanted)
-            loss = (late.chi2 - found.chi2) * whole / record.samples
-            rivals["sampling_delay"] = Rival(loss, _moved(found.model, late.model, [n for n in accepted if n != name], setting))
-        out[name] = rivals
+            moved = _moved(found.model, late.model, [n for n in accepted if n != name], setting)
+            rivals["sampling_delay"] = Rival((late.chi2 - found.chi2) * scale, moved)
+        out[name] = Dropped(gain * scale, rivals)
     return out
 
 

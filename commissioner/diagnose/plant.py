@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.kernels.pushes import tilted
 from commissioner.diagnose.kernels.spline import cells_of
 from commissioner.diagnose.kernels.tangent import sensitivities
 from commissioner.diagnose.kernels.trajectory import (
@@ -22,6 +21,7 @@ from commissioner.diagnose.kernels.trajectory import (
 )
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.starts import initial_state, slopes_of_start
 from commissioner.diagnose.terminals import sense
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
     drive = modulation(model, segment, channels)
     machine = _machine(model, layout, asked)
     period = segment.period_s
-    start = initial_state(model, segment, _decay_tilt(machine[0]))
+    start = initial_state(model, segment, machine)
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v}
@@ -157,14 +157,13 @@ def _tangent(
     place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}
     at_work = np.array([*kinds.NOMINAL, *(t.kind for t in asked)], dtype=np.int64)
     indices = np.array([0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64)
-    before = np.array(segment.flux_before_wb)
-    flux_before = np.stack([before, _per_tilt(_carried(model, segment)[0]) * before])
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
         path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE}), layout.legs_vectors),
         cells_of(_if(kinds.IRON_CURVE in wanted, layout.iron_vectors)),
-        cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)), flux_before, out,
+        cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)),
+        slopes_of_start(model, segment, path.machine, layout, asked), out,
     )
     return out
 
@@ -229,44 +228,6 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, 
 
 def _if(is_used: bool, vectors: Array) -> Array:
     return vectors if is_used else vectors[:0]
-
-
-def initial_state(model: Model, segment: Segment, tilt: Array) -> Array:
-    """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component."""
-    state = np.zeros(4)
-    along, across = _carried(model, segment)
-    alpha, beta = segment.flux_before_wb
-    turned = _per_tilt(along) * np.array(tilted(tilt[0], tilt[1], alpha, beta))
-    left = np.array([along * alpha - across * beta, along * beta + across * alpha]) + turned
-    state[:] = [*left, *left]
-    for term, value in zip(model.terms, model.values, strict=True):
-        if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
-            if term.index < 2:
-                state[term.index] += value
-                state[2 + term.index] += value
-            else:
-                state[term.index - 2] += value
-    return state
-
-
-def _carried(model: Model, segment: Segment) -> tuple[float, float]:
-    """Share of the flux before that is left at the start: along it and across."""
-    along, across = (
-        sum(v for t, v in zip(model.terms, model.values, strict=True)
-            if t.kind == kinds.CARRY and t.index == k and t.segment in (-1, segment.uid))
-        for k in (0, 1)
-    )
-    return along, across
-
-
-def _per_tilt(along: float) -> float:
-    """What a tilt of the open machine's rate R_R / L_M changes in the share left: exp(-t R_R / L_M (1 + tilt)), first order."""
-    return along * float(np.log(along)) if 0.0 < along < 1.0 else 0.0
-
-
-def _decay_tilt(base: Array) -> Array:
-    """(2,) tilt of R_R / L_M."""
-    return base[6:8] + base[10:12]
 
 
 def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:

@@ -21,31 +21,6 @@ def tilted(cosine, sine, a, b):
 
 
 @kernel
-def starts(kind_of, indices, flux_before, coupled, splits_a, splits_b, x):
-    """Derivatives (P, 4) of the state that a segment begins with."""
-    fa, fb, ta, tb = flux_before[0, 0], flux_before[0, 1], flux_before[1, 0], flux_before[1, 1]
-    for p in range(kind_of.shape[0]):
-        kind, n = kind_of[p], indices[p]
-        qa = qb = 0.0
-        if kind == kinds.CARRY:
-            qa, qb = fa if n == 0 else -fb, fb if n == 0 else fa
-        elif kind == kinds.ROTOR_ANISOTROPY:
-            qa, qb = tilted(1.0 - n, n, ta, tb)
-        elif kind == kinds.LEAKAGE_ANISOTROPY:
-            qa, qb = tilted(coupled * (1.0 - n), coupled * n, ta, tb)
-        elif kind == kinds.MAGNETIZING_ANISOTROPY:
-            qa, qb = tilted((1.0 - coupled) * (1.0 - n), (1.0 - coupled) * n, ta, tb)
-        elif kind == kinds.ANISOTROPY_SPLIT:
-            qa, qb = tilted(splits_a, splits_b, ta, tb)
-        elif kind == kinds.INITIAL_FLUX and n < 2:
-            qa, qb = 1.0 - n, n
-        # a flux without current is in stator and rotor alike
-        x[p, 0], x[p, 1], x[p, 2], x[p, 3] = qa, qb, qa, qb
-        if kind == kinds.INITIAL_FLUX and n >= 2:
-            x[p, n - 2] = 1.0
-
-
-@kernel
 def pushes(
     kind, n, start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels, base, branch_time,
     stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost, magnetizing, current, terminal, flux, rotor,

@@ -22,7 +22,7 @@ from commissioner.compiled import kernel
 from commissioner.diagnose import kinds
 from commissioner.diagnose.kernels import samples as row
 from commissioner.diagnose.kernels.march import forced, marched, marched_with_memory
-from commissioner.diagnose.kernels.pushes import INTO_FLUX, pushes, starts, through_the_circuit
+from commissioner.diagnose.kernels.pushes import INTO_FLUX, pushes, through_the_circuit
 from commissioner.diagnose.kernels.samples import at_samples
 from commissioner.diagnose.kernels.trajectory import SQRT3
 
@@ -137,13 +137,13 @@ def sensitivities(
     omega_rad_per_s, channels, period,
     base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
     stop_gain, stop_radius, branch_gain, branch_time,
-    kind_of, indices, legs_vectors, iron_vectors, leak_vectors, flux_before, out,
+    kind_of, indices, legs_vectors, iron_vectors, leak_vectors, start_slopes, out,
 ):
     """Fills `out` (2, P, n): d i / d parameter at every sample, for the kinds and `indices` (P,) listed.
 
     `states`, `stop_states` and everything before `kind_of` are the trajectory's. `legs_vectors` (K, width) are B-spline weights,
-    `iron_vectors` and `leak_vectors` (K, intervals, 4) cells; empty where no listed parameter needs them. `flux_before` (2, 2):
-    the flux that the segment before left, and what of it decays more per tilt of R_R / L_M.
+    `iron_vectors` and `leak_vectors` (K, intervals, 4) cells; empty where no listed parameter needs them. `start_slopes`
+    (P, 4): d (psi_s, psi_R) / d parameter at the first sample.
     """
     samples, count = voltage_a.shape[0], kind_of.shape[0]
     working = np.flatnonzero(stop_gain)
@@ -170,11 +170,10 @@ def sensitivities(
     both, force = np.zeros((4, rows)), np.zeros((SIDE_BY_SIDE, 4, rows))
 
     # what a parameter takes from block to block: state, pushes into current and w, and those of what remembers
-    x, pushed, fed = np.zeros((count, 4)), np.zeros((count, 4)), np.zeros((count, 4))
+    x, pushed, fed = start_slopes.copy(), np.zeros((count, 4)), np.zeros((count, 4))
     z, q = np.zeros((count, working.shape[0], 2)), np.zeros((count, bars.shape[0], 2))
     moved, rate = np.zeros((count, 2)), np.zeros((count, 2))
     own = (kind_of == kinds.NU).astype(np.float64)
-    starts(kind_of, indices, flux_before, base[14], base[15], base[16], x)
     for p in range(count):
         for c in range(2):
             moved[p, c] = (1.0 - nu) * x[p, 2 + c] + nu * x[p, c]

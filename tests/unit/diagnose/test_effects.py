@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.model import Model
-from commissioner.diagnose.nominal import CARRY
-from commissioner.diagnose.plant import initial_state, predict
+from commissioner.diagnose.plant import predict
 
 NAMES = [
     "dead_time",
@@ -267,32 +265,6 @@ def test_sensitivities_beside_every_other_effect_are_exact(crowded, setting, nam
         size = np.sqrt(np.mean(slope**2))
         about = model.terms[row - 4].symbol if row > 3 else row
         assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) <= 0.02 * size, (about, size)
-
-
-@pytest.mark.parametrize("symbol", ["leakage_cos", "leakage_sin", "magnetizing_cos", "magnetizing_sin", "split"])
-def test_sensitivities_of_tilted_inductances_hold_with_flux_from_the_segment_before(nominal, setting, symbol):
-    """What is left of that flux tilts with the open machine's rate, and the cage's resistance by the share of the leakage."""
-    terms = (*CATALOGUE["inductance_anisotropy"].terms(setting), *CARRY)
-    held = {"leakage_cos": 0.02, "leakage_sin": -0.03, "magnetizing_cos": 0.04, "split": 0.2, "flux_carried_over": 0.4}
-    model = Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
-    segments = list(setting.record.segments)
-    segments[1] = replace(segments[1], flux_before_wb=(0.3, -0.2))
-    behind = replace(setting, record=replace(setting.record, segments=tuple(segments)))
-    row = 4 + [t.symbol for t in terms].index(symbol)
-    jacobian = predict(model, behind.record, 1, behind.layout, wanted=terms).jacobian[row]
-    slope = central_slope(model, behind, row, 1e-3)
-    assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
-
-
-def test_carried_flux_that_tilts_is_what_an_open_machine_keeps(nominal, setting):
-    """psi(t) = exp(-t R_R / L_M (1 + tilt)) psi(0), the tilt of the rate that of both."""
-    terms = (*CATALOGUE["inductance_anisotropy"].terms(setting), *CARRY)
-    held = {"magnetizing_cos": 0.03, "magnetizing_sin": 0.02, "split": -0.5, "flux_carried_over": 0.4}
-    model = Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
-    segment = replace(setting.record.segments[1], flux_before_wb=(0.3, -0.2))
-    start = initial_state(model, segment, np.array([0.03, 0.02]))
-    rate = np.log(0.4) * (np.eye(2) + np.array([[0.03, 0.02], [0.02, -0.03]]))
-    assert start[2:4] == pytest.approx(expm(rate) @ [0.3, -0.2], rel=2e-3)
 
 
 @pytest.mark.parametrize(("shape", "delay"), [(0.0, None), (0.25, 100.0 * (1.0 - 0.5**0.5)), (0.5, 100.0)])
