@@ -60,6 +60,13 @@ def test_coarse_steps_that_cut_off_are_named(seed):
     assert [c.name for c in seen.causes] == ["quantization"] and seen.verdict.value == "explained"
 
 
+def test_flux_that_bent_iron_leaves_to_the_next_segment_is_no_remanence():
+    """It decays by the iron's own curve; a straight one's share for all segments left 3.4 times the noise, named remanence, 1.0 sure."""
+    seen, _ = diagnosed(Case("one", 2800147, "magnetizing_saturation"), 2.5)
+    assert [c.name for c in seen.causes] == ["magnetizing_saturation"] and seen.verdict.value == "explained"
+    assert seen.causes[0].gain_share == 1.0
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", [60, 62])
 def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
