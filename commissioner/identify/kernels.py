@@ -211,6 +211,38 @@ def update_factors(first: int, r: float, ff: Array, v: Array, upper: Array, diag
             k_gain[i] += v[j] * old
 
 
+@njit(cache=True, inline="always")
+def worth_of_white_noise(c0: float, c1: float, beta: float) -> float:
+    """Variance times the (AR(1)) length of its correlation, so that an error of the model, which is coloured, is not taken for
+
+    information. `c0`, `c1`: mean square and lagged product of the error; 1 / `beta` the samples they remember.
+    """
+    rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)
+    rho = 0.0 if rho < 0.0 else (0.999 if rho > 0.999 else rho)
+    return c0 * (1.0 + rho) / (1.0 - rho)
+
+
+@njit(cache=True, inline="always")
+def feed_back(
+    loop: Array, open_loop: float, seen: float, slope_now: float, slope_next: float,
+    t1: float, t2: float, t3: float, t4: float, f1: float, f2: float,
+) -> None:
+    """The inverter's loss follows the predicted current: what that adds to the current's derivative by one number of theta.
+
+    `loop` (4,) filters that derivative's feedback, two states of y and two of u; `open_loop` is its filter without it, `seen`
+    the derivative at this sample; `slope_*` the loss's slope at both ends of the period.
+    """
+    g1, g2 = 1.0 - f1, 1.0 - f2
+    gain = t3 * g1 + t4 * g2
+    held = t1 * loop[0] + t2 * loop[1] + t3 * loop[2] + t4 * loop[3]
+    loop[0] = f1 * loop[0] + g1 * held
+    loop[1] = f2 * loop[1] + g2 * held
+    free = open_loop + (t1 * loop[0] + t2 * loop[1] + t3 * f1 * loop[2] + t4 * f2 * loop[3])
+    back = -0.5 * (slope_now * seen + slope_next * free) / (1.0 + 0.5 * gain * slope_next)
+    loop[2] = f1 * loop[2] + g1 * back
+    loop[3] = f2 * loop[3] + g2 * back
+
+
 @njit(cache=True)
 def advance(
     u: Array,
@@ -282,8 +314,7 @@ def advance(
             extra = lookup(extra_a, extra_span, (free - ad00 * yl) / ad01 + machine[2] * yl)
         e = y[k] - offset - extra - yl
 
-        # Noise level: variance times the (AR(1)) length of its correlation, so that an error of the model, which is
-        # coloured, is not taken for information.
+        # Noise level.
         if law != FROZEN:
             c0 += beta * (e * e - c0)
             c1 += beta * (e * e_last - c1)
@@ -291,9 +322,7 @@ def advance(
             squares += e * e
 
         if recurses:
-            rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)
-            rho = 0.0 if rho < 0.0 else (0.999 if rho > 0.999 else rho)
-            r = c0 * (1.0 + rho) / (1.0 - rho) + noise_floor
+            r = worth_of_white_noise(c0, c1, beta) + noise_floor
             psi[2], psi[3], psi[4], psi[5], psi[6] = 1.0, py1, py2, pu1, pu2
             if has_lost:
                 for j in range(4):
@@ -375,16 +404,9 @@ def advance(
         py1, py2 = f1 * py1 + g1 * p, f2 * py2 + g2 * p
         pu1, pu2 = f1 * pu1 + g1 * q, f2 * pu2 + g2 * q
         if has_lost and recurses:
-            gain = t3 * g1 + t4 * g2
             for j in range(4):
-                held = t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * loop[j, 2] + t4 * loop[j, 3]
-                loop[j, 0] = f1 * loop[j, 0] + g1 * held
-                loop[j, 1] = f2 * loop[j, 1] + g2 * held
-                free = py1 if j == 0 else (py2 if j == 1 else (pu1 if j == 2 else pu2))
-                free += t1 * loop[j, 0] + t2 * loop[j, 1] + t3 * f1 * loop[j, 2] + t4 * f2 * loop[j, 3]
-                back = -0.5 * (slope_now * seen[j] + slope_next * free) / (1.0 + 0.5 * gain * slope_next)
-                loop[j, 2] = f1 * loop[j, 2] + g1 * back
-                loop[j, 3] = f2 * loop[j, 3] + g2 * back
+                open_loop = py1 if j == 0 else (py2 if j == 1 else (pu1 if j == 2 else pu2))
+                feed_back(loop[j], open_loop, seen[j], slope_now, slope_next, t1, t2, t3, t4, f1, f2)
         if absorbing:
             s1, s2 = t1 * d11 + t2 * d21, t1 * d12 + t2 * d22
             d11, d12 = f1 * d11 + g1 * s1, f1 * d12 + g1 * s2

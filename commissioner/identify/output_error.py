@@ -88,6 +88,79 @@ def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, p
     return g, slope
 
 
+@njit(cache=True, inline="always")
+def _add_sample(
+    e: float, w: float, si: Array, first_own: int, wanted: Array, information: Array, score: Array, block_scores: Array, block: int
+) -> None:
+    """One residual of weight w and its sensitivities `si` into the normal equations; that of the offset is one."""
+    for a in range(wanted.size):
+        if wanted[a] > 0.0:
+            wa = w * (si[a] if a != first_own else 1.0)
+            score[a] += wa * e
+            block_scores[block, a] += wa * e
+            for b in range(a):
+                information[a, b] += wa * (si[b] if b != first_own else 1.0)
+            information[a, a] += wa * (si[a] if a != first_own else 1.0)
+
+
+@njit(cache=True, inline="always")
+def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
+    """Share of this part of the period in which the voltage before still acts, and its derivative by `delay` (in periods)."""
+    late, d_late = delay * parts - part, float(parts)
+    if 0.0 <= delay <= 1.0 and parts > 1:
+        if late < 0.0 or late > 1.0:
+            late, d_late = (0.0 if late < 0.0 else 1.0), 0.0
+    elif parts > 1:
+        late, d_late = delay, 1.0
+    return late, d_late
+
+
+@njit(cache=True, inline="always")
+def _current_at_end(
+    theta: Array, exponents: Exponents, flux_scale: float, table: Array, integral: Array, per_a: float, free: float, c1: float,
+    beta: float, b1: float, i0: float, within: float, power: Array,
+) -> tuple[float, float, float, float, float, float]:
+    """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
+
+    inside what is known to hold the root.
+    """
+    i, low, high = i0, -np.inf, np.inf
+    mean, by_i0, by_i1, g, slope_g = 0.0, 0.0, 0.0, 0.0, 0.0
+    for _ in range(_MOST_STEPS):
+        mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i)
+        g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1 * mean, power)
+        missed = i - free + beta * mean - g
+        if abs(missed) <= within:
+            break
+        if missed > 0.0:
+            high = i
+        else:
+            low = i
+        i -= missed / (1.0 + (beta + slope_g * b1) * by_i1)
+        if not low < i < high:
+            i = 0.5 * (low + high)
+    return i, mean, by_i0, by_i1, g, slope_g
+
+
+@njit(cache=True, inline="always")
+def _push_of_loss(basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array) -> None:
+    """Mean of every shape of F over the currents i0 ... i, off the rows of `push` from `first` on."""
+    apart = (i - i0) * per_a
+    cell0, in0, out0 = _locate(basis.shape[0], per_a, i0)
+    cell1, in1, out1 = _locate(basis.shape[0], per_a, i)
+    cell, inside, _ = _locate(basis.shape[0], per_a, 0.5 * (i0 + i))
+    sign = 1.0 if i0 + i >= 0.0 else -1.0
+    for c in range(basis.shape[1]):
+        if abs(apart) < 1e-3:
+            at = sign * (basis[cell, c] + inside * (basis[cell + 1, c] - basis[cell, c]))
+        else:
+            at = basis_integral[cell1, c] - basis_integral[cell0, c]
+            at += in1 * (basis[cell1, c] + 0.5 * in1 * (basis[cell1 + 1, c] - basis[cell1, c]))
+            at -= in0 * (basis[cell0, c] + 0.5 * in0 * (basis[cell0 + 1, c] - basis[cell0, c]))
+            at = (at + (out1 - out0) * basis[-1, c]) / apart
+        push[first + c] -= at
+
+
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate(
     u: Array,
@@ -121,8 +194,8 @@ def simulate(
     `information`, `score`.
 
     First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
-    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising. `basis` (rows, k) tabulates the
-    coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
+    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
+    `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
     from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
     (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
     W e^2.
@@ -164,15 +237,7 @@ def simulate(
         w = weight[k]
         if w > 0.0:
             total += w * e * e
-            row = k // block
-            for a in range(p):
-                if wanted[a] > 0.0:
-                    wa = w * (si[a] if a != first_own else 1.0)
-                    score[a] += wa * e
-                    block_scores[row, a] += wa * e
-                    for b in range(a):
-                        information[a, b] += wa * (si[b] if b != first_own else 1.0)
-                    information[a, a] += wa * (si[a] if a != first_own else 1.0)
+            _add_sample(e, w, si, first_own, wanted, information, score, block_scores, k // block)
         if k == u.size - 1:
             break
         jump = u[k] - v_last
@@ -181,12 +246,7 @@ def simulate(
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
         for part in range(parts):
             # A late step inside: its mean, and its first moment as a centred ramp of that moment.
-            late, d_late = delay * parts - part, float(parts)
-            if 0.0 <= delay <= 1.0 and parts > 1:
-                if late < 0.0 or late > 1.0:
-                    late, d_late = (0.0 if late < 0.0 else 1.0), 0.0
-            elif parts > 1:
-                late, d_late = delay, 1.0
+            late, d_late = _late_share(delay, part, parts)
             tilt, steep = 6.0 * late * (1.0 - late) * jump, 6.0 * (1.0 - 2.0 * late) * jump
             ahead = 0.5 * last_parts / parts
             last_parts = parts
@@ -196,26 +256,14 @@ def simulate(
             c2 = ad[h, 1, 0] * x1 + ad[h, 1, 1] * x2 + b1[h, 1] * held + b2[h, 1] * tilt
             g_last = g
 
-            # The current at the end: i = h (c - b w(i)) + g(c_1 - b_1 w(i)), w the mean loss over the step.
+            # The current at the end.
             mean, by_i0, by_i1 = 0.0, 0.0, 0.0
             i0 = i
             if k_f > 0:
-                free = h_s * c1 + h_r * c2
-                reach = beta * furthest
-                low, high = -np.inf, np.inf
-                for _ in range(_MOST_STEPS):
-                    mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i)
-                    g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1[h, 0] * mean, power)
-                    missed = i - free + beta * mean - g
-                    if abs(missed) <= _SOLVED * (current_span + reach):
-                        break
-                    if missed > 0.0:
-                        high = i
-                    else:
-                        low = i
-                    i -= missed / (1.0 + (beta + slope_g * b1[h, 0]) * by_i1)
-                    if not low < i < high:
-                        i = 0.5 * (low + high)
+                within = _SOLVED * (current_span + beta * furthest)
+                i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
+                    theta, exponents, flux_scale, table, integral, per_a, h_s * c1 + h_r * c2, c1, beta, b1[h, 0], i0, within, power
+                )
             old1, old2 = x1, x2
             x1, x2 = c1 - b1[h, 0] * mean, c2 - b1[h, 1] * mean
             if k_f == 0:
@@ -230,20 +278,7 @@ def simulate(
             push[0] -= extra
             push[DELAY] -= (jump + 0.5 * steep) * d_late
             if k_f > 0:
-                apart = (i - i0) * per_a
-                cell0, in0, out0 = _locate(table.size, per_a, i0)
-                cell1, in1, out1 = _locate(table.size, per_a, i)
-                cell, inside, _ = _locate(table.size, per_a, 0.5 * (i0 + i))
-                sign = 1.0 if i0 + i >= 0.0 else -1.0
-                for c in range(k_f):
-                    if abs(apart) < 1e-3:
-                        at = sign * (basis[cell, c] + inside * (basis[cell + 1, c] - basis[cell, c]))
-                    else:
-                        at = basis_integral[cell1, c] - basis_integral[cell0, c]
-                        at += in1 * (basis[cell1, c] + 0.5 * in1 * (basis[cell1 + 1, c] - basis[cell1, c]))
-                        at -= in0 * (basis[cell0, c] + 0.5 * in0 * (basis[cell0 + 1, c] - basis[cell0, c]))
-                        at = (at + (out1 - out0) * basis[-1, c]) / apart
-                    push[first_f + c] -= at
+                _push_of_loss(basis, basis_integral, per_a, i0, i, first_f, push)
             for j in range(p):
                 d1 = ad[h, 0, 0] * s1[j] + ad[h, 0, 1] * s2[j] + b1[h, 0] * push[j]
                 d2 = ad[h, 1, 0] * s1[j] + ad[h, 1, 1] * s2[j] + b1[h, 1] * push[j]

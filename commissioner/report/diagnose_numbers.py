@@ -31,6 +31,8 @@ def percent(share: float) -> str:
     """Never 100 % where something is left, never 0 % where something is."""
     if 0.9995 <= share < 1.0:
         return "over 99.9 %"
+    if share == 1.0:
+        return "100 %"
     return "under 0.1 %" if 0.0 < share < 0.001 else f"{100.0 * share:.1f} %"
 
 
