@@ -16,7 +16,7 @@ from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, with_ranges
+from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import required_chi2
 from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves
@@ -44,6 +44,8 @@ FINER_SHARE = 2e-3
 """Of what is not explained, so much must go with finer knots: beside a cause that lacks, no curve need be right to the last digit."""
 FASTER_SHARE = 0.2
 """Of what is not explained, so much must go with a faster speed: else another cause makes it."""
+SAME_SLACK = 0.2
+"""The slack of a leg's tail is taken anew where it has moved by more than this part of itself."""
 SAME_RATIO = 0.05
 """L_sigma over L_M is taken anew where it has moved by more than this part of itself."""
 
@@ -60,7 +62,9 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
 def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay), with closer time
 
-    constants where a second path acts, and the ratio of the inductances as it is now; the same setting where nothing is new.
+    constants where a second path acts, and the ratio of the inductances and the slack of the legs as they are now; the same setting
+
+    where nothing is new.
     """
     layout = setting.layout
     reached = largest_fluxes(setting.record, model, layout)
@@ -75,6 +79,9 @@ def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     ratio = leak_ratio(model)
     if abs(ratio - layout.leak_ratio) > SAME_RATIO * ratio:
         fresh = replace(fresh, leak_ratio=ratio)
+    slack = legs_slack_v(model, fresh, setting.facts.current_peak_a)
+    if abs(slack - layout.legs_slack_v) > SAME_SLACK * slack:
+        fresh = replace(fresh, legs_slack_v=slack)
     there = setting if fresh is layout else replace(setting, layout=fresh, iron_flux_wb=flux)
     return with_closer_branches(model, there)
 

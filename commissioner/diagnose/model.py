@@ -38,6 +38,10 @@ class Term:
     """Known function of time that it multiplies, to which `index` points in one record: in another it may lie elsewhere."""
 
 
+LEG_TAIL = 0.15
+"""Of the range of currents on which a leg's loss may bend: beyond, it hardly rises."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """The fixed dictionaries: spline ranges and vectors, stop radii, branch corner frequencies."""
@@ -63,18 +67,22 @@ class Layout:
     channel_ends_a: Array = field(default_factory=lambda: np.ones(3))
     """Largest current that each channel reported: where its end, if it has one, is near."""
 
+    @property
+    def leg_tail(self) -> float:
+        """Where the tail of a leg's curve begins, as its argument."""
+        return float(np.arcsinh(LEG_TAIL * np.sinh(self.legs_top)))
+
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
 
-        tell apart): each rise beyond 0.15 of the range's end is about `legs_slack_v` or less.
+        tell apart): each rise in the tail is about `legs_slack_v` or less.
         """
         size = 4 + len(terms)
         out = np.zeros((size, size))
         count = self.legs_vectors.shape[0]
         knots = (np.arange(count) + 0.5) * self.legs_top / count
-        tail = np.sinh(self.legs_top) * 0.15
         for k, term in enumerate(terms):
-            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
+            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > np.sinh(self.leg_tail):
                 out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
         return out
 

@@ -12,6 +12,7 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import channel_ends
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
+from commissioner.diagnose.effects.effect import spline_value
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
@@ -27,6 +28,11 @@ SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.35
 """Of L_sigma over L_M: no more is believed where L_M is hardly seen."""
+DROP_SHARE, TAIL_SHARE, LEAST_SLACK = 0.003, 0.03, 0.03
+"""Rise at one knot of a leg's tail, over the voltage across R_s at the peak and over the leg's loss before the tail; and the least, over
+
+the first. A slack as large as the loss let the tail take 15 to 27 % more than there was, off R_s, for rises cannot be negative.
+"""
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
 WIDENING, NARROWING = (-0.03, -0.1, -0.3), (0.03, 0.1, 0.25, 0.5)
 """Radii of stops and, negative, scales of exponential operators, over the largest iron flux; those whose loops widen, and narrow."""
@@ -44,14 +50,26 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
         iron_vectors=even_vectors(10), leak_vectors=even_vectors(12),
         branch_time_s=BRANCH_TIME_S,
         nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
-        legs_slack_v=0.003 * peak * model.nominal[0], leak_ratio=leak_ratio(model),
+        leak_ratio=leak_ratio(model),
     )
-    return layout, flux
+    return replace(layout, legs_slack_v=legs_slack_v(model, layout, peak)), flux
 
 
 def leak_ratio(model: Model) -> float:
     """Of the leakage over the magnetizing inductance."""
     return min(model.nominal[2] / model.nominal[3], MOST_LEAK_RATIO)
+
+
+def legs_slack_v(model: Model, layout: Layout, peak_a: float) -> float:
+    """By how much a leg's loss may rise at each knot of its tail: a small part of what it loses before, where a leg's loss is known;
+
+    else of the voltage across R_s, as which more would pass.
+    """
+    most = DROP_SHARE * peak_a * model.nominal[0]
+    count = layout.legs_vectors.shape[0]
+    weights = model.sum_kind(kinds.LEGS, count) + model.sum_kind(kinds.LEGS_LINK, count)
+    lost = spline_value(layout.legs_vectors, weights, layout.legs_top, layout.leg_tail)
+    return min(max(TAIL_SHARE * lost, LEAST_SLACK * most), most) if lost > 0.0 else most
 
 
 def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float, float]:

@@ -1,9 +1,13 @@
 """The scores count what they claim to count."""
 
 import numpy as np
+import pytest
 
+from sim import kernel
+from sim.packing import pack
 from tests.hidden_effects import scoring
-from tests.hidden_effects.cases import WEIGHTS, class_of, plan
+from tests.hidden_effects.cases import WEIGHTS, Case, class_of, plan
+from tests.hidden_effects.sizes import carried_by_memory
 
 
 def row(stratum, named, true, verdict="explained", **more):
@@ -95,3 +99,18 @@ def test_the_full_plan_has_the_protocols_strata_and_no_case_twice():
 def test_classes_are_those_no_terminal_separates():
     assert class_of("device_drop") == {"dead_time", "device_drop"}
     assert class_of("remanence") == {"remanence"}
+
+
+@pytest.mark.parametrize(("seed", "shape"), [(0, "dahl"), (4, "widening")])
+def test_the_current_of_a_memory_is_what_the_simulator_carries_where_a_wide_loop_turns(seed, shape):
+    """Its own differential equation, down and up between the turning points."""
+    plant = Case("one", seed, "magnetic_hysteresis", noise="white").scenario(1.0).plant
+    (effect,) = plant.effects
+    assert effect.shape == shape
+    top, (p, _) = 1.4 * plant.nameplate.rated_flux_wb, pack(plant)
+    x, rates = np.zeros(16), np.zeros(16)
+    flux = top * np.concatenate([np.linspace(1, -1, 20001), np.linspace(-1, 1, 20001)])
+    for here, step in zip(flux[:-1], np.diff(flux), strict=True):
+        kernel._extra_states(x, 0.0, 0.0, here, 0.0, step, 0.0, p, rates)
+        x[10] += rates[10]
+    assert x[10] == pytest.approx(carried_by_memory(effect, plant, top), rel=2e-3)

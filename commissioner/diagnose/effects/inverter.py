@@ -138,8 +138,11 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
 
 
 def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    """The sag at rated power; of a recorded link whose course the motor's own power hardly makes, the part that reaches the motor."""
-    if values.get(RECORDED_LINK) and _as_lags(setting.record)[1] > LEFT_BY_THE_LOAD:
+    """The sag at rated power; of a recorded link whose course the motor's own power hardly makes, the part that reaches the motor,
+
+    where that is most of what is lost: in a link that is recorded coarsely the sag may be hidden.
+    """
+    if values.get(RECORDED_LINK) and _as_lags(setting.record)[1] > LEFT_BY_THE_LOAD and _is_mostly_recorded(setting.record, values):
         return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
     return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
 
@@ -149,15 +152,34 @@ def _as_lags(record: Record) -> tuple[dict[str, float], float]:
 
     and the share of its power that this leaves.
     """
+    courses = _courses(record)
+    course = courses.pop(RECORDED_LINK)
+    table = np.column_stack(list(courses.values()))
+    found = np.linalg.lstsq(table, course, rcond=None)[0]
+    left = course - table @ found
+    return dict(zip(courses, map(float, found), strict=True)), float(left @ left) / max(float(course @ course), 1e-300)
+
+
+def _is_mostly_recorded(record: Record, values: Mapping[str, float]) -> bool:
+    """Whether more of the voltage moves with the recorded link than with the motor's own power."""
+    courses = _courses(record)
+    recorded = values[RECORDED_LINK] * courses.pop(RECORDED_LINK)
+    drawn = np.sum([values.get(n, 0.0) * c for n, c in courses.items()], axis=0)
+    return float(np.linalg.norm(recorded)) > float(np.linalg.norm(drawn))
+
+
+def _courses(record: Record) -> dict[str, Array]:
+    """By name, what a lagged power or the recorded link moves of the command, per unit and but for a constant part of it, at some
+
+    instants of all segments.
+    """
     some = [slice(None, None, max(s.count // SAG_SAMPLES, 1)) for s in record.segments]
-    weight = np.concatenate([s.voltage_axis_v[at] for s, at in zip(record.segments, some, strict=True)])[:, None]
-    names = [n for n in record.channel_names if n.startswith("sag_")]
-    columns = [record.channel(n) for n in (*names, RECORDED_LINK)]
-    *lags, course = (weight * np.vstack([c[at][:, columns] for c, at in zip(record.channels, some, strict=True)])).T
-    table = np.column_stack([weight, *lags])
-    found, constant = (np.linalg.lstsq(t, course, rcond=None)[0] for t in (table, table[:, :1]))
-    left, whole = course - table @ found, course - table[:, :1] @ constant
-    return dict(zip(names, map(float, found[1:]), strict=True)), float(left @ left / max(whole @ whole, 1e-300))
+    command = np.concatenate([s.voltage_axis_v[at] for s, at in zip(record.segments, some, strict=True)])
+    out = {}
+    for name in [n for n in record.channel_names if n.startswith("sag_") or n == RECORDED_LINK]:
+        moved = command * np.concatenate([c[at, record.channel(name)] for c, at in zip(record.channels, some, strict=True)])
+        out[name] = moved - command * float(command @ moved) / max(float(command @ command), 1e-300)
+    return out
 
 
 def without_the_recorded_link(model: Model, record: Record) -> Model:

@@ -58,3 +58,12 @@ def test_a_link_that_was_recorded_in_some_segments_only_is_none(setting):
     assert not recorded_sag(replace(seen, segments=(replace(seen.segments[0], link_swing=None), *seen.segments[1:])))
     assert not recorded_sag(setting.record)
     assert RECORDED_LINK not in {t.symbol for t in SAG.terms(setting)}
+
+
+def test_a_sag_that_a_coarse_record_of_the_link_hides_is_said_at_rated_power(setting, nominal):
+    """Of a link whose noise is all that was seen, 0.04 +- 0.04 was called the part that reaches the motor."""
+    noise = np.random.default_rng(1)
+    column = setting.record.channel("sag_3ms")
+    seen = with_link(setting, lambda s, c: 0.002 * noise.standard_normal(s.count) + 0.01 * c[:, column])
+    sizes = SAG.sizes(seen, model_of(seen, nominal, link_recorded=0.04, sag_3ms=0.01).of("dc_link_sag"))
+    assert sizes["sag_at_rated_power"][0] == pytest.approx(0.01, rel=0.05)
