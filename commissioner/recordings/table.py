@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import io
 import math
+import re
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from commissioner.recordings.whole import whole_file
 from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES, RunningRecording, Signal, StandstillRecording
 
 MAX_METADATA_LINES = 1000
+KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
+"""Of a comment; `=` is not what we write, yet a value written so must not be lost without a word."""
 STEP_TOLERANCE, MOST_ROUNDED = 0.02, 0.1
 """Of a period, by which time steps may differ; and by how much more at most where the time stamps are rounded."""
 
@@ -246,9 +249,8 @@ def _read_csv(path: Path) -> Table:
         if not line.startswith(b"#"):
             break
         start = text.tell()
-        key, separator, value = line[1:].decode("utf-8").partition(":")
-        if separator:
-            metadata[key.strip()] = value.strip()
+        if said := KEY_AND_VALUE.match(line[1:].decode("utf-8")):
+            metadata[said[1].strip()] = said[2].strip()
     text.seek(start)
     columns = text.readline().count(b",") + 1
     if columns > MAX_COLUMNS:
