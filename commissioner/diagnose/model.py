@@ -67,11 +67,6 @@ class Layout:
     channel_ends_a: Array = field(default_factory=lambda: np.ones(3))
     """Largest current that each channel reported: where its end, if it has one, is near."""
 
-    @property
-    def leg_tail(self) -> float:
-        """Where the tail of a leg's curve begins, as its argument."""
-        return float(np.arcsinh(LEG_TAIL * np.sinh(self.legs_top)))
-
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
 
@@ -81,8 +76,9 @@ class Layout:
         out = np.zeros((size, size))
         count = self.legs_vectors.shape[0]
         knots = (np.arange(count) + 0.5) * self.legs_top / count
+        tail = LEG_TAIL * np.sinh(self.legs_top)
         for k, term in enumerate(terms):
-            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > np.sinh(self.leg_tail):
+            if term.kind in (kinds.LEGS, kinds.LEGS_LINK) and np.sinh(knots[term.index]) > tail:
                 out[4 + k, 4 + k] = (term.step / self.legs_slack_v) ** 2
         return out
 

@@ -12,9 +12,9 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channel_end import channel_ends
 from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
-from commissioner.diagnose.effects.effect import spline_value
+from commissioner.diagnose.effects.inverter import lost_by_a_leg
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.model import NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
+from commissioner.diagnose.model import LEG_TAIL, NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
@@ -66,9 +66,7 @@ def legs_slack_v(model: Model, layout: Layout, peak_a: float) -> float:
     else of the voltage across R_s, as which more would pass.
     """
     most = DROP_SHARE * peak_a * model.nominal[0]
-    count = layout.legs_vectors.shape[0]
-    weights = model.sum_kind(kinds.LEGS, count) + model.sum_kind(kinds.LEGS_LINK, count)
-    lost = spline_value(layout.legs_vectors, weights, layout.legs_top, layout.leg_tail)
+    lost = lost_by_a_leg(model, layout, LEG_TAIL)
     return min(max(TAIL_SHARE * lost, LEAST_SLACK * most), most) if lost > 0.0 else most
 
 

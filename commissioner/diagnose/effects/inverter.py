@@ -49,17 +49,21 @@ def _leg_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {"voltage_v": (top, "V"), "half_current_a": (half, "A"), **unequal}
 
 
+def lost_by_a_leg(model: Model, layout: Layout, share: float) -> float:
+    """V, at a share of the range of currents on which its loss may bend."""
+    count = layout.legs_vectors.shape[0]
+    weights = model.sum_kind(kinds.LEGS, count) + model.sum_kind(kinds.LEGS_LINK, count)
+    at = float(np.arcsinh(share * np.sinh(layout.legs_top)))
+    return spline_value(layout.legs_vectors, weights, layout.legs_top, at)
+
+
 def tail_of_legs(model: Model, layout: Layout) -> tuple[float, float]:
     """Half of what a leg's loss rises by over the upper half of the currents at which it may bend, V, and the resistance, ohm, that this
 
     looks like: a law that goes on rising beyond cannot be told from R_s, and its form is nobody's knowledge.
     """
-    count = layout.legs_vectors.shape[0]
-    weights = model.sum_kind(kinds.LEGS, count) + model.sum_kind(kinds.LEGS_LINK, count)
-    most = float(np.sinh(layout.legs_top))
-    ends = [spline_value(layout.legs_vectors, weights, layout.legs_top, float(np.arcsinh(share * most))) for share in (0.5, 1.0)]
-    rise = 0.5 * max(ends[1] - ends[0], 0.0)
-    return rise, rise / (0.5 * most * layout.legs_knee_a)
+    rise = 0.5 * max(lost_by_a_leg(model, layout, 1.0) - lost_by_a_leg(model, layout, 0.5), 0.0)
+    return rise, rise / (0.5 * float(np.sinh(layout.legs_top)) * layout.legs_knee_a)
 
 
 def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -142,29 +146,26 @@ def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
     where that is most of what is lost: in a link that is recorded coarsely the sag may be hidden.
     """
-    if values.get(RECORDED_LINK) and _as_lags(setting.record)[1] > LEFT_BY_THE_LOAD and _is_mostly_recorded(setting.record, values):
-        return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
+    if values.get(RECORDED_LINK):
+        courses = _courses(setting.record)
+        if _is_mostly_recorded(courses, values) and _as_lags(courses)[1] > LEFT_BY_THE_LOAD:
+            return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
     return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
 
 
-def _as_lags(record: Record) -> tuple[dict[str, float], float]:
-    """The sum of lagged powers that comes nearest to the recorded link's course but for a constant, each instant weighed by the command,
-
-    and the share of its power that this leaves.
-    """
-    courses = _courses(record)
-    course = courses.pop(RECORDED_LINK)
-    table = np.column_stack(list(courses.values()))
+def _as_lags(courses: Mapping[str, Array]) -> tuple[dict[str, float], float]:
+    """The sum of lagged powers that comes nearest to the recorded link's course, and the share of its power that this leaves."""
+    course, lags = courses[RECORDED_LINK], [n for n in courses if n != RECORDED_LINK]
+    table = np.column_stack([courses[n] for n in lags])
     found = np.linalg.lstsq(table, course, rcond=None)[0]
     left = course - table @ found
-    return dict(zip(courses, map(float, found), strict=True)), float(left @ left) / max(float(course @ course), 1e-300)
+    return dict(zip(lags, map(float, found), strict=True)), float(left @ left) / max(float(course @ course), 1e-300)
 
 
-def _is_mostly_recorded(record: Record, values: Mapping[str, float]) -> bool:
+def _is_mostly_recorded(courses: Mapping[str, Array], values: Mapping[str, float]) -> bool:
     """Whether more of the voltage moves with the recorded link than with the motor's own power."""
-    courses = _courses(record)
-    recorded = values[RECORDED_LINK] * courses.pop(RECORDED_LINK)
-    drawn = np.sum([values.get(n, 0.0) * c for n, c in courses.items()], axis=0)
+    recorded = values[RECORDED_LINK] * courses[RECORDED_LINK]
+    drawn = np.sum([values.get(n, 0.0) * c for n, c in courses.items() if n != RECORDED_LINK], axis=0)
     return float(np.linalg.norm(recorded)) > float(np.linalg.norm(drawn))
 
 
@@ -187,7 +188,7 @@ def without_the_recorded_link(model: Model, record: Record) -> Model:
     swing = model.of("dc_link_sag").get(RECORDED_LINK, 0.0)
     if not swing:
         return model
-    lags, _ = _as_lags(record)
+    lags, _ = _as_lags(_courses(record))
     values = tuple(
         0.0 if t.symbol == RECORDED_LINK else v + swing * lags[t.symbol] if t.effect == "dc_link_sag" else v
         for t, v in zip(model.terms, model.values, strict=True)

@@ -12,8 +12,9 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.nominal import CARRY
-from commissioner.diagnose.plant import trajectory
+from commissioner.diagnose.plant import predict, trajectory
 from commissioner.diagnose.starts import slopes_of_start
+from tests.unit.diagnose.test_effects import central_slope
 
 BEFORE_WB = np.array([0.4, -0.3])
 TILTED = {"leakage_cos": 0.02, "leakage_sin": -0.03, "magnetizing_cos": 0.04, "split": 0.2}
@@ -83,6 +84,17 @@ def test_flux_that_tilts_is_what_an_open_machine_keeps(nominal, behind):
     start = start_of(model_of(nominal, behind, ["inductance_anisotropy"], held), behind)
     rate = np.log(0.4) * (np.eye(2) + np.array([[0.03, 0.02], [0.02, -0.03]]))
     assert start[2:4] == pytest.approx(expm(rate) @ BEFORE_WB, rel=2e-3)
+
+
+@pytest.mark.parametrize("symbol", ["leakage_cos", "leakage_sin", "magnetizing_cos", "magnetizing_sin", "split", "curve_3", "flux_carried_over"])
+def test_sensitivities_of_the_currents_hold_with_flux_from_the_segment_before(nominal, behind, symbol):
+    """What is left of that flux tilts with the open machine's rate, and the cage's resistance by the share of the leakage."""
+    effects, iron = (["magnetizing_saturation"], bent()) if symbol == "curve_3" else (["inductance_anisotropy"], {"flux_carried_over": 0.4})
+    model = model_of(nominal, behind, effects, {**TILTED, **iron})
+    row = 4 + [t.symbol for t in model.terms].index(symbol)
+    jacobian = predict(model, behind.record, 1, behind.layout, wanted=model.terms).jacobian[row]
+    slope = central_slope(model, behind, row, 1e-3)
+    assert np.sqrt(np.mean((jacobian - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
 
 
 @pytest.mark.parametrize("share", [(0.4, 0.0), (0.3, -0.2), (-0.3, 0.1), (2e-4, 0.0), (0.0, 0.0), (1.2, 0.0)])
