@@ -341,7 +341,8 @@ def advance_period(x, p, m, voltage_v, axis, work, points, known):
 
     `m` is the Model of `p`, `known` are the `all_currents` of the state `x`; those of the state it leaves are returned.
 
-    Classical Runge-Kutta in P_SUBSTEPS (1 or even) steps; `points` are sensed currents at 0, 1/4 .. 1 of the period.
+    Classical Runge-Kutta in P_SUBSTEPS (1 or even) steps; `points` are sensed currents at 0, 1/4 .. 1 of the period, the first
+    one just after the voltage has stepped: a loss resistance across the terminals draws its new current at once.
     The link voltage and the hot resistances stand still within the period. `work` is `scratch()`.
     """
     has_lag = p[at.P_LAG_ORDER] != 0.0
@@ -392,6 +393,8 @@ def advance_period(x, p, m, voltage_v, axis, work, points, known):
         i1a, i1b = core_a, core_b
         if m.iron_s != 0.0:
             _, _, _, _, i1a, i1b = _stage(ra, rb, core_a, core_b, ir_a, ir_b, now, m)
+            if step == 0 and not has_lag:
+                points[0, 0], points[0, 1] = i0a, i0b
         mid_a, mid_b, end_a, end_b = ima, imb, i1a, i1b
         if has_lag:
             mid_a, end_a = _sensed(x, 0, i0a, ima, i1a, p)

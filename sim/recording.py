@@ -156,11 +156,14 @@ def _sample(
 
 @kernel
 def _sense_rows(points, places, t, noise, cable, s, out):
-    """Sample, bend, offset, clip and convert every row; `places` in control periods from the segment's start."""
+    """Sample, bend, offset, clip and convert every row; `places` in control periods from the segment's start.
+
+    At the very edge of a period a sample shows what was there before the voltage stepped.
+    """
     n = points.shape[0]
     for k in range(n):
-        place = min(max(places[k], 0.0), n - 1e-9)
-        which = int(place)
+        place = min(max(places[k], 0.0), float(n))
+        which = max(math.ceil(place) - 1, 0)
         a, b = between(points[which], place - which)
         for phase in range(3):
             seen = sense(phase_of(a, b, phase) + cable[k, phase], t[k], phase, noise[k, phase], s)

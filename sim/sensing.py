@@ -12,7 +12,7 @@ HALF_SQRT3 = 0.5 * math.sqrt(3.0)
 
 @kernel
 def between(points, place):
-    """Sensed alpha and beta current at `place` (0..1) of a control period: the quartic through its five points."""
+    """Sensed alpha and beta current at `place` (above 0, to 1) of a control period: the quartic through its five points."""
     s = 4.0 * place
     a, b = 0.0, 0.0
     for j in range(at.POINTS):

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.linalg import expm
 
 from sim import hidden
 from sim.effects import CATALOGUE
@@ -139,6 +140,36 @@ def test_hidden_motors_stay_below_their_rated_flux_without_bias():
     for seed in range(4):
         _, _, truth = hidden.case(seed, "null", "poor")
         assert truth["segments"][0]["stator_flux_wb"] < truth["rated_flux_wb"]
+
+
+@pytest.mark.parametrize("late", [0.0, 0.1, 0.5, 0.95, 1.0, 1.3])
+def test_a_loss_resistance_draws_its_new_current_as_soon_as_the_voltage_steps(late):
+    document = short_document()
+    document["sensors"] |= {"delay_s": late * 2e-4, "noise_a": 1e-4}
+    document["effects"] = {"iron_loss": {"size": 0.02, "shape": "resistor"}}
+    document["recording"] = {"segments": [{**SHORT, "tones": [[12.0, 83.0, 0.2], [30.0, 330.0, 1.0]]}], "pause_s": 0.5}
+    plant = build(document).plant
+    columns = play(document)
+    u, g, r = columns["voltage_axis_v"], 0.02, plant.machine.stator_resistance_ohm
+    per_leak, per_ls = 1.0 / plant.machine.leakage_inductance_h, 1.0 / 0.25
+    core = np.array([per_ls + per_leak, -per_leak])  # current of (psi_s, psi_r) beside the resistance
+    share = 1.0 / (1.0 + r * g)
+    rate = np.array([-r * share * core, plant.machine.rotor_resistance_ohm * np.array([per_leak, -per_leak])])
+    whole = np.block([[rate, np.array([[share], [0.0]])], [np.zeros((1, 3))]])
+    back = int(late) + 1  # at an edge: what was there before the step
+    step, part = expm(whole * 2e-4), expm(whole * 2e-4 * (back - late))
+    flux, exact = np.zeros((u.size + 1, 2)), np.zeros(u.size)
+    for k, v in enumerate(u):
+        flux[k + 1] = step[:2, :2] @ flux[k] + step[:2, 2] * v
+    for k in range(back, u.size):
+        held = u[k - back]
+        exact[k] = share * (core @ (part[:2, :2] @ flux[k - back] + part[:2, 2] * held) + g * held)
+    axis = np.radians(SHORT["axis_deg"])
+    along = sum(
+        columns[f"current_{name}_a"] * np.cos(axis - k * 2.0 * np.pi / 3.0) for name, k in (("u", 0), ("v", 1), ("w", -1))
+    ) * 2.0 / 3.0
+    assert np.std(g * np.diff(u)) > 0.1
+    np.testing.assert_allclose(along[3:], exact[3:], atol=6e-4)
 
 
 def test_lost_rows_leave_no_hole_in_time_but_are_missing():
