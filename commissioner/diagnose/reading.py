@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from commissioner.diagnose.kinds import CLOCK, DELAY, IRON_LOSS, LAG
 from commissioner.diagnose.lag import SHORT_LAG, Between, behind, by_lag, by_shape, low_pass
 from commissioner.diagnose.model import Model, Term
 from commissioner.diagnose.record import Segment
-from commissioner.diagnose.resample import held_at, resample, resample_hermite
+from commissioner.diagnose.resample import held_at, resample, resample_hermite, step_shown
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,11 @@ class Reading:
     turns: Array
     clock: Array
 
+    @cached_property
+    def shown(self) -> NDArray[np.intp]:
+        """Which step of the held voltage each sample shows."""
+        return step_shown(self.late)
+
     def of(self, current: Terminals) -> tuple[Array, Array]:
         """Values and slopes (1/s) read of the current."""
         if self.lag:
@@ -42,7 +48,7 @@ class Reading:
         if not self.late.any():
             return current.values, current.before
         value, slope = resample_hermite(current.unheld, current.after, current.before, self.late, self.period_s)
-        return value + held_at(current.held, self.late), slope
+        return value + held_at(current.held, self.shown), slope
 
     def of_row(self, row: Array, held: Array | None = None) -> Array:
         """A derivative (rows, n) of the current as it is read, with its part that is held from each sample on."""
@@ -50,7 +56,7 @@ class Reading:
             unheld = row - _until(held)
             if self.lag:
                 return behind(Between.straight(unheld, held), self.lag, self.shape, self.late)[0]
-            return self.of_row(unheld) + held_at(held, self.late)
+            return self.of_row(unheld) + held_at(held, self.shown)
         lagged = low_pass(row, self.lag, self.shape) if self.lag else row
         return resample(lagged, self.late) if self.late.any() else lagged
 

@@ -7,6 +7,7 @@ from scipy.linalg import expm
 from commissioner.diagnose.effects import CATALOGUE
 from commissioner.diagnose.model import Model
 from commissioner.diagnose.plant import predict
+from commissioner.diagnose.resample import step_shown
 from tests.unit.diagnose.conftest import NOMINAL, PERIOD_S
 
 FINE = 100
@@ -73,3 +74,18 @@ def test_the_sensitivity_to_iron_loss_holds_behind_a_late_lag(nominal, setting):
         )
         slope = (more - less) / 2e-2
         assert np.abs(jacobian[row] - slope).max() < 0.03 * np.abs(slope).max(), symbol
+
+
+def test_a_clock_that_comes_back_to_the_edge_stays_on_its_side_and_one_that_crosses_does_not():
+    turn = np.linspace(0.0, 2.0 * np.pi, 5001)
+    after = np.arange(5001)
+    comes_back = -0.1 * (1.0 - np.cos(turn))
+    assert np.count_nonzero(step_shown(comes_back) != after) <= 1
+    for graze in (3e-4, -3e-4):
+        assert np.count_nonzero(step_shown(comes_back + graze * turn / turn[-1]) != after) <= 1
+    crosses = 0.1 * np.sin(turn) + 1.0
+    np.testing.assert_array_equal(after - step_shown(crosses), np.where(np.sin(turn) < 0.0, 1, 2))
+    for constant in (0.0, 1e-4, -1e-4, 0.4, -0.4):
+        assert set(after - step_shown(np.full(5001, constant))) == {0 if constant < 0.0 else 1}
+    alternating = np.where(after % 2, 0.01, -0.01)
+    np.testing.assert_array_equal(after - step_shown(alternating), after % 2)
