@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from commissioner.cli.screen import out as screen
 from commissioner.cli.screen import table
-from commissioner.report.diagnose_names import TOGETHER, class_name, members, said, sizes, spoken, sure_words
+from commissioner.report.diagnose_names import TOGETHER, class_name, main_quantity, members, said, spoken, sure_words
 from commissioner.report.diagnose_numbers import PLUS_MINUS, limit_words, number, part_word, sure
 from commissioner.report.diagnose_words import (
     actions,
@@ -77,7 +77,7 @@ def _causes(document: Mapping[str, Any]) -> None:
     for cause in found:
         is_fit = cause.get("found_by") != "audit"
         rows.append((
-            class_name(cause), next((size for _, size in sizes(cause)), "-"),
+            class_name(cause), main_quantity(cause),
             part_word(cause["gain_share"], largest) if is_fit else "-", sure(cause["confidence"]),
         ))
     screen.print(table("", ("cause", "size", "part of the error", "sure of the name"), rows))

@@ -66,11 +66,16 @@ def sure_words(cause: Cause) -> str:
 
 
 def sizes(cause: Cause) -> list[tuple[str, str]]:
-    """What is measured and how much; of a class only what its members share, with no member's own number."""
-    if cause["equivalent"]:
-        shared = COMMON.get(members(cause), {})
-        return [(shared[k], quantity(v, k)) for k, v in cause["parameters"].items() if k in shared]
-    return [(quantity_name(k), quantity(v, k)) for k, v in cause["parameters"].items()]
+    """What is measured and how much."""
+    return [(name, quantity(cause["parameters"][key], key)) for key, name in _stated(cause).items()]
+
+
+def _stated(cause: Cause) -> dict[str, str]:
+    """Which sizes are stated, and what they are called; of a class only what its members share, with no member's own number."""
+    if not cause["equivalent"]:
+        return {key: quantity_name(key) for key in cause["parameters"]}
+    shared = COMMON.get(members(cause), {})
+    return {key: shared[key] for key in cause["parameters"] if key in shared}
 
 
 def size_words(cause: Cause) -> str:
@@ -82,20 +87,31 @@ def size_words(cause: Cause) -> str:
 
 
 def main_size(cause: Cause) -> str:
-    """The one size of the headline: of several sensors or directions the largest."""
-    shared = COMMON.get(members(cause), {}) if cause["equivalent"] else cause["parameters"]
-    entries = [(k, v) for k, v in cause["parameters"].items() if k in shared]
-    if not entries:
-        return ""
-    unit = entries[0][1]["unit"]
-    alike = [(k, v) for k, v in entries if v["unit"] == unit and (k not in PLAIN_NUMBERS or k == entries[0][0])]
-    key, entry = max(alike, key=lambda item: abs(item[1]["value"])) if members(cause) != TOGETHER else entries[0]
-    return short(entry, key)
+    """The one size of the headline."""
+    key = _main_key(cause)
+    return short(cause["parameters"][key], key) if key else ""
 
 
-def size_name(cause: Cause) -> str:
-    """What the first size is called."""
-    return next((name for name, _ in sizes(cause)), "")
+def main_quantity(cause: Cause) -> str:
+    """The same with its interval, for a table."""
+    key = _main_key(cause)
+    return quantity(cause["parameters"][key], key) if key else "-"
+
+
+def main_name(cause: Cause) -> str:
+    """What it is called."""
+    key = _main_key(cause)
+    return _stated(cause)[key] if key else ""
+
+
+def _main_key(cause: Cause) -> str:
+    """Of the stated sizes the first; of several sensors or directions the largest. Empty where none is stated."""
+    keys = list(_stated(cause))
+    if not keys or members(cause) == TOGETHER:
+        return next(iter(keys), "")
+    entries = cause["parameters"]
+    alike = [k for k in keys if entries[k]["unit"] == entries[keys[0]]["unit"] and (k not in PLAIN_NUMBERS or k == keys[0])]
+    return max(alike, key=lambda k: abs(entries[k]["value"]))
 
 
 def plain_of(cause: Cause) -> Plain:

@@ -11,12 +11,12 @@ from commissioner.report.diagnose_names import (
     Cause,
     class_name,
     listed,
+    main_name,
     main_size,
     members,
     plain_of,
     said,
     sentence,
-    size_name,
 )
 from commissioner.report.diagnose_numbers import number, percent
 from commissioner.report.page import Tone
@@ -62,7 +62,7 @@ def _points_headline(document: Document) -> str:
         return "No circuit of the catalogue describes these points."
     if not document["causes"]:
         return str(document["reason"]).replace(" (1 causes tested)", " (one cause tested)")
-    named = [f"{class_name(c)} ({size_name(c)} {size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
+    named = [f"{class_name(c)} ({main_name(c)} {size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
     return f"Constant parameters are not enough for these points; what is missing: {listed(named)}."
 
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import erf
 
 from tests.hidden_effects.cases import class_of
 
@@ -146,15 +148,22 @@ def _ties(rows: Sequence[Row]) -> list[Line]:
 
 
 def _distributions(rows: Sequence[Row]) -> list[Line]:
-    errors = [
-        t["size_error"] for r in rows for t in r["truth"] if t["size_error"] is not None and (t["strength"] or 0) >= 0.1
-    ]
+    sized = [(t, r) for r in rows for t in r["truth"] if t["size_error"] is not None and (t["strength"] or 0) >= 0.1]
+    errors = [t["size_error"] for t, _ in sized]
     gains = [r["capture"] for r in rows if r["capture"] is not None and r["stratum"] in IN_LIBRARY and required(r)]
     times = [r["seconds"] for r in rows if r["seconds"]]
     out = []
     if errors:
         middle, high = np.quantile(errors, [0.5, 0.95])
         out.append(Line("size error: median, 95th percentile", f"{middle:.2%}, {high:.1%}", len(errors), "0.5 %, 5 %"))
+    spreads = [
+        _spread_of_largest(c["sizes"]) for t, r in sized for c in r["causes"]
+        if c["name"] == t["name"] and c.get("sizes") and not c["equivalent"]
+    ]  # fmt: skip
+    spreads = [s for s in spreads if s]
+    if spreads:
+        middle, high = quantiles_of_noise(spreads, (0.5, 0.95))
+        out.append(Line("the same if noise of the stated spreads alone acted", f"{middle:.2%}, {high:.1%}", len(spreads), ""))
     if gains:
         low, middle = np.quantile(gains, [0.01, 0.5])
         text = f"{low:.4f}, {middle:.5f}"
@@ -165,6 +174,26 @@ def _distributions(rows: Sequence[Row]) -> list[Line]:
         text = f"{np.median(times):.1f} s, {max(times):.1f} s at {int(np.median([r['samples'] for r in rows]))} samples x 3"
         out.append(Line("time of a diagnosis: median, worst", text, len(times), "10 s, 40 s at 1e5 x 3"))
     return out
+
+
+def _spread_of_largest(sizes: dict[str, Any]) -> float:
+    """Stated standard deviation over size, of the largest of the sizes that have the first one's unit."""
+    unit = next(iter(sizes.values()))[2]
+    value, spread, _ = max((x for x in sizes.values() if x[2] == unit), key=lambda x: abs(x[0]))
+    return abs(spread / value) if value else 0.0
+
+
+def quantiles_of_noise(spreads: Sequence[float], shares: Sequence[float]) -> list[float]:
+    """Quantiles of absolute errors that are normal, each with a standard deviation of its own: what no estimator is better than
+
+    where these are the Cramér-Rao bound's.
+    """
+    known = np.array(spreads)
+
+    def missing(error: float, share: float) -> float:
+        return float(np.mean(erf(error / (math.sqrt(2.0) * known)))) - share
+
+    return [float(brentq(missing, 0.0, 10.0 * float(known.max()), args=(share,))) for share in shares]
 
 
 def claims(rows: Sequence[Row], part: str = "causes") -> list[tuple[float, bool, list[float]]]:

@@ -13,7 +13,17 @@ from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure
 from commissioner.diagnose.record import Facts
 from commissioner.diagnose.refusals import refused
 from commissioner.report import diagnose_sections as sections
-from commissioner.report.diagnose_names import class_name, plain_of, sentence, size_words, spoken, sure_words
+from commissioner.report.diagnose_names import (
+    class_name,
+    main_name,
+    main_quantity,
+    main_size,
+    plain_of,
+    sentence,
+    size_words,
+    spoken,
+    sure_words,
+)
 from commissioner.report.diagnose_page import page_of
 from commissioner.report.diagnose_plain import PLAIN
 from commissioner.report.diagnose_words import actions, headline, meaning, remarks, tone
@@ -72,6 +82,14 @@ def test_much_leg_voltage_is_not_called_normal():
 def test_a_tie_has_the_name_certainty_and_size_of_the_class(one, name, certain, shown, hidden):
     assert class_name(one) == name and certain in sure_words(one)
     assert shown in size_words(one) and hidden not in size_words(one)
+
+
+def test_of_several_directions_the_largest_size_leads_under_its_own_name():
+    broken_bar = cause("resistance_anisotropy", {"stator_anisotropy": (1e-5, 3e-5, "1"), "rotor_anisotropy": (0.0096, 1e-4, "1")})
+    assert (main_name(broken_bar), main_size(broken_bar), main_quantity(broken_bar)) == ("rotor anisotropy", "0.96 %", "0.960 ± 0.020 %")
+    assert (main_name(LEGS), main_size(LEGS)) == ("lost per leg", "7.9 V")
+    unlike = cause("iron_loss", {"conductance_ms": (0.3, 0.01, "mS")}, ["rotor_skin_effect"])
+    assert (main_name(unlike), main_size(unlike), main_quantity(unlike)) == ("", "", "-")
 
 
 def test_a_tie_of_unlike_causes_is_said_without_a_size():
