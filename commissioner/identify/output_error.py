@@ -31,6 +31,8 @@ PARTS = 4
 """Steps of a period in which the current passes zero."""
 _SOLVED = 1e-12
 _MOST_STEPS = 40
+_ROWS = 256
+"""Weighted sensitivities gathered before they are multiplied."""
 
 
 @njit(cache=True)
@@ -43,34 +45,34 @@ def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     return cell, at - cell, 0.0
 
 
-@njit(cache=True)
-def _loss(table: Array, per_a: float, i: float) -> tuple[float, float]:
-    """(F, F') at a current; constant beyond the table."""
-    cell, fraction, beyond = _locate(table.size, per_a, i)
-    rise = table[cell + 1] - table[cell]
-    value = table[cell] + fraction * rise
-    return (value if i >= 0.0 else -value), (0.0 if beyond > 0.0 else rise * per_a)
+@njit(cache=True, inline="always")
+def _mean_loss(
+    table: Array, integral: Array, per_a: float, i0: float, i1: float, at0: tuple[int, float, float], at1: tuple[int, float, float]
+) -> tuple[float, float, float]:
+    """(mean of F over the currents i0 ... i1, its derivatives by i0 and by i1), `at0` and `at1` where they lie in the table.
 
-
-@njit(cache=True)
-def _integral(table: Array, integral: Array, per_a: float, i: float) -> float:
-    """Of F from 0 to a current, in table rows: even."""
-    cell, fraction, beyond = _locate(table.size, per_a, i)
-    inside = fraction * (table[cell] + 0.5 * fraction * (table[cell + 1] - table[cell]))
-    return float(integral[cell] + inside + beyond * table[-1])
-
-
-@njit(cache=True)
-def _mean_loss(table: Array, integral: Array, per_a: float, i0: float, i1: float) -> tuple[float, float, float]:
-    """(mean of F over the currents i0 ... i1, its derivatives by i0 and by i1)."""
+    F is odd and constant beyond the table. Within a cell it is straight; further apart areas are counted from the cells' edges,
+    since a difference of integrals from zero would lose the digits that the implicit step is solved for.
+    """
+    (cell0, in0, out0), (cell1, in1, out1) = at0, at1
+    rise0, rise1 = table[cell0 + 1] - table[cell0], table[cell1 + 1] - table[cell1]
+    f0, f1 = table[cell0] + in0 * rise0, table[cell1] + in1 * rise1
+    sign0, sign1 = (1.0 if i0 >= 0.0 else -1.0), (1.0 if i1 >= 0.0 else -1.0)
+    if sign0 != sign1:
+        area = integral[cell1] + 0.5 * in1 * (table[cell1] + f1) + out1 * f1
+        area -= integral[cell0] + 0.5 * in0 * (table[cell0] + f0) + out0 * f0
+    elif cell0 == cell1 and (out0 > 0.0) == (out1 > 0.0):
+        slope = 0.0 if out0 > 0.0 else 0.5 * rise0 * per_a
+        return 0.5 * sign0 * (f0 + f1), slope, slope
+    elif cell1 + in1 + out1 > cell0 + in0 + out0:
+        area = 0.5 * (1.0 - in0) * (f0 + table[cell0 + 1]) + integral[cell1] - integral[cell0 + 1]
+        area += 0.5 * in1 * (table[cell1] + f1) + (out1 - out0) * f1
+    else:
+        area = 0.5 * (1.0 - in1) * (f1 + table[cell1 + 1]) + integral[cell0] - integral[cell1 + 1]
+        area = -area - 0.5 * in0 * (table[cell0] + f0) - (out0 - out1) * f0
     apart = i1 - i0
-    if abs(apart) * per_a < 1e-3:
-        mean, slope = _loss(table, per_a, 0.5 * (i0 + i1))
-        return mean, 0.5 * slope, 0.5 * slope
-    mean = (_integral(table, integral, per_a, i1) - _integral(table, integral, per_a, i0)) / (apart * per_a)
-    f0, _ = _loss(table, per_a, i0)
-    f1, _ = _loss(table, per_a, i1)
-    return mean, (mean - f0) / apart, (f1 - mean) / apart
+    mean = area / (apart * per_a)
+    return mean, (mean - sign0 * f0) / apart, (sign1 * f1 - mean) / apart
 
 
 @njit(cache=True)
@@ -89,21 +91,6 @@ def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, p
 
 
 @njit(cache=True, inline="always")
-def _add_sample(
-    e: float, w: float, si: Array, first_own: int, wanted: Array, information: Array, score: Array, block_scores: Array, block: int
-) -> None:
-    """One residual of weight w and its sensitivities `si` into the normal equations; that of the offset is one."""
-    for a in range(wanted.size):
-        if wanted[a] > 0.0:
-            wa = w * (si[a] if a != first_own else 1.0)
-            score[a] += wa * e
-            block_scores[block, a] += wa * e
-            for b in range(a):
-                information[a, b] += wa * (si[b] if b != first_own else 1.0)
-            information[a, a] += wa * (si[a] if a != first_own else 1.0)
-
-
-@njit(cache=True, inline="always")
 def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
     """Share of this part of the period in which the voltage before still acts, and its derivative by `delay` (in periods)."""
     late, d_late = delay * parts - part, float(parts)
@@ -118,16 +105,17 @@ def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
 @njit(cache=True, inline="always")
 def _current_at_end(
     theta: Array, exponents: Exponents, flux_scale: float, table: Array, integral: Array, per_a: float, free: float, c1: float,
-    beta: float, b1: float, i0: float, within: float, power: Array,
+    beta: float, b1: float, i0: float, guess: float, within: float, power: Array,
 ) -> tuple[float, float, float, float, float, float]:
     """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
 
     inside what is known to hold the root.
     """
-    i, low, high = i0, -np.inf, np.inf
+    at0 = _locate(table.size, per_a, i0)
+    i, low, high = guess, -np.inf, np.inf
     mean, by_i0, by_i1, g, slope_g = 0.0, 0.0, 0.0, 0.0, 0.0
     for _ in range(_MOST_STEPS):
-        mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i)
+        mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i, at0, _locate(table.size, per_a, i))
         g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1 * mean, power)
         missed = i - free + beta * mean - g
         if abs(missed) <= within:
@@ -158,7 +146,7 @@ def _push_of_loss(basis: Array, basis_integral: Array, per_a: float, i0: float, 
             at += in1 * (basis[cell1, c] + 0.5 * in1 * (basis[cell1 + 1, c] - basis[cell1, c]))
             at -= in0 * (basis[cell0, c] + 0.5 * in0 * (basis[cell0 + 1, c] - basis[cell0, c]))
             at = (at + (out1 - out0) * basis[-1, c]) / apart
-        push[first + c] -= at
+        push[first + c] = -at
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -190,15 +178,15 @@ def simulate(
     residual: Array,
     flux: Array,
 ) -> float:
-    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J (lower triangle) and J^T W e added to
-    `information`, `score`.
+    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J and J^T W e added to `information`,
+    `score`.
 
     First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
     `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
     `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
     from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
     (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
-    W e^2.
+    W e^2, infinite where the model runs away.
     """
     p = wanted.size
     k_f, extra_powers = basis.shape[1], exponents.size
@@ -215,35 +203,48 @@ def simulate(
 
     x1, x2 = own[1], own[2]
     s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
-    dg, dg_last, push = np.zeros(p), np.zeros(p), np.zeros(p)
+    dg, dg_last = np.zeros(p), np.zeros(p)
+    pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
     g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
     g_last = g
     i = h_s * x1 + h_r * x2 + g
-    for j in range(p):
-        si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j]
-        dg[j] = slope_g * s1[j]
-    si[2] += (x2 - x1) / (l_l * l_l)
-    si[3] -= x1 / (l_0 * l_0)
+    to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
     for m in range(extra_powers):
-        si[first_g + m] += power[m]
-        dg[first_g + m] += power[m]
+        to_g[first_g + m] = to_i[first_g + m] = power[m]
+    for j in range(p):
+        si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j] + to_i[j]
+        dg[j] = slope_g * s1[j] + to_g[j]
     dg_last[:] = dg
-    total, v_last, last_parts = 0.0, u_before, 1
+    rows, missed, gathered = np.zeros((_ROWS, p)), np.zeros(_ROWS), 0
+    total, v_last, last_parts, mean = 0.0, u_before, 1, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
         residual[k], flux[k] = e, x1
         w = weight[k]
         if w > 0.0:
             total += w * e * e
-            _add_sample(e, w, si, first_own, wanted, information, score, block_scores, k // block)
+            root = np.sqrt(w)
+            for j in range(p):
+                rows[gathered, j] = root * si[j]
+            rows[gathered, first_own] = root * wanted[first_own]
+            missed[gathered] = root * e
+            gathered += 1
+        if gathered == _ROWS or (k + 1) % block == 0 or k == u.size - 1:
+            some = rows[:gathered]
+            information += np.dot(some.T, some)
+            part_score = np.dot(missed[:gathered], some)
+            score += part_score
+            block_scores[k // block] += part_score
+            gathered = 0
         if k == u.size - 1:
             break
         jump = u[k] - v_last
         v_last = u[k]
         parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
         beta = h_s * b1[h, 0] + h_r * b1[h, 1]
+        a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
         for part in range(parts):
             # A late step inside: its mean, and its first moment as a centred ramp of that moment.
             late, d_late = _late_share(delay, part, parts)
@@ -252,54 +253,48 @@ def simulate(
             last_parts = parts
             extra = g + ahead * (g - g_last)
             held = u[k] - late * jump - 0.5 * tilt - r_s * extra
-            c1 = ad[h, 0, 0] * x1 + ad[h, 0, 1] * x2 + b1[h, 0] * held + b2[h, 0] * tilt
-            c2 = ad[h, 1, 0] * x1 + ad[h, 1, 1] * x2 + b1[h, 1] * held + b2[h, 1] * tilt
+            c1 = a11 * x1 + a12 * x2 + b11 * held + b2[h, 0] * tilt
+            c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
             g_last = g
 
             # The current at the end.
-            mean, by_i0, by_i1 = 0.0, 0.0, 0.0
+            by_i0, by_i1 = 0.0, 0.0
             i0 = i
             if k_f > 0:
                 within = _SOLVED * (current_span + beta * furthest)
                 i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
-                    theta, exponents, flux_scale, table, integral, per_a, h_s * c1 + h_r * c2, c1, beta, b1[h, 0], i0, within, power
+                    theta, exponents, flux_scale, table, integral, per_a, h_s * c1 + h_r * c2, c1, beta, b11, i0, h_s * c1 + h_r * c2 - beta * mean + g, within, power
                 )
+            if not np.isfinite(i):
+                return np.inf
             old1, old2 = x1, x2
-            x1, x2 = c1 - b1[h, 0] * mean, c2 - b1[h, 1] * mean
+            x1, x2 = c1 - b11 * mean, c2 - b12 * mean
             if k_f == 0:
                 g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
                 i = h_s * x1 + h_r * x2 + g
             held -= mean
 
-            # Sensitivities: all but the part by the new current's own loss, then that.
-            for j in range(p):
-                push[j] = -r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
-                dg_last[j] = dg[j]
-            push[0] -= extra
-            push[DELAY] -= (jump + 0.5 * steep) * d_late
+            # What the parameters add themselves, then every sensitivity; of its own loss the new current's part.
+            pushed[0], pushed[DELAY] = -extra, -(jump + 0.5 * steep) * d_late
             if k_f > 0:
-                _push_of_loss(basis, basis_integral, per_a, i0, i, first_f, push)
-            for j in range(p):
-                d1 = ad[h, 0, 0] * s1[j] + ad[h, 0, 1] * s2[j] + b1[h, 0] * push[j]
-                d2 = ad[h, 1, 0] * s1[j] + ad[h, 1, 1] * s2[j] + b1[h, 1] * push[j]
-                s1[j], s2[j] = d1, d2
+                _push_of_loss(basis, basis_integral, per_a, i0, i, first_f, pushed)
             for j in range(CIRCUIT):
-                s1[j] += dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
-                s2[j] += dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
-            s1[DELAY] += b2[h, 0] * steep * d_late
-            s2[DELAY] += b2[h, 1] * steep * d_late
-            for j in range(p):
-                si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j]
-            si[2] += (x2 - x1) / (l_l * l_l)
-            si[3] -= x1 / (l_0 * l_0)
+                to_s1[j] = dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
+                to_s2[j] = dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
+            to_s1[DELAY], to_s2[DELAY] = b2[h, 0] * steep * d_late, b2[h, 1] * steep * d_late
+            to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
             for m in range(extra_powers):
-                si[first_g + m] += power[m]
-            scale = 1.0 / (1.0 + (beta + slope_g * b1[h, 0]) * by_i1)
+                to_g[first_g + m] = to_i[first_g + m] = power[m]
+            scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
+            h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
             for j in range(p):
-                si[j] *= scale * wanted[j]
-                s1[j] -= b1[h, 0] * by_i1 * si[j]
-                s2[j] -= b1[h, 1] * by_i1 * si[j]
-                dg[j] = slope_g * s1[j]
-            for m in range(extra_powers):
-                dg[first_g + m] += power[m]
+                push = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+                dg_last[j] = dg[j]
+                d1 = a11 * s1[j] + a12 * s2[j] + b11 * push + to_s1[j]
+                d2 = a21 * s1[j] + a22 * s2[j] + b12 * push + to_s2[j]
+                moved = (h_g * d1 + h_r * d2 + to_i[j]) * scale * wanted[j]
+                si[j] = moved
+                s1[j] = d1 - back1 * moved
+                s2[j] = d2 - back2 * moved
+                dg[j] = slope_g * s1[j] + to_g[j]
     return total

@@ -191,7 +191,6 @@ class Problem:
             residual,
             flux,
         )
-        information += np.tril(information, -1).T
         return float(squares)
 
 
