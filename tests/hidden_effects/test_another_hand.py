@@ -12,7 +12,7 @@ from tests.hidden_effects.another_hand import PEAK_A, TONES_HZ, Machine, recorde
 from tests.hidden_effects.cases import class_of
 
 
-def named(machine, seconds=1.5):
+def named(machine, seconds=1.0):
     seen = diagnose([recorded(machine, seconds)])
     return seen, {c.name: {c.name, *c.equivalent} for c in seen.causes}
 
@@ -94,7 +94,7 @@ def test_a_sagging_link_has_its_size_whatever_its_lags(lag_s, again_s):
 
     difference of two: from sums alone 0.2 of the noise was left, and five other causes were named in turn.
     """
-    seen, names = named(Machine(sag=0.4, sag_s=lag_s, again_s=again_s))
+    seen, names = named(Machine(sag=0.4, sag_s=lag_s, again_s=again_s), 1.5)
     assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
     assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(0.4, rel=0.03)
 
@@ -131,11 +131,13 @@ def test_an_offset_is_named_beside_a_remanence_thirty_times_larger():
     assert sizes["sensor_offset"]["offset_u_a"][0] == pytest.approx(2e-3, rel=0.1)
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("foot", [0.25, 0.1])
+@pytest.mark.parametrize("foot", [0.25, long(0.1)])
 def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(foot):
-    """On twice the knots the foot of the curve was cut off: hysteresis and a sagging link were named beside it, 0.82 and 0.76 sure."""
-    seen, names = named(Machine(knee_wb=0.9, foot=foot, foot_wb=0.25), 3.0)
+    """On twice the knots the foot of the curve was cut off: hysteresis and a sagging link were named beside it, 0.82 and 0.76 sure. Where
+
+    it could not reach beyond 0.4 of the flux, hysteresis was, 0.97 sure.
+    """
+    seen, names = named(Machine(knee_wb=0.9, foot=foot, foot_wb=0.25), 1.5)
     assert set(names) == {"magnetizing_saturation"} and seen.left.sigma < 0.1
 
 
@@ -158,7 +160,7 @@ def test_legs_that_differ_are_told_apart():
 @pytest.mark.parametrize("late_s", [2e-5, long(5e-6)])
 def test_a_current_that_is_read_late_is_not_sure_to_be_iron_loss_and_never_a_cable(late_s):
     """It has taken late_s / L_sigma of the new voltage: a conductance, and a capacitance of that times the period."""
-    _, names = named(Machine(read_late_s=late_s))
+    _, names = named(Machine(read_late_s=late_s), 1.5)
     assert len(names) == 1 and any("sampling_delay" in found for found in names.values()), names
 
 
@@ -198,11 +200,11 @@ def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
 
 @pytest.mark.campaign
 def test_a_cause_is_seen_from_about_its_stated_limit_on():
-    limits = detection_limits(named(Machine())[0].found)
+    limits = detection_limits(named(Machine(), 1.5)[0].found)
     offset_a, gain = (limits[n][key]["value"] for n, key in (("sensor_offset", "offset_w_a"), ("sensor_gain_mismatch", "gain_w_over_u")))
     for times, is_seen in ((0.5, False), (2.0, True)):
-        assert ("sensor_offset" in named(Machine(offsets_a=(0.0, 0.0, times * offset_a)))[1]) is is_seen
-        assert ("sensor_gain_mismatch" in named(Machine(gains=(1.0, 1.0, 1.0 + times * gain)))[1]) is is_seen
+        assert ("sensor_offset" in named(Machine(offsets_a=(0.0, 0.0, times * offset_a)), 1.5)[1]) is is_seen
+        assert ("sensor_gain_mismatch" in named(Machine(gains=(1.0, 1.0, 1.0 + times * gain)), 1.5)[1]) is is_seen
 
 
 @pytest.mark.campaign

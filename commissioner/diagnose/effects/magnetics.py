@@ -32,7 +32,7 @@ def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {"extra_current_a": (float(extra[most]), "A"), "at_flux_wb": (float(grid[most]), "Wb")}
 
 
-FOOT_SHARE = 0.4
+FOOT_SHARE = 0.6
 """Of the flux reached, at which a foot that ends within three intervals of the dictionary has ended."""
 
 
@@ -44,7 +44,7 @@ FOOT_SHARE = 0.4
     split_by="repeat the lowest tone at half and at full flux",
 )
 def magnetizing_saturation(setting: Setting) -> tuple[Term, ...]:
-    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond a third of
+    """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond half of
 
     it (below, the permeability of steel may still grow: Rayleigh's foot).
     `split` moves the saturating flux between rotor (-0.5) and stator (+0.5) side of the leakage.
