@@ -32,7 +32,7 @@ def _saturation_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {"extra_current_a": (float(extra[most]), "A"), "at_flux_wb": (float(grid[most]), "Wb")}
 
 
-FOOT_SHARE = 0.6
+FOOT_SHARE = 0.5
 """Of the flux reached, at which a foot that ends within three intervals of the dictionary has ended."""
 
 
