@@ -45,7 +45,7 @@ def fit_segments(
     problem.plateau_v = max(float(np.max(np.abs(theta[choice.leg_slice]), initial=0.0)), 1e-3)
     own = np.zeros((len(segments), OWN)) if own_start is None else own_start.copy()
     present = problem.evaluate(theta, own)
-    if not np.all(np.isfinite(present.information)):
+    if not present.is_finite:
         raise DataRefused(
             "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
             remedy="check that the nameplate belongs to the motor",
@@ -57,8 +57,7 @@ def fit_segments(
         step = _step(problem, present, theta, damping)
         new_theta, new_own = _apply(problem, theta, own, step)
         trial = problem.evaluate(new_theta, new_own, over=spare)
-        can_be_judged = bool(np.isfinite(trial.squares) and np.all(np.isfinite(trial.information)))
-        if can_be_judged and trial.squares <= present.squares * (1.0 + 1e-13):
+        if trial.is_finite and trial.squares <= present.squares * (1.0 + 1e-13):
             size = _size_in_std(problem, step, present, theta)
             shrinks = min(size / last_size, 1.0) if last_size > 0.0 and damping <= 1e-4 else 1.0
             small = size * (shrinks if shrinks < 0.1 else 1.0) < tolerance

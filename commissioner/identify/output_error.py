@@ -132,21 +132,29 @@ def _current_at_end(
 
 @njit(cache=True, inline="always")
 def _push_of_loss(basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array) -> None:
-    """Mean of every shape of F over the currents i0 ... i, off the rows of `push` from `first` on."""
-    apart = (i - i0) * per_a
-    cell0, in0, out0 = _locate(basis.shape[0], per_a, i0)
-    cell1, in1, out1 = _locate(basis.shape[0], per_a, i)
-    cell, inside, _ = _locate(basis.shape[0], per_a, 0.5 * (i0 + i))
-    sign = 1.0 if i0 + i >= 0.0 else -1.0
+    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on."""
+    at0, at = _locate(basis.shape[0], per_a, i0), _locate(basis.shape[0], per_a, i)
     for c in range(basis.shape[1]):
-        if abs(apart) < 1e-3:
-            at = sign * (basis[cell, c] + inside * (basis[cell + 1, c] - basis[cell, c]))
-        else:
-            at = basis_integral[cell1, c] - basis_integral[cell0, c]
-            at += in1 * (basis[cell1, c] + 0.5 * in1 * (basis[cell1 + 1, c] - basis[cell1, c]))
-            at -= in0 * (basis[cell0, c] + 0.5 * in0 * (basis[cell0 + 1, c] - basis[cell0, c]))
-            at = (at + (out1 - out0) * basis[-1, c]) / apart
-        push[first + c] = -at
+        push[first + c] = -_mean_loss(basis[:, c], basis_integral[:, c], per_a, i0, i, at0, at)[0]
+
+
+@njit(cache=True, inline="always")
+def _add_rows(rows: Array, missed: Array, information: Array, score: Array, block_score: Array) -> None:
+    """Weighted sensitivities (rows, p) and residuals (rows,) into the normal equations."""
+    information += np.dot(rows.T, rows)
+    added = np.dot(missed, rows)
+    score += added
+    block_score += added
+
+
+@njit(cache=True, inline="always")
+def _add_directly(
+    x1: float, x2: float, l_l: float, l_0: float, power: Array, first_g: int, to_i: Array, to_g: Array
+) -> None:
+    """Derivatives of the current, and of the iron's extra one, by the parameters at constant fluxes."""
+    to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
+    for m in range(power.size - 1):
+        to_g[first_g + m] = to_i[first_g + m] = power[m]
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -210,15 +218,14 @@ def simulate(
     g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
     g_last = g
     i = h_s * x1 + h_r * x2 + g
-    to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
-    for m in range(extra_powers):
-        to_g[first_g + m] = to_i[first_g + m] = power[m]
+    _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
     for j in range(p):
         si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j] + to_i[j]
         dg[j] = slope_g * s1[j] + to_g[j]
     dg_last[:] = dg
     rows, missed, gathered = np.zeros((_ROWS, p)), np.zeros(_ROWS), 0
-    total, v_last, last_parts, mean = 0.0, u_before, 1, 0.0
+    total, v_last, last_parts = 0.0, u_before, 1
+    mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
         residual[k], flux[k] = e, x1
@@ -232,11 +239,7 @@ def simulate(
             missed[gathered] = root * e
             gathered += 1
         if gathered == _ROWS or (k + 1) % block == 0 or k == u.size - 1:
-            some = rows[:gathered]
-            information += np.dot(some.T, some)
-            part_score = np.dot(missed[:gathered], some)
-            score += part_score
-            block_scores[k // block] += part_score
+            _add_rows(rows[:gathered], missed[:gathered], information, score, block_scores[k // block])
             gathered = 0
         if k == u.size - 1:
             break
@@ -257,13 +260,12 @@ def simulate(
             c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
             g_last = g
 
-            # The current at the end.
-            by_i0, by_i1 = 0.0, 0.0
+            # The current at the end, sought from where the loss of the step before would leave it.
             i0 = i
             if k_f > 0:
-                within = _SOLVED * (current_span + beta * furthest)
+                free, within = h_s * c1 + h_r * c2, _SOLVED * (current_span + beta * furthest)
                 i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
-                    theta, exponents, flux_scale, table, integral, per_a, h_s * c1 + h_r * c2, c1, beta, b11, i0, h_s * c1 + h_r * c2 - beta * mean + g, within, power
+                    theta, exponents, flux_scale, table, integral, per_a, free, c1, beta, b11, i0, free - beta * mean + g, within, power
                 )
             if not np.isfinite(i):
                 return np.inf
@@ -282,9 +284,7 @@ def simulate(
                 to_s1[j] = dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
                 to_s2[j] = dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
             to_s1[DELAY], to_s2[DELAY] = b2[h, 0] * steep * d_late, b2[h, 1] * steep * d_late
-            to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
-            for m in range(extra_powers):
-                to_g[first_g + m] = to_i[first_g + m] = power[m]
+            _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
             scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
             h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
             for j in range(p):

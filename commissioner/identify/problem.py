@@ -35,6 +35,11 @@ class Evaluation:
     residuals: list[Signal]
     flux: list[Signal]
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether the model could be simulated to the end of every segment."""
+        return bool(np.isfinite(self.squares) and np.all(np.isfinite(self.information)))
+
 
 class Problem:
     """The joint least-squares problem: shared parameters first, then three of each segment."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from commissioner.errors import DataRefused
 from commissioner.identify.batch import Segment
 from commissioner.identify.bound import cramer_rao
 from commissioner.identify.fit import fit_segments
 from commissioner.identify.leg_law import LegLaw
-from commissioner.identify.model import ModelChoice, start_theta
+from commissioner.identify.model import SHARED, ModelChoice, start_theta
 from commissioner.identify.problem import Problem
 from commissioner.identify.resistance import knee_shape
 from commissioner.identify.whiteness import whiteness
@@ -57,6 +58,17 @@ def test_a_fit_goes_on_where_an_earlier_one_ended():
     again = fit_segments(parts, PERIOD_S, START, theta_start=first.theta, own_start=first.own, max_iterations=1)
     assert again.sum_of_squares == pytest.approx(first.sum_of_squares, rel=1e-9)
     assert np.any(np.abs(first.own[0, 1:]) > 1e-3)
+
+
+def test_a_start_whose_machine_runs_away_is_refused():
+    """Iron that gives back more current the more flux it holds."""
+    voltage = multitone(TONES, 2.0, PERIOD_S)
+    current = linear_response(TRUTH, voltage, PERIOD_S)[0]
+    model = ModelChoice(extra_powers=4, flux_scale_wb=0.1)
+    theta = start_theta(START, model)
+    theta[SHARED : SHARED + 4] = -50.0
+    with pytest.raises(DataRefused, match="cannot be simulated from this start"):
+        fit_segments([Segment(voltage, current, 0.0, True)], PERIOD_S, START, model, theta)
 
 
 def test_masked_samples_do_not_count():
