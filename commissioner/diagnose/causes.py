@@ -69,7 +69,7 @@ def causes_of(
 
     `trust`: factor on every confidence (see `doubt`).
     """
-    refitted = _refitted_without(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest)])
+    refitted = _refitted_without(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest, trust)])
     without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
     causes = [_cause(found, name, rest, without[name], noise, excluded, trust) for name in found.accepted]
     causes = _without_truncation(_with_open_ties(causes, without), audit)
@@ -94,11 +94,11 @@ def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
     return rest.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
 
 
-def _may_be_named(found: Found, name: str, rest: Leftover) -> bool:
+def _may_be_named(found: Found, name: str, rest: Leftover, trust: float) -> bool:
     """Whether the name is likely enough: else its alternatives need not be sought."""
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
-    sure = confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
+    sure = trust * confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
     return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
 
 
@@ -221,7 +221,7 @@ def doubt(rest: Leftover, share: float) -> float:
 
     larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
     """
-    is_trace = max(rest.from_tones_sigma, rest.from_states_sigma) > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    is_trace = max(rest.from_tones_sigma, rest.from_states_sigma, rest.from_alien_sigma) > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
     return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
 
 

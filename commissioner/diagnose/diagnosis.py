@@ -118,6 +118,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     record, layout = found.record, found.layout
     numbers = 4 + len(found.fit.model.terms)
     rest = leftover(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
+    rest = rest.with_alien(float(np.sqrt(found.alien_chi2 / found.fit.normal.count.sum())))
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     trust = doubt(rest, explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
     gained = float(np.sqrt(max(found.nominal.chi2 - found.fit.chi2, 0.0) / found.fit.normal.count.sum()))

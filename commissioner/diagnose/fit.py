@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from commissioner.diagnose import kinds
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.record import Record
@@ -103,11 +104,20 @@ def _square_root(gram: Array, slope: Array) -> tuple[Array, Array]:
 
 
 def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
-    """Bounds of theta: the four within a factor 3 per step and within their box, the terms as physics says."""
+    """Bounds of theta: the four within a factor 3 per step and within their box, the terms as physics says; numbers of several
+
+    causes that say where one iron lies share what is left to either side.
+    """
     box = np.log(np.maximum(np.array(layout.nominal_box), 1e-12))
     four = np.log(np.array(model.nominal))
     low = np.array([*np.maximum(four - np.log(3.0), np.minimum(box[:, 0], four)), *(t.lower / t.step for t in model.terms)])
     high = np.array([*np.minimum(four + np.log(3.0), np.maximum(box[:, 1], four)), *(t.upper / t.step for t in model.terms)])
+    sides = [k for k, t in enumerate(model.terms) if t.kind == kinds.NU]
+    for k in sides if len(sides) > 1 else ():
+        term, here = model.terms[k], 4 + k
+        low[here], high[here] = (
+            model.theta[here] + (end - model.total(kinds.NU)) / len(sides) / term.step for end in (term.lower, term.upper)
+        )
     return low, high
 
 

@@ -115,7 +115,7 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     """
     if name == "clock_drift" and _is_a_delay(model.of(name), setting.record):
         return False
-    if any(t.kind == kinds.VOLTAGE_MOD for t in model.terms if t.effect == name) and _link_stands_still(model, name, setting.record):
+    if is_ruled_out(model, name, setting.record):
         return False
     sizes = CATALOGUE[name].sizes(setting, model.of(name))
     sign = CATALOGUE[name].sign
@@ -129,6 +129,11 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     peak, rated_peak = setting.facts.current_peak_a, setting.facts.rated_current_peak_a
     latest = max(LATEST_KNEE * peak, min(LATEST_KNEE_OF_RATED * rated_peak, LATEST_KNEE_AT_SMALL_CURRENT * peak))
     return "half_current_a" not in sizes or sizes["half_current_a"][0] < latest
+
+
+def is_ruled_out(model: Model, name: str, record: Record) -> bool:
+    """Whether what was measured says surely that it is not this cause: a link that was recorded, and stands still."""
+    return any(t.kind == kinds.VOLTAGE_MOD for t in model.terms if t.effect == name) and _link_stands_still(model, name, record)
 
 
 def _link_stands_still(model: Model, name: str, record: Record) -> bool:

@@ -6,7 +6,7 @@ by the current, its slope and the time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,11 @@ class Leftover:
     from_states_sigma: float
     strongest_hz: float
     from_bursts_sigma: float = 0.0
+    from_alien_sigma: float = 0.0
+    """What a cause would take that was ruled out."""
+
+    def with_alien(self, sigma: float) -> Leftover:
+        return replace(self, from_alien_sigma=sigma, sigma=max(self.sigma, sigma))
 
 
 def leftover(

@@ -17,7 +17,16 @@ from commissioner.diagnose.dictionaries import following, with_closer_radii, wit
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, as_read_late, large_delay, regrouped
 from commissioner.diagnose.fit import Fit, fit
-from commissioner.diagnose.guards import LINEAR, MATERIAL_SHARE, effects_of, guard, is_plausible, losses_of, meets_tones
+from commissioner.diagnose.guards import (
+    LINEAR,
+    MATERIAL_SHARE,
+    effects_of,
+    guard,
+    is_plausible,
+    is_ruled_out,
+    losses_of,
+    meets_tones,
+)
 from commissioner.diagnose.lines import LINES, with_clearer_lines
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
@@ -42,7 +51,7 @@ slow changes from segment to segment, as a shaft's motion or a drift does."""
 LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 2.0
 """A rest above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
 
-this share is left as it is."""
+this share is left as it is; so is what a cause that was ruled out would take."""
 
 WRONG_VALLEY = 1.0
 """A rest above this multiple of the noise, once the first cause is in the model: what it made of the currents may have led the four
@@ -68,6 +77,8 @@ class Steps:
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
         self.below: dict[str, float] = {}
         self.implausible: list[str] = []
+        self.ruled_out: dict[str, float] = {}
+        self.alien_chi2 = 0.0
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
@@ -207,15 +218,14 @@ class Steps:
         ]
         losses = losses_of(current, effects_of(current.model))
         rest = self._rest(current)
-        promising = [
-            s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * self._guard(losses, s.name, rest))
-        ]
+        guards = {name: self._guard(losses, name, rest) for name in screening.scores}
+        promising = [s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * guards[s.name])]
         best = None if "sampling_delay" in refused else self._large_delay(current)
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
-            wanted = max(self._guard(losses, score.name, rest), self.threshold(score.numbers))
+            wanted = max(guards[score.name], self.threshold(score.numbers))
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
             trial = self._tried(current, score, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
@@ -223,6 +233,8 @@ class Steps:
             is_sound = is_plausible(trial.model, score.name, self.setting)
             if not is_sound:
                 self.implausible.append(score.name)
+                if is_ruled_out(trial.model, score.name, self.record):
+                    self.ruled_out[score.name] = min(gain / score.delta_chi2, 1.0)
             if gain < wanted or not is_sound:
                 if required_chi2(score.numbers) < gain:
                     self.below[score.name] = gain
@@ -230,7 +242,8 @@ class Steps:
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
-        return None if best is None or self._is_crumb(current, best[2]) else (best[1], best[2])
+        self.alien_chi2 = self._alien(screening, guards)
+        return None if best is None or current.chi2 - best[2].chi2 < self._crumb(rest) else (best[1], best[2])
 
     def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
         """The refit with one more cause; lines looked for meanwhile concern only their own causes."""
@@ -254,10 +267,17 @@ class Steps:
             self.tried = (current, {})
         return self.tried[1]
 
-    def _is_crumb(self, current: Fit, trial: Fit) -> bool:
-        """Whether the best candidate takes but a crumb of a large rest: then no cause makes it, and six crumbs name nothing."""
-        rest = self._rest(current)
-        return self._is_large(rest) and current.chi2 - trial.chi2 < CRUMB * rest
+    def _alien(self, screening: Screening, guards: Mapping[str, float]) -> float:
+        """The most chi2 that a cause which was ruled out would take, beyond its guard: so much is real, and it is not that cause's."""
+        promised = {
+            name: kept * screening.scores[name].delta_chi2
+            for name, kept in self.ruled_out.items() if name in screening.scores
+        }
+        return max((chi2 for name, chi2 in promised.items() if chi2 > max(guards[name], self.threshold(screening.scores[name].numbers))), default=0.0)
+
+    def _crumb(self, rest: float) -> float:
+        """What the best candidate must take where much is left: else no cause makes it, and six crumbs name nothing."""
+        return CRUMB * max(rest if self._is_large(rest) else 0.0, self.alien_chi2)
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None

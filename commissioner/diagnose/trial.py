@@ -22,8 +22,6 @@ from commissioner.diagnose.record import Record, each_segment
 Array = NDArray[np.float64]
 HELD_SAMPLES = 400_000
 """Of a record whose trajectories are held: a quarter of a gigabyte at the most."""
-SLICE = 12 * 1024
-"""Samples whitened at once in white noise: a multiple of every block a screening averages over."""
 
 
 @dataclass(frozen=True)
@@ -145,21 +143,28 @@ class Trial:
         return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
 
     def _product(self, jacobian: Array, residual: Array, good: NDArray[np.bool_], block: int) -> Array:
-        """Whitened Gram matrix of all directions and, last, the residual: in slices where noise is white, never copied whole."""
+        """Whitened Gram matrix of all directions and, last, the residual: of white noise phase by phase, never copied whole."""
         noise, size = self._noise, jacobian.shape[0] + 1
         total = np.zeros((size, size))
-        length = SLICE if noise.is_white else max(residual.shape[1], 1)
-        for start in range(0, residual.shape[1], length):
-            part = slice(start, start + length)
-            kept = good[part]
-            both = [jacobian[..., part], residual[None, :, part]]
-            if block > 1 and noise.is_white:
-                both, kept = [_averaged(x, block) for x in both], _whole(kept, block)
-            directions, left = (whiten(x, kept, noise, self._record.facts.sample_period_s) for x in both)
-            total[:-1, :-1] += directions @ directions.T
-            total[:-1, -1] += directions @ left[0]
-            total[-1, -1] += left[0] @ left[0]
+        if noise.is_white:
+            for phase, sigma_a in enumerate(noise.sigma_a):
+                directions, left, kept = jacobian[:, phase], residual[phase], good
+                if block > 1:
+                    directions, left, kept = _averaged(directions, block), _averaged(left, block), _whole(good, block)
+                if not kept.all():
+                    directions, left = directions[:, kept], left[kept]
+                _add_products(directions, left, float(sigma_a) ** -2.0, total)
+        else:
+            period = self._record.facts.sample_period_s
+            directions, left = (whiten(x, good, noise, period) for x in (jacobian, residual[None]))
+            _add_products(directions, left[0], 1.0, total)
         return total
+
+
+def _add_products(directions: Array, residual: Array, weight: float, total: Array) -> None:
+    total[:-1, :-1] += weight * (directions @ directions.T)
+    total[:-1, -1] += weight * (directions @ residual)
+    total[-1, -1] += weight * float(residual @ residual)
 
 
 def _averaged(signal: Array, block: int) -> Array:
