@@ -118,7 +118,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     record, layout = found.record, found.layout
     numbers = 4 + len(found.fit.model.terms)
     rest = leftover(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
-    rest = rest.with_alien(float(np.sqrt(found.alien_chi2 / found.fit.normal.count.sum())))
+    rest = rest.with_alien(float(np.sqrt(found.alien.chi2 / found.fit.normal.count.sum())))
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     trust = doubt(rest, explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
     gained = float(np.sqrt(max(found.nominal.chi2 - found.fit.chi2, 0.0) / found.fit.normal.count.sum()))
@@ -133,7 +133,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
     is_seen = max(rest.from_states_sigma, rest.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
-    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), is_complete=found.is_complete)
+    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found)
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
         verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
@@ -144,7 +144,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
 
 
 def _verdict(
-    causes: Sequence[Cause], rest: Leftover, share: float, *, leaves_a_trace: bool, is_complete: bool
+    causes: Sequence[Cause], rest: Leftover, share: float, *, leaves_a_trace: bool, found: Found
 ) -> tuple[Verdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
@@ -152,15 +152,16 @@ def _verdict(
         or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
-        if not is_complete:
+        if not found.is_complete:
             return Verdict.UNEXPLAINED, (
                 f"Not finished: the time allowed was over before every cause was tried; a structured error of {rest.sigma:.2g} "
                 f"times the noise is left so far{', beside ' + names if names else ''}."
             )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
         comes_and_goes = " It comes and goes: in some moments much more is left than in most." if rest.from_bursts_sigma else ""
+        alien = f" Part of it looks like {found.alien.name}, which the recorded DC link rules out." if found.alien.chi2 else ""
         return Verdict.UNEXPLAINED, (
-            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{seen}"
+            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{alien}{seen}"
         )
     if not causes:
         return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."

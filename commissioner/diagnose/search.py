@@ -24,7 +24,7 @@ from commissioner.diagnose.nominal import (
 from commissioner.diagnose.record import Record, Segment
 from commissioner.diagnose.screen import Screening
 from commissioner.diagnose.settle import settled
-from commissioner.diagnose.steps import Report, Steps, surely_left
+from commissioner.diagnose.steps import Alien, Report, Steps, surely_left
 from commissioner.diagnose.trial import Trial
 
 EXPLORED = (45_000, 180_000)
@@ -61,8 +61,7 @@ class Found:
     """Samples that stand out alone: masked as well, and no loss."""
     material_chi2: float = 0.0
     """A cause that gains less is too small to matter."""
-    alien_chi2: float = 0.0
-    """What a cause that was ruled out would take: it is in the data, and that cause does not make it."""
+    alien: Alien = field(default_factory=Alien)
     is_complete: bool = True
     """False: the time allowed was over before nothing more passed the rules."""
 
@@ -184,7 +183,8 @@ def _settled(
 ) -> Found:
     """The last fit's sides and loops settled, unless too much is left; with all that was seen on the way."""
     steps, fitted, noise, layout = reached.steps, reached.fit, reached.steps.noise, reached.steps.layout
-    is_alien = steps.alien_chi2 > UNKNOWN_SHARE * (nominal.chi2 - fitted.chi2 + steps.alien_chi2)
+    alien = steps.alien
+    is_alien = alien.chi2 > UNKNOWN_SHARE * (nominal.chi2 - fitted.chi2 + alien.chi2)
     if not (is_alien or _leaves(UNKNOWN_SIGMA, fitted, nominal, noise)):
         fitted, layout = settled(fitted, steps.record, layout, noise, is_placed=is_placed)
     iron_wb, leakage_wb = largest_fluxes(steps.record, fitted.model, layout)
@@ -197,7 +197,7 @@ def _settled(
     return Found(
         nominal, fitted, reached.accepted, steps.record, layout, setting, reached.screening, first,
         steps.below, gains, tuple(x for x in losses if not x.is_spike),
-        tuple(x for x in losses if x.is_spike), steps.material_chi2, max(steps.alien_chi2 - (reached.fit.chi2 - fitted.chi2), 0.0), steps.go_on(),
+        tuple(x for x in losses if x.is_spike), steps.material_chi2, replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0)), steps.go_on(),
     )
 
 

@@ -7,7 +7,7 @@ never has to mend the shape of an earlier one.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,6 +67,14 @@ def surely_left(fitted: Fit, noise: Noise) -> float:
     return fitted.chi2 / float(fitted.normal.count.sum()) - 1.0 - NOISE_DOUBT * noise.uncertainty
 
 
+@dataclass(frozen=True)
+class Alien:
+    """A cause that was ruled out by what was measured, and the chi2 it would take: so much is real, and it is not that cause's."""
+
+    name: str = ""
+    chi2: float = 0.0
+
+
 class Steps:
     """One record (the first part of every segment of `full`, or all of it), one dictionary; remembers what was tried."""
 
@@ -78,7 +86,7 @@ class Steps:
         self.below: dict[str, float] = {}
         self.implausible: list[str] = []
         self.ruled_out: dict[str, float] = {}
-        self.alien_chi2 = 0.0
+        self.alien = Alien()
         self.regrouped: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
@@ -242,7 +250,7 @@ class Steps:
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
-        self.alien_chi2 = self._alien(screening, guards)
+        self.alien = self._most_alien(screening, guards)
         return None if best is None or current.chi2 - best[2].chi2 < self._crumb(rest) else (best[1], best[2])
 
     def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
@@ -267,17 +275,18 @@ class Steps:
             self.tried = (current, {})
         return self.tried[1]
 
-    def _alien(self, screening: Screening, guards: Mapping[str, float]) -> float:
-        """The most chi2 that a cause which was ruled out would take, beyond its guard: so much is real, and it is not that cause's."""
-        promised = {
-            name: kept * screening.scores[name].delta_chi2
+    def _most_alien(self, screening: Screening, guards: Mapping[str, float]) -> Alien:
+        """What of the causes that were ruled out would take most, beyond its guard."""
+        promised = (
+            Alien(name, kept * screening.scores[name].delta_chi2)
             for name, kept in self.ruled_out.items() if name in screening.scores
-        }
-        return max((chi2 for name, chi2 in promised.items() if chi2 > max(guards[name], self.threshold(screening.scores[name].numbers))), default=0.0)
+        )
+        beyond = (a for a in promised if a.chi2 > max(guards[a.name], self.threshold(screening.scores[a.name].numbers)))
+        return max(beyond, key=lambda a: a.chi2, default=Alien())
 
     def _crumb(self, rest: float) -> float:
         """What the best candidate must take where much is left: else no cause makes it, and six crumbs name nothing."""
-        return CRUMB * max(rest if self._is_large(rest) else 0.0, self.alien_chi2)
+        return CRUMB * max(rest if self._is_large(rest) else 0.0, self.alien.chi2)
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None

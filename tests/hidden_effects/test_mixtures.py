@@ -89,6 +89,14 @@ def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
     assert seen.verdict.value == "unexplained", seen.reason
 
 
+def test_what_the_recorded_link_rules_out_is_somebody_elses():
+    """An unknown cause that a sag of the link would imitate best: many weak causes had been fitted in its place."""
+    seen, _ = diagnosed(Case("absent", 3000012), 1.0)
+    assert seen.verdict.value == "unexplained" and seen.left.from_alien_sigma > 0.03
+    assert "looks like dc_link_sag, which the recorded DC link rules out" in seen.reason
+    assert len(seen.found.accepted) <= 2
+
+
 @pytest.mark.campaign
 def test_no_cause_gains_more_than_all_together():
     """A course of speed that had run far promised ten times the whole error, and was named for it beside an unknown cause."""

@@ -11,7 +11,7 @@ from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import joint_net, screen
-from commissioner.diagnose.steps import CRUMB, ENTIRELY, Steps
+from commissioner.diagnose.steps import CRUMB, ENTIRELY, Alien, Steps
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
@@ -73,12 +73,12 @@ def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_a_crumb
     steps = Steps(replace(setting, record=late), WHITE, ["sampling_delay", "iron_loss"], print, late, lambda: True)
     screening = promised(nominal, late, setting, steps.names)
     guards = dict.fromkeys(steps.names, 100.0)
-    assert steps._alien(screening, guards) == 0.0
+    assert steps._most_alien(screening, guards) == Alien()
     steps.ruled_out["sampling_delay"] = 0.5
-    alien = steps.alien_chi2 = steps._alien(screening, guards)
-    assert alien == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2) and alien > steps.material_chi2
-    assert steps._crumb(0.0) == CRUMB * alien
-    assert steps._alien(screening, guards | {"sampling_delay": 2.0 * alien}) == 0.0
+    alien = steps.alien = steps._most_alien(screening, guards)
+    assert alien.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2) and alien.chi2 > steps.material_chi2
+    assert steps._crumb(0.0) == CRUMB * alien.chi2
+    assert steps._most_alien(screening, guards | {"sampling_delay": 2.0 * alien.chi2}) == Alien()
     small, large = 0.005 * steps.count, 0.05 * steps.count
-    steps.alien_chi2 = 0.0
+    steps.alien = Alien()
     assert [steps._crumb(rest) for rest in (small, large)] == [0.0, CRUMB * large]
