@@ -198,7 +198,7 @@ def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Se
         halved = with_halved_intervals(vectors, np.array([v for t, v in pairs if (t.effect, t.kind) == (effect, kind)]), finer)
         fresh = [
             replace(t, start=float(np.clip(halved[t.index], t.lower, t.upper)) if t.kind == kind else known[t.symbol])
-            for t in CATALOGUE[effect].terms(setting)
+            for t in CATALOGUE[effect].terms(setting) if t.kind == kind or t.symbol in known
         ]
         model = model.without(effect).with_terms(fresh)
     return model
