@@ -1,4 +1,4 @@
-"""How far a fit's numbers may move: several causes that say where one iron lies move it together."""
+"""Where one iron lies between rotor and stator, as several causes say: how far a fit may move it."""
 
 from __future__ import annotations
 
