@@ -50,6 +50,7 @@ class Leftover:
     """What a cause would take that was ruled out."""
 
     def with_alien(self, sigma: float) -> Leftover:
+        """With what a cause that was ruled out would take, in units of the noise rms."""
         return replace(self, from_alien_sigma=sigma, sigma=max(self.sigma, sigma))
 
 

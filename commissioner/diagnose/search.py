@@ -194,10 +194,12 @@ def _settled(
     # no cause gains more than all together: where numbers have run far, a loss to first order says so
     most = max(nominal.chi2 - fitted.chi2, 0.0)
     gains = {name: min(loss, most) for name, loss in losses_of(fitted, reached.accepted).items()}
+    # what settling gained may be the same
+    alien = replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0))
     return Found(
         nominal, fitted, reached.accepted, steps.record, layout, setting, reached.screening, first,
         steps.below, gains, tuple(x for x in losses if not x.is_spike),
-        tuple(x for x in losses if x.is_spike), steps.material_chi2, replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0)), steps.go_on(),
+        tuple(x for x in losses if x.is_spike), steps.material_chi2, alien, steps.go_on(),
     )
 
 

@@ -228,13 +228,14 @@ class Steps:
         losses = losses_of(current, effects_of(current.model))
         rest = self._rest(current)
         guards = {name: self._guard(losses, name, rest) for name in screening.scores}
+        least = {name: max(guards[name], self.threshold(score.numbers)) for name, score in screening.scores.items()}
         promising = [s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * guards[s.name])]
         best = None if "sampling_delay" in refused else self._large_delay(current)
         for score in promising[:REFITTED]:
             if best is not None and RIVAL * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
-            wanted = max(guards[score.name], self.threshold(score.numbers))
+            wanted = least[score.name]
             to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
             trial = self._tried(current, score, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
@@ -255,7 +256,7 @@ class Steps:
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
-        self.alien = self._most_alien(screening, guards)
+        self.alien = self._most_alien(screening, least)
         return None if best is None or current.chi2 - best[2].chi2 < self._crumb(rest) else (best[1], best[2])
 
     def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
@@ -303,13 +304,13 @@ class Steps:
             self.tried = (current, {})
         return self.tried[1]
 
-    def _most_alien(self, screening: Screening, guards: Mapping[str, float]) -> Alien:
-        """What of the causes that were ruled out would take most, beyond its guard."""
+    def _most_alien(self, screening: Screening, least: Mapping[str, float]) -> Alien:
+        """What of the causes that were ruled out would take most, and more than the `least` that it must gain."""
         promised = (
             Alien(name, kept * screening.scores[name].delta_chi2)
             for name, kept in self.ruled_out.items() if name in screening.scores
         )
-        beyond = (a for a in promised if a.chi2 > max(guards[a.name], self.threshold(screening.scores[a.name].numbers)))
+        beyond = (a for a in promised if a.chi2 > least[a.name])
         return max(beyond, key=lambda a: a.chi2, default=Alien())
 
     def _crumb(self, rest: float) -> float:
