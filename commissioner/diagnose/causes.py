@@ -147,10 +147,14 @@ def _cause(
 
 
 def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> list[Cause]:
-    """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one: either may be true."""
+    """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one, or if they have another form: either
+
+    may be true.
+    """
     out = []
     for cause in causes:
         tied = [without[c.name].rivals[n] for c in causes if c is not cause for n in c.equivalent if n in without[c.name].rivals]
+        tied += without[cause.name].forms
         sizes = {}
         for key, (value, spread, unit) in cause.sizes.items():
             moved = [0.5 * r.moved.get(cause.name, {}).get(key, 0.0) for r in tied]

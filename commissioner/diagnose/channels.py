@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import expm
 from scipy.signal import lfilter, ss2tf
 
+from commissioner.diagnose.kernels.link import behind_diodes
 from commissioner.diagnose.lines import found_lines, recorded_sag, with_lines, without_lines
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
@@ -18,6 +19,11 @@ from commissioner.diagnose.record import TO_PHASES, Record, Segment
 
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
+SWINGING, DRAWN, ROOT, HELD = (tuple(f"sag_{of}{lag * 1e3:g}ms" for lag in SAG_LAGS_S) for of in ("", "drawn_", "root_", "held_"))
+"""Lagged powers: with their sign, from a source that takes back what it gave; without what is given back; the root of that, as of a
+
+rectifier whose current flows in gaps; and of a capacitor behind diodes, which holds what is given back until it is drawn.
+"""
 RECORDED_LINK, LEAST_SWING = "link_recorded", 1e-5
 """The swing of a recorded link, without its ripple; and what counts as none, of the link."""
 HEAT_LEAKS_S = {"": np.inf, "_20s": 20.0, "_6s": 6.0}
@@ -134,9 +140,10 @@ def _since_start(record: Record, segment: Segment) -> Array:
 
 def _sag(record: Record) -> Named:
     """Minus lagged electrical power over rated power; and the link's own course where it was recorded."""
-    names = tuple(f"sag_{lag * 1e3:g}ms" for lag in SAG_LAGS_S)
-    powers = [power_drawn(record, s) for s in record.segments]
-    lagged = [behind_lag(powers, record.facts.sample_period_s, lag) for lag in SAG_LAGS_S]
+    names, powers, period = (*SWINGING, *DRAWN, *ROOT, *HELD), [power_of(record, s) for s in record.segments], record.facts.sample_period_s
+    drawn = [np.maximum(p, 0.0) for p in powers]
+    laws = [(behind_lag, powers), (behind_lag, drawn), (behind_lag, [np.sqrt(p) for p in drawn]), (behind_rectifier, powers)]
+    lagged = [law(of, period, lag) for law, of in laws for lag in SAG_LAGS_S]
     out = [-np.stack(courses, axis=1) for courses in zip(*lagged, strict=True)]
     recorded = recorded_sag(record)
     if not recorded or max(float(np.std(r)) for r in recorded) < LEAST_SWING:
@@ -144,7 +151,7 @@ def _sag(record: Record) -> Named:
     return (*names, RECORDED_LINK), [np.column_stack(pair) for pair in zip(out, recorded, strict=True)]
 
 
-def power_drawn(record: Record, segment: Segment) -> Array:
+def power_of(record: Record, segment: Segment) -> Array:
     """Mean over each period, (n,), of the electrical power over rated power; the command of a sample acts on the current until the next."""
     current = segment.axis_current_a
     over_the_period = 0.5 * (current + np.append(current[1:], current[-1]))
@@ -164,6 +171,11 @@ def behind_lag(powers: Sequence[Array], period_s: float, lag_s: float, shape: fl
     step = expm(rates * period_s)
     top, bottom = ss2tf(step[:order, :order], step[:order, [order]], step[[-1], :order], step[[-1], [order]])
     return [np.asarray(lfilter(top[0], bottom, power)) for power in powers]
+
+
+def behind_rectifier(powers: Sequence[Array], period_s: float, lag_s: float) -> list[Array]:
+    """As `behind_lag`, of a capacitor that diodes charge: what is given back stays in it until it is drawn."""
+    return [behind_diodes(power, period_s / lag_s) for power in powers]
 
 
 def _hats(record: Record, name: str) -> Named:

@@ -96,10 +96,14 @@ class Rival:
 
 @dataclass(frozen=True)
 class Dropped:
-    """A fit without one cause: the loss in chi2, scaled to the whole recording, and what of the rest takes its place."""
+    """A fit without one cause: the loss in chi2, scaled to the whole recording, and what of the rest takes its place; `forms`: the
+
+    cause's own other ones that do.
+    """
 
     loss: float
     rivals: Mapping[str, Rival]
+    forms: tuple[Rival, ...] = ()
 
 
 def alternatives(
@@ -132,8 +136,19 @@ def alternatives(
             late = fit(read_late(found.model, found.model.nominal[2]), record, layout, noise, wanted_chi2=wanted)
             moved = _moved(found.model, late.model, [n for n in accepted if n != name], setting)
             rivals["sampling_delay"] = Rival((late.chi2 - found.chi2) * scale, moved)
-        out[name] = Dropped(gain * scale, rivals)
+        out[name] = Dropped(gain * scale, rivals, _other_forms(found, without, name, setting, noise, scale))
     return out
+
+
+def _other_forms(found: Fit, without: Fit, name: str, setting: Setting, noise: Noise, scale: float) -> tuple[Rival, ...]:
+    """The other forms of a cause that lose no more than TIE_CHI2."""
+    entry, out = CATALOGUE[name], []
+    for form in entry.other_forms(found.model.of(name), entry.terms(setting)):
+        wanted = found.chi2 + TIE_CHI2 / scale
+        trial = fit(without.model.with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted)
+        if trial.chi2 < wanted and is_plausible(trial.model, name, setting):
+            out.append(Rival((trial.chi2 - found.chi2) * scale, _moved(found.model, trial.model, [name], setting)))
+    return tuple(out)
 
 
 def _moved(here: Model, there: Model, names: Sequence[str], setting: Setting) -> dict[str, dict[str, float]]:

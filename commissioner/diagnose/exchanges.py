@@ -142,6 +142,20 @@ def _is_its_own(fitted: Fit, period_s: float) -> bool:
     return abs(edge - charge) < SAME_STEP * charge + 3.0 * spread
 
 
+def in_other_forms(current: Fit, accepted: Sequence[str], setting: Setting, noise: Noise, report: Report) -> Fit | None:
+    """The fit with causes in other forms of theirs that fit clearly better: each was chosen beside others that the model lacked."""
+    best = current
+    for name in accepted:
+        symbols = current.model.of(name)
+        for form in CATALOGUE[name].other_forms(symbols, CATALOGUE[name].terms(setting)):
+            wanted = best.chi2 - STATISTICAL_FLOOR - price(len(form)) + price(len(best.model.of(name)))
+            trial = fit(best.model.without(name).with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted)
+            report(f"  {name} in another form: gained {best.chi2 - trial.chi2:.4g}")
+            if trial.chi2 <= wanted and is_plausible(trial.model, name, setting):
+                best = trial
+    return None if best is current else best
+
+
 def regrouped(
     current: Fit, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report,
     threshold: Callable[[int], float],

@@ -15,7 +15,15 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import FINE_HAT
 from commissioner.diagnose.dictionaries import following, with_closer_radii, with_faster_speed, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
-from commissioner.diagnose.exchanges import LATE, Exchanged, as_a_lag, as_read_late, large_delay, regrouped
+from commissioner.diagnose.exchanges import (
+    LATE,
+    Exchanged,
+    as_a_lag,
+    as_read_late,
+    in_other_forms,
+    large_delay,
+    regrouped,
+)
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import (
     LINEAR,
@@ -88,6 +96,7 @@ class Steps:
         self.ruled_out: dict[str, float] = {}
         self.alien = Alien()
         self.regrouped: set[frozenset[str]] = set()
+        self.reformed: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
         self.placed: frozenset[str] = frozenset()
@@ -111,7 +120,7 @@ class Steps:
     def continued(self, setting: Setting) -> Steps:
         """A search of more of the same record: sets of causes that were looked at as a whole are not looked at again."""
         steps = Steps(setting, self.noise, self.names, self.report, self.full, self.go_on)
-        steps.regrouped, steps.placed = self.regrouped, self.placed
+        steps.regrouped, steps.reformed, steps.placed = self.regrouped, self.reformed, self.placed
         return steps
 
     @property
@@ -325,7 +334,12 @@ class Steps:
         return (gain - price(numbers), "sampling_delay", trial) if gain >= self.threshold(numbers) else None
 
     def _exchanged(self, current: Fit, accepted: tuple[str, ...]) -> Exchanged | None:
-        """Linear causes for others that fit clearly better, each set tried once."""
+        """Causes in other forms, and linear ones for others, that fit clearly better; each set tried once."""
+        if frozenset(accepted) not in self.reformed:
+            self.reformed.add(frozenset(accepted))
+            other_form = in_other_forms(current, accepted, self.setting, self.noise, self.report)
+            if other_form is not None:
+                return other_form, accepted, self.setting
         mine, late = (frozenset(n for n in accepted if n in names) for names in (LINEAR, LATE))
         if "cable_capacitance" in late and "sensor_lag" in self.names and late not in self.lagging:
             self.lagging.add(late)

@@ -5,6 +5,7 @@ import pytest
 
 from tests.hidden_effects.blind import diagnosed, hidden_names
 from tests.hidden_effects.cases import NULL_NOISES, Case, class_of
+from tests.hidden_effects.oracle import gain_capture
 from tests.hidden_effects.sizes import size_error
 
 
@@ -128,3 +129,18 @@ def test_a_dead_time_that_leads_the_four_parameters_astray_is_named_alone():
     """Thirty times the noise: fitted alone the four had lost their magnetizing inductance, and a skin effect of 3.3 brought it back."""
     seen, _ = diagnosed(Case("one", 2700032, "dead_time"), 3.0)
     assert {c.name for c in seen.causes} == {"dead_time"} and seen.left.sigma < 0.05
+
+
+def test_a_source_that_takes_no_power_back_has_its_sag():
+    """A third of the power swings back: with its sign counted 3.3 % had read 5.0."""
+    seen, scenario = diagnosed(Case("one", 3100031, "dc_link_sag"), 2.0)
+    assert {c.name for c in seen.causes} == {"dc_link_sag"}
+    (effect,) = scenario.plant.effects
+    assert size_error(effect, scenario.plant, seen.causes[0].sizes, 0.0) < 0.05
+
+
+def test_a_source_that_bends_is_foretold_under_another_excitation():
+    """In proportion to lagged power, nothing of the gain was left at another level."""
+    seen, scenario = diagnosed(Case("one", 3100004, "dc_link_sag"), 2.0)
+    assert {c.name for c in seen.causes} == {"dc_link_sag"}
+    assert gain_capture(seen, scenario, 3100004) > 0.9

@@ -85,6 +85,11 @@ class Effect:
         best = max(self.forms(terms), key=lambda form: sum(t.symbol in symbols for t in form), default=())
         return (*best, *self.exchanged_in(symbols))
 
+    def other_forms(self, symbols: Collection[str], terms: Sequence[Term]) -> tuple[tuple[Term, ...], ...]:
+        """Of the sets of these numbers those that are not the one that has these names."""
+        mine = {*self.form_of(symbols, terms)}
+        return tuple(form for form in self.forms(terms) if {*form, *self.exchanged_in(symbols)} != mine)
+
     def exchanged_in(self, symbols: Collection[str]) -> tuple[Term, ...]:
         return tuple(t for t in self.exchanged if t.symbol in symbols)
 

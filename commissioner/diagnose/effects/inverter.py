@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.diagnose import kinds
-from commissioner.diagnose.channels import RECORDED_LINK, SAG_LAGS_S, behind_lag, power_drawn
+from commissioner.diagnose.channels import (
+    DRAWN,
+    HELD,
+    RECORDED_LINK,
+    ROOT,
+    SAG_LAGS_S,
+    SWINGING,
+    behind_lag,
+    behind_rectifier,
+    power_of,
+)
 from commissioner.diagnose.effects.effect import (
     Effect,
     Setting,
@@ -115,7 +125,7 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     """Sag at rated power and time constant (s) of the one lag whose loss of voltage comes nearest to the sum of these, but for a
 
     constant: that only scales the four numbers, so that several lags in place of one between them have any sum. The lag is of second
-    order where that leaves at most SECOND_ORDER_LEAVES of what a first one does.
+    order where that leaves at most SECOND_ORDER_LEAVES of what a first one does, and no capacitor holds what is given back.
     """
     record = setting.record
     first = [s.first(SAG_SAMPLES) for s in record.segments]
@@ -124,12 +134,18 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
     ])
 
-    powers, period = [power_drawn(record, s) for s in first], record.facts.sample_period_s
+    powers, period = [power_of(record, s) for s in first], record.facts.sample_period_s
+    holds = any(values.get(n) for n in HELD)
+    if any(values.get(n) for n in DRAWN):
+        powers = [np.maximum(p, 0.0) for p in powers]
 
     def lagged(log_lag: float, shape: float = 0.0) -> Array:
-        return -np.concatenate(behind_lag(powers, period, float(np.exp(log_lag)), shape))
+        lag = float(np.exp(log_lag))
+        return -np.concatenate(behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape))
 
     size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
+    if holds:
+        return size, float(np.exp(log_lag))
     left = as_much_of(lagged(log_lag), course, weight)[1]
     second = least_squares(
         lambda x: as_much_of(lagged(*x), course, weight)[1], (log_lag, 0.1), x_scale=(0.1, 0.1),
@@ -148,14 +164,17 @@ def _sag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """
     if values.get(RECORDED_LINK):
         courses = _courses(setting.record)
-        if _is_mostly_recorded(courses, values) and _as_lags(courses)[1] > LEFT_BY_THE_LOAD:
+        if _is_mostly_recorded(courses, values) and _as_lags(courses, values)[1] > LEFT_BY_THE_LOAD:
             return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
     return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
 
 
-def _as_lags(courses: Mapping[str, Array]) -> tuple[dict[str, float], float]:
-    """The sum of lagged powers that comes nearest to the recorded link's course, and the share of its power that this leaves."""
-    course, lags = courses[RECORDED_LINK], [n for n in courses if n != RECORDED_LINK]
+def _as_lags(courses: Mapping[str, Array], names: Iterable[str]) -> tuple[dict[str, float], float]:
+    """The sum of the lagged powers among these names that comes nearest to the recorded link's course, and the share of its power
+
+    that this leaves.
+    """
+    course, lags = courses[RECORDED_LINK], [n for n in names if n != RECORDED_LINK]
     table = np.column_stack([courses[n] for n in lags])
     found = np.linalg.lstsq(table, course, rcond=None)[0]
     left = course - table @ found
@@ -177,7 +196,7 @@ def _courses(record: Record) -> dict[str, Array]:
     some = [slice(None, None, max(s.count // SAG_SAMPLES, 1)) for s in record.segments]
     command = np.concatenate([s.voltage_axis_v[at] for s, at in zip(record.segments, some, strict=True)])
     out = {}
-    for name in [n for n in record.channel_names if n.startswith("sag_") or n == RECORDED_LINK]:
+    for name in [n for n in record.channel_names if n in (*SWINGING, *DRAWN, *ROOT, *HELD, RECORDED_LINK)]:
         moved = command * np.concatenate([c[at, record.channel(name)] for c, at in zip(record.channels, some, strict=True)])
         out[name] = moved - command * float(command @ moved) / max(float(command @ command), 1e-300)
     return out
@@ -188,7 +207,7 @@ def without_the_recorded_link(model: Model, record: Record) -> Model:
     swing = model.of("dc_link_sag").get(RECORDED_LINK, 0.0)
     if not swing:
         return model
-    lags, _ = _as_lags(_courses(record))
+    lags, _ = _as_lags(_courses(record), model.of("dc_link_sag"))
     values = tuple(
         0.0 if t.symbol == RECORDED_LINK else v + swing * lags[t.symbol] if t.effect == "dc_link_sag" else v
         for t, v in zip(model.terms, model.values, strict=True)
@@ -202,6 +221,7 @@ def without_the_recorded_link(model: Model, record: Record) -> Model:
     confounders=("dead_time", "sensor_nonlinearity", "leakage_saturation"),
     source="v = v* (1 - k LP(p) / P_N); six-pulse rectifier regulation, e.g. N. Mohan, Power Electronics, ch. 5",
     split_by="record the DC-link voltage, or repeat at another amplitude",
+    either=tuple((*names, RECORDED_LINK) for names in (SWINGING, DRAWN, HELD, DRAWN + ROOT)),
 )
 def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
@@ -212,7 +232,7 @@ def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     record = setting.record
     lags = tuple(
         Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n)
-        for n in record.channel_names if n.startswith("sag_")
+        for n in (*SWINGING, *DRAWN, *ROOT, *HELD)
     )
     if RECORDED_LINK not in record.channel_names:
         return lags

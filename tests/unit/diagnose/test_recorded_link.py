@@ -27,7 +27,7 @@ def tone(hertz):
 
 
 def model_of(setting, nominal, **numbers):
-    terms = SAG.terms(setting)
+    terms = SAG.form_of(numbers, SAG.terms(setting))
     return replace(nominal, terms=terms, values=tuple(numbers.get(t.symbol, 0.0) for t in terms))
 
 
