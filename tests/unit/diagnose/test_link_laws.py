@@ -1,5 +1,7 @@
 """What a DC link loses: a lag, a capacitor behind diodes, and the form that a sag's numbers take."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -22,7 +24,7 @@ def test_behind_diodes_is_the_solution_of_its_equation(lag_s):
     ends = PERIOD_S * np.arange(power.size + 1)
     area = [0.0]
     x = [0.0, 0.0]
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+    for begin, end in itertools.pairwise(ends):
         x = solve_ivp(rates, (begin, end - 1e-15), x, rtol=1e-9, atol=1e-12, max_step=2e-6).y[:, -1]
         area.append(x[1])
     (held,) = behind_rectifier([power], PERIOD_S, lag_s)
