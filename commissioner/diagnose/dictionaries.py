@@ -19,7 +19,7 @@ from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import required_chi2
-from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves
+from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves, without_springs
 from commissioner.diagnose.trial import Trial
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
 
 
 def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
-    """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay), with closer time
+    """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay where the flux fills them), with closer time
 
     constants where a second path acts, and the ratio of the inductances and the slack of the legs as they are now; the same setting
 
@@ -70,12 +70,14 @@ def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     reached = largest_fluxes(setting.record, model, layout)
     fresh, flux = with_ranges(layout, reached[0], setting.facts.current_peak_a * model.nominal[2]), reached[0]
     iron, leak = fresh.iron_top_wb / layout.iron_top_wb, fresh.leak_top_wb / layout.leak_top_wb
-    if layout.stop_radius_wb.shape != fresh.stop_radius_wb.shape:
-        fresh = replace(fresh, stop_radius_wb=layout.stop_radius_wb)
+    has_closer_loops = layout.stop_radius_wb.shape != fresh.stop_radius_wb.shape
     if 0.85 < iron < 1.06 and 0.8 < leak < 1.15:
         fresh, flux = layout, setting.iron_flux_wb
     else:
         model = carried_over(model, layout, reached, fresh)
+        if has_closer_loops:
+            model, filled = without_springs(model, layout, flux)
+            fresh = replace(fresh, stop_radius_wb=filled.stop_radius_wb)
     ratio = leak_ratio(model)
     if abs(ratio - layout.leak_ratio) > SAME_RATIO * ratio:
         fresh = replace(fresh, leak_ratio=ratio)

@@ -24,6 +24,8 @@ SETTLED_SAMPLES, PLACED_SAMPLES = 90_000, 45_000
 """On so many, loops are settled and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
+MOST_OF_THE_FLUX = 0.75
+"""A stop whose radius is a larger share of the flux reached is a spring."""
 REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,), kinds.LEG_SHARE: (1, 2)}
 """Indices of the numbers that only refine a clock, a delay, a lag or the legs."""
 WARMING = frozenset({"stator_heating", "rotor_heating"})
@@ -60,18 +62,43 @@ def _price(one: Fit) -> float:
 
 
 def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model, Layout]:
-    """The model with memory operators of `ratio` times smaller and larger radii beside each that acts."""
+    """The model with memory operators of `ratio` times smaller and larger radii beside each that acts, as far as the flux fills them."""
     loops = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if t.kind == kinds.STOP]
     radii = [layout.stop_radius_wb[t.index] for t, _ in loops]
     for radius, rate in [layout.stop_radius_wb[t.index] for t, v in loops if v]:
         for wanted in (radius / ratio, radius * ratio):
-            if all(r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii):
+            is_new = all(r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii)
+            if is_new and abs(wanted) < widest_loop(layout.iron_top_wb):
                 radii.append(np.array([wanted, rate]))
     values = [v for _, v in loops] + [0.0] * (len(radii) - len(loops))
     fresh = [replace(loops[0][0], symbol=f"loop_{k}", index=k) for k in range(len(radii))]
     others = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if t.kind != kinds.STOP]
     terms, kept = zip(*others, *zip(fresh, values, strict=True), strict=True)
     return Model(model.nominal, terms, kept), replace(layout, stop_radius_wb=np.array(radii))
+
+
+def without_springs(model: Model, layout: Layout, iron_flux_wb: float) -> tuple[Model, Layout]:
+    """The model and its dictionary without memory operators that a flux of `iron_flux_wb` does not fill: they do not yield, and are part
+
+    of 1 / L_M.
+    """
+    radii = layout.stop_radius_wb
+    kept = np.flatnonzero(np.abs(radii[:, 0]) < widest_loop(iron_flux_wb))
+    at = {int(old): new for new, old in enumerate(kept)}
+    stiffness, terms, values = 1.0 / model.nominal[3], [], []
+    for term, value in zip(model.terms, model.values, strict=True):
+        if term.kind == kinds.STOP and term.index not in at:
+            stiffness += value / abs(float(radii[term.index, 0]))
+            continue
+        terms.append(replace(term, symbol=f"loop_{at[term.index]}", index=at[term.index]) if term.kind == kinds.STOP else term)
+        values.append(value)
+    nominal = (*model.nominal[:3], 1.0 / stiffness)
+    return Model(nominal, tuple(terms), tuple(values)), replace(layout, stop_radius_wb=radii[kept])
+
+
+def widest_loop(iron_flux_wb: float) -> float:
+    """Radius (Wb) beyond which a memory operator hardly yields within this flux."""
+    return MOST_OF_THE_FLUX * iron_flux_wb
 
 
 def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:

@@ -226,8 +226,9 @@ def without_the_recorded_link(model: Model, record: Record) -> Model:
 def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
 
-    alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference. Where the link was
-    recorded, the part of its own swing that reaches the motor as well: 1 where the drive leaves it as it is.
+    alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference. What the motor gives
+    back counts with its sign, or not at all, or is held behind diodes until it is drawn; or what is drawn and its root. Where the link
+    was recorded, the part of its own swing that reaches the motor as well: 1 where the drive leaves it as it is.
     """
     record = setting.record
     lags = tuple(
