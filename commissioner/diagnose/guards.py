@@ -66,7 +66,8 @@ LATEST_KNEE, LATEST_KNEE_OF_RATED, LATEST_KNEE_AT_SMALL_CURRENT = 0.2, 0.15, 0.6
 LEAST_SEEN, CLEARLY = 0.3, 6.0
 """Of a sag or a ripple, what a recorded link must show of it, and how many standard errors of white noise it may miss."""
 MOST_SAG = 0.5
-"""Of the link, at rated power: no source gives that power while it loses more."""
+"""Of the link, at rated power: no source gives that power while it loses more. (A charging resistor that was left in loses it at small powers:
+a recorded link shows that.)"""
 LEAST_SLOPE_LOST = 0.25
 """A channel that loses less of its slope than this at the largest current is not straight, yet not at its end."""
 
@@ -122,7 +123,7 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     has_own_sign = any(t.lower < 0.0 for t in CATALOGUE[name].exchanged_in(model.of(name)))
     if sign and sizes and not has_own_sign and next(iter(sizes.values()))[0] * sign <= 0:
         return False
-    if "sag_at_rated_power" in sizes and sizes["sag_at_rated_power"][0] > MOST_SAG:
+    if "sag_at_rated_power" in sizes and sizes["sag_at_rated_power"][0] > MOST_SAG and not _link_shows(model, name, setting.record):
         return False
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
@@ -138,20 +139,31 @@ def is_ruled_out(model: Model, name: str, record: Record) -> bool:
 
 def _link_stands_still(model: Model, name: str, record: Record) -> bool:
     """Whether the DC link was recorded and surely moves by less than LEAST_SEEN of what this cause says."""
+    share, doubt = _shown_by_the_link(model, name, record)
+    return share + CLEARLY * doubt < LEAST_SEEN
+
+
+def _link_shows(model: Model, name: str, record: Record) -> bool:
+    """Whether the DC link was recorded and surely moves by more than LEAST_SEEN of what this cause says."""
+    share, doubt = _shown_by_the_link(model, name, record)
+    return share - CLEARLY * doubt > LEAST_SEEN
+
+
+def _shown_by_the_link(model: Model, name: str, record: Record) -> tuple[float, float]:
+    """Share of what this cause says of the DC link that the recorded one shows, and its standard error; anything where it was not recorded."""
     both = power = swung = 0.0
     count = 0
     for segment, channels in zip(record.segments, record.channels, strict=True):
         if segment.link_swing is None:
-            return False
+            return LEAST_SEEN, np.inf
         course = modulation(model.only((name,)), segment, channels)[0]
         said, seen = course - course.mean(), segment.link_swing - segment.link_swing.mean()
         both, power, swung = both + float(said @ seen), power + float(said @ said), swung + float(seen @ seen)
         count += segment.count
     if power == 0.0:
-        return False
+        return LEAST_SEEN, np.inf
     share = both / power
-    doubt = np.sqrt(max(swung - share * both, 0.0) / count / power)
-    return bool(share + CLEARLY * doubt < LEAST_SEEN)
+    return share, float(np.sqrt(max(swung - share * both, 0.0) / count / power))
 
 
 def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:

@@ -63,6 +63,16 @@ def test_no_link_gives_its_rated_power_while_it_loses_more_than_half(setting, no
         assert is_plausible(model, "dc_link_sag", setting) is is_sound
 
 
+def test_a_link_that_was_recorded_may_lose_as_much_as_it_shows(setting, nominal):
+    """A charging resistor of 80 ohm left in: a sag of 6 % in the test, 0.8 of the link at rated power, had been `unexplained`."""
+    terms = CATALOGUE["dc_link_sag"].terms(setting)
+    model = replace(nominal, terms=terms, values=tuple(0.8 * (t.symbol == "sag_10ms") for t in terms))
+    column = setting.record.channel("sag_10ms")
+    for shown, is_sound in ((0.8, True), (0.0, False)):
+        seen = recorded_link(setting, lambda s, c, shown=shown: shown * c[:, column])
+        assert is_plausible(model, "dc_link_sag", seen) is is_sound
+
+
 @pytest.mark.parametrize("accepted", ["rotor_skin_effect", "sensor_lag", "iron_loss"])
 def test_a_curve_beside_a_linear_cause_may_be_weaker_than_a_memory(accepted):
     """What a linear cause of another form leaves is in proportion to the command, as no curve is; a memory is below its radius."""
