@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose import kinds
+from commissioner.diagnose import kinds, sensor_curve
 from commissioner.diagnose.channel_end import COUNT, current_lost, in_all, slope_lost
 from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Layout, Model, Term
@@ -15,6 +15,7 @@ from commissioner.diagnose.reading import Terminals, conductance_per_volt, readi
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
 
 Array = NDArray[np.float64]
+CURVES = {EVEN: sensor_curve.even, ODD: sensor_curve.odd}
 
 
 def sense(
@@ -42,12 +43,16 @@ def sense(
             is_conductance = row > 3 and listed[row - 4].kind == kinds.IRON_LOSS
             jacobian[row] = reader.of_row(jacobian[row], grows * listed[row - 4].step * held if is_conductance else None)
     scale = layout.nonlinearity_scale_a
-    gain, even, odd = (model.sum_kind(k, 3)[:phases, None] for k in (GAIN, EVEN, ODD))
-    s = current / scale
+    gain = model.sum_kind(GAIN, 3)[:phases, None]
     sensed = current + model.sum_kind(OFFSET, 3)[:phases, None]
-    if gain.any() or even.any() or odd.any():
-        sensed += current * (gain + s * (even + s * odd))
-        slope_of_sensor = 1.0 + gain + s * (2.0 * even + 3.0 * s * odd)
+    curves = {kind: of(current / scale) for kind, of in CURVES.items() if any(t.kind == kind for t in (*model.terms, *listed))}
+    shares = {kind: model.sum_kind(kind, 3 * sensor_curve.COUNT).reshape(-1, 3)[:, :phases, None] for kind in curves}
+    if gain.any() or any(share.any() for share in shares.values()):
+        error, slope_of_sensor = gain, 1.0 + gain
+        for kind, (errors, slopes) in curves.items():
+            error = error + (shares[kind] * errors).sum(axis=0)
+            slope_of_sensor = slope_of_sensor + (shares[kind] * slopes).sum(axis=0)
+        sensed += current * error
         for row in rows:
             jacobian[row] *= slope_of_sensor
     ages = _ages(record, segment) if DRIFT in {t.kind for t in (*model.terms, *listed)} else []
@@ -67,10 +72,9 @@ def sense(
             row[term.index % 3] = ages[term.index // 3]
         elif term.kind == GAIN:
             row[term.index] = current[term.index]
-        elif term.kind == EVEN:
-            row[term.index] = current[term.index] * s[term.index]
-        elif term.kind == ODD:
-            row[term.index] = current[term.index] * s[term.index] ** 2
+        elif term.kind in CURVES:
+            part, phase = divmod(term.index, 3)
+            row[phase] = current[phase] * curves[term.kind][0][part, phase]
         elif term.kind == TONE:
             row[term.index % 3] = channels[:, term.index // 3]
         elif term.kind == CABLE:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from commissioner.diagnose import sensor_curve
 from commissioner.diagnose.channel_end import COUNT, reported
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed
 from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
@@ -142,26 +143,37 @@ def sensor_gain_mismatch(setting: Setting) -> tuple[Term, ...]:
 
 
 def _nonlinearity_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
-    even = [v for k, v in values.items() if k.startswith("even")]
-    odd = [v for k, v in values.items() if k.startswith("odd")]
-    return {
-        "even_at_full_scale": (float(np.mean(even)) if even else 0.0, "1"),
-        "odd_at_full_scale": (float(np.mean(odd)) if odd else 0.0, "1"),
-    }
+    """Mean of the sensors, at full scale of the square and the cubic that err as much as theirs do at the largest current reported."""
+    peak = setting.layout.channel_ends_a / setting.layout.nonlinearity_scale_a
+    out: Sizes = {}
+    for part, of, order in (("even", sensor_curve.even, 1), ("odd", sensor_curve.odd, 2)):
+        errors = of(peak)[0] / peak**order
+        weights = [[values.get(f"{part}_{p}{bend}", 0.0) for p in PHASES[: peak.size]] for bend in BENDS]
+        seen = np.array([f"{part}_{p}" in values for p in PHASES[: peak.size]])
+        mean = float((np.array(weights) * errors).sum(axis=0)[seen].mean()) if seen.any() else 0.0
+        out = {**out, f"{part}_at_full_scale": (mean, "1")}
+    return out
+
+
+BENDS = ("", *(f"_bend_{k}" for k in range(1, sensor_curve.COUNT)))
+"""Of the names of a sensor curve's numbers: its polynomial, and bends that settle."""
 
 
 @effect(
     "sensor_nonlinearity", "Current sensors that are not straight", sign=0, family="even", sizes=_nonlinearity_sizes,
     signature="even or odd lines that no impedance has filtered, in each sensor by its own current",
     confounders=("leakage_saturation", "dc_link_sag"),
-    source="reported = i (1 + n2 i/I_fs + n3 (i/I_fs)^2), I_fs twice the rated peak; linearity figures of data sheets",
+    source="reported = i (1 + n2 i/I_fs + n3 (i/I_fs)^2 + ...), I_fs twice the rated peak; linearity figures of data sheets",
     split_by="DC staircase",
+    either=tuple(
+        tuple(f"{part}_{p}{bend}" for part in ("even", "odd") for bend in bends for p in PHASES) for bends in (BENDS[:1], BENDS)
+    ),
 )
 def sensor_nonlinearity(setting: Setting) -> tuple[Term, ...]:
-    """n2 and n3 of each sensor, relative to full scale."""
+    """n2 and n3 of each sensor, relative to full scale; or these and bends that settle (`sensor_curve`)."""
     return tuple(
-        Term("sensor_nonlinearity", f"{part}_{PHASES[k]}", "1", kind, k, 1e-3)
-        for part, kind in (("even", EVEN), ("odd", ODD)) for k in range(setting.facts.phases)
+        Term("sensor_nonlinearity", f"{part}_{PHASES[k]}{bend}", "1", kind, k + 3 * m, 1e-3)
+        for part, kind in (("even", EVEN), ("odd", ODD)) for m, bend in enumerate(BENDS) for k in range(setting.facts.phases)
     )
 
 
