@@ -11,6 +11,7 @@ LEGS_LINK = 19  # as LEGS, scaled with the link voltage and switching frequency 
 LEAK_SPLIT = 21  # share of the saturating leakage on the rotor side
 LEG_SHARE = 23  # of a leg, what its loss is above the mean of the three, over that mean (1: V, 2: W; U has what is missing)
 ANISOTROPY_SPLIT = 22  # share of the leakage on the rotor side where inductances differ between directions
+MEMORY = 24  # 1: what the iron remembers outlives the pause between two segments
 CARRY = 20  # share of the flux at the end of the segment before that is left at the start: along it (0), across (1)
 
 NOMINAL = (R_S, R_R, GAMMA_SIGMA, GAMMA_M)

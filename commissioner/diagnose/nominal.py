@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from commissioner.diagnose import kinds
@@ -14,11 +15,13 @@ from commissioner.diagnose.channels import add_channels
 from commissioner.diagnose.effects import Setting
 from commissioner.diagnose.effects.inverter import lost_by_a_leg
 from commissioner.diagnose.fit import Fit, fit
+from commissioner.diagnose.kernels.memory import at_rest, replayed
 from commissioner.diagnose.model import LEG_TAIL, NO_DICTIONARY, Layout, Model, Term, even_vectors, odd_vectors
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
 
+Array = NDArray[np.float64]
 SILENT = (1.0, 1.0, 0.01, 0.2)
 """Where a fit begins when no current answers the command (an audit refuses such a recording)."""
 CORNERS_HZ, EDDY_CORNERS_HZ = 12.5 * 2.0 ** (2.0 / 3.0 * np.arange(10)), np.array([150.0, 400.0, 1000.0])
@@ -33,6 +36,8 @@ DROP_SHARE, TAIL_SHARE, LEAST_SLACK = 0.003, 0.03, 0.03
 
 the first. A slack as large as the loss let the tail take 15 to 27 % more than there was, off R_s, for rises cannot be negative.
 """
+PATH_STEPS, MOST_OF_THE_PATH = 6000, 20_000
+"""Points of a segment, and of all before one, at which the iron's flux is kept for what it remembers."""
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
 WIDENING, NARROWING = (-0.03, -0.1, -0.3), (0.03, 0.1, 0.25, 0.5)
 """Radii of stops and, negative, scales of exponential operators, over the largest iron flux; those whose loops widen, and narrow."""
@@ -177,15 +182,35 @@ def starts_of(record: Record) -> list[Term]:
 
 
 def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
-    """Every segment told the rotor flux at which the one before it ended (same file), by the model, one after the other."""
-    before: tuple[float, float] = (0.0, 0.0)
-    file = -1
+    """Every segment told the rotor flux at which the one before it ended (same file), above what the iron keeps, and the iron's
+
+    flux since the file's first, by the model, one after the other.
+    """
+    before, path, file = np.zeros(2), np.zeros((2, 1)), -1
     for k, segment in enumerate(record.segments):
         inherits = segment.file == file and segment.starts_at_rest
-        told = replace(segment, flux_before_wb=before if inherits else (0.0, 0.0))
+        if not inherits:
+            before, path = np.zeros(2), np.zeros((2, 1))
+        told = replace(segment, flux_before_wb=(float(before[0]), float(before[1])), iron_before_wb=path if inherits else None)
         record = replace(record, segments=(*record.segments[:k], told, *record.segments[k + 1 :]))
-        before, file = predict(model, record, k, layout).last_rotor_flux_wb, segment.file
+        seen = predict(model, record, k, layout)
+        steps = np.r_[0 : segment.count : max(segment.count // PATH_STEPS, 1), segment.count - 1]
+        path = np.hstack([path, seen.iron_flux_wb[:, steps]])[:, -MOST_OF_THE_PATH:]
+        kept = _kept_flux(model, layout, path)
+        path = np.hstack([path, kept[:, None]])
+        before, file = np.array(seen.last_rotor_flux_wb) - kept, segment.file
     return record
+
+
+def _kept_flux(model: Model, layout: Layout, path: Array) -> Array:
+    """(2,) flux that the iron's memory keeps up once all currents have decayed, after this path of its flux (2, m)."""
+    radius = layout.stop_radius_wb
+    narrow = np.where(radius[:, 1] > 0.0, 0.0, 1.0 / np.abs(radius[:, 0]))
+    stiffness = model.sum_kind(kinds.STOP, len(radius)) * narrow if model.total(kinds.MEMORY) else np.zeros(len(radius))
+    if not stiffness.any():
+        return np.zeros(2)
+    z = replayed(path, np.ascontiguousarray(radius[:, 0]))
+    return np.array(at_rest(path[0, -1], path[1, -1], z, stiffness, np.ascontiguousarray(radius[:, 0]), model.nominal[3]))
 
 
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:

@@ -110,7 +110,7 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
     drive = modulation(model, segment, channels)
     machine = _machine(model, layout, asked)
     period = segment.period_s
-    start = initial_state(model, segment, machine)
+    start, memory = initial_state(model, segment, machine)
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v}
@@ -131,7 +131,7 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
         )
         return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
-        va, vb, *drive, period, _substeps(model, layout, segment, asked), layout.crossing_substeps, *machine, start
+        va, vb, *drive, period, _substeps(model, layout, segment, asked), layout.crossing_substeps, *machine, start, memory
     )
     return Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
 

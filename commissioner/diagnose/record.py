@@ -12,6 +12,7 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 
+from commissioner.diagnose.kernels.memory import replayed
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
@@ -40,6 +41,8 @@ class Segment:
     uid: int = 0
     flux_before_wb: tuple[float, float] = (0.0, 0.0)
     """Rotor flux (alpha, beta) at the end of the segment before, of which a part may be left at the start."""
+    iron_before_wb: NDArray[np.float64] | None = None
+    """(2, m): the iron's flux in the segments before, to the pause's end; what it remembers of them may outlive the pause."""
     age_s: float = 0.0
     """Time of the first sample since the first one of its file."""
     link_swing: Signal | None = None
@@ -75,6 +78,25 @@ class Segment:
     def idle(self) -> int:
         """Samples before the first command."""
         return int(np.argmax(self.voltage_axis_v != 0.0))
+
+    @property
+    def left_before_wb(self) -> Signal:
+        """(4,) flux that decays after the segment before, and flux that the iron keeps."""
+        kept = (0.0, 0.0) if self.iron_before_wb is None else self.iron_before_wb[:, -1]
+        return np.array([*self.flux_before_wb, *kept])
+
+    def memory(self, radius_wb: Signal) -> NDArray[np.float64]:
+        """(s, 2) what memory operators of these radii have kept of the segments before."""
+        if self.iron_before_wb is None:
+            return np.zeros((radius_wb.size, 2))
+        key = radius_wb.tobytes()
+        if key not in self._memories:
+            self._memories[key] = np.asarray(replayed(self.iron_before_wb, radius_wb))
+        return self._memories[key]
+
+    @cached_property
+    def _memories(self) -> dict[bytes, NDArray[np.float64]]:
+        return {}
 
     def first(self, samples: int) -> Segment:
         """The segment cut so many samples after its first command."""

@@ -56,16 +56,17 @@ class _Left:
         return np.asarray(slope + self.rates_spent * self.tilt @ slope + longer * self.tilt @ self.even)
 
 
-def initial_state(model: Model, segment: Segment, machine: tuple[Any, ...]) -> Array:
-    """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component.
+def initial_state(model: Model, segment: Segment, machine: tuple[Any, ...]) -> tuple[Array, Array]:
+    """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component; and (s, 2) what
 
-    `machine` is the plant's constants and curves.
+    the memory operators at work remember. `machine` is the plant's constants and curves.
     """
-    state = np.tile(_left(model, segment, machine, np.zeros((0, 0, 4))).flux, 2)
+    memory = _memory(model, segment, machine[10])
+    state = np.tile(_left(model, segment, machine, np.zeros((0, 0, 4))).flux, 2) + _magnetized(machine, memory)
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
             state += value * _unit(term.index)
-    return state
+    return state, memory
 
 
 def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], layout: Layout, asked: Sequence[Term]) -> Array:
@@ -74,12 +75,17 @@ def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], la
     bends = any(t.kind == kinds.IRON_CURVE for t in asked)
     left = _left(model, segment, machine, cells_of(layout.iron_vectors if bends else layout.iron_vectors[:0]))
     per_tilt = left.rates_spent * left.even
+    per_memory = _per_memory_current(machine)
+    of_all = _per_ampere(layout.stop_radius_wb)[:, None] * _memory(model, segment, layout.stop_radius_wb)
     tilts = {kinds.ROTOR_ANISOTROPY: 1.0, kinds.LEAKAGE_ANISOTROPY: coupled, kinds.MAGNETIZING_ANISOTROPY: 1.0 - coupled}
     out = np.zeros((4 + len(asked), 4))
     out[kinds.GAMMA_M] = np.tile(left.derivatives[0] * left.flux, 2)
+    out[kinds.GAMMA_M] -= model.nominal[3] * np.tile(_magnetized(machine, _memory(model, segment, machine[10]))[2:], 2)
     for row, term in enumerate(asked, start=4):
         if term.kind == kinds.INITIAL_FLUX:
             out[row] = _unit(term.index)
+        elif term.kind == kinds.STOP:
+            out[row] = per_memory @ of_all[term.index]
         elif term.kind == kinds.CARRY:
             out[row] = np.tile(left.per_share(term.index), 2)
         elif term.kind == kinds.IRON_CURVE:
@@ -89,6 +95,29 @@ def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], la
         elif term.kind in tilts:
             out[row] = np.tile(tilts[term.kind] * np.array(tilted(1.0 - term.index, term.index, *per_tilt)), 2)
     return out
+
+
+def _memory(model: Model, segment: Segment, radius: Array) -> Array:
+    """(s, 2) what operators of `radius` (s, 2) remember of the segments before; nothing where the pause wipes it out."""
+    if not model.total(kinds.MEMORY):
+        return np.zeros((len(radius), 2))
+    return segment.memory(np.ascontiguousarray(radius[:, 0]))
+
+
+def _magnetized(machine: tuple[Any, ...], memory: Array) -> Array:
+    """(psi_s, psi_R) that the memory keeps up."""
+    return np.asarray(_per_memory_current(machine) @ ((machine[9] * _per_ampere(machine[10])) @ memory))
+
+
+def _per_memory_current(machine: tuple[Any, ...]) -> Array:
+    """(4, 2): (psi_s, psi_R) per ampere of memory current where neither terminals nor cage carry any: (3), (6) of `trajectory`."""
+    l_sigma, l_m, nu = 1.0 / machine[0][2], 1.0 / machine[0][3], machine[0][4]
+    return np.vstack([-(l_m + nu * l_sigma) * np.eye(2), -l_m * np.eye(2)])
+
+
+def _per_ampere(radius: Array) -> Array:
+    """(s,) current of each memory operator per ampere and state (1/Wb), near no flux; `radius` (s, 2) with its loop's rate."""
+    return np.where(radius[:, 1] > 0.0, 0.0, 1.0 / np.abs(radius[:, 0]))
 
 
 def _left(model: Model, segment: Segment, machine: tuple[Any, ...], vectors: Array) -> _Left:

@@ -15,6 +15,7 @@ from commissioner.diagnose import kinds
 from commissioner.diagnose.channels import FINE_HAT
 from commissioner.diagnose.dictionaries import following, with_closer_radii, with_faster_speed, with_finer_curves
 from commissioner.diagnose.effects import CATALOGUE, Setting
+from commissioner.diagnose.effects.magnetics import CARRIED
 from commissioner.diagnose.exchanges import (
     LATE,
     Exchanged,
@@ -51,6 +52,8 @@ RIVAL = 2.5
 """A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
 HOPELESS = 0.4
 """A candidate that promises less than this share of what its guard wants is not refitted."""
+CARRIED_ROUNDS = 3
+"""Times that what the iron remembers is told anew by a better model."""
 MOST_LOOKS = 3
 """Times that lines are looked for again: once they are, what was beside them is known better."""
 STEPS_GUARD = 0.5
@@ -191,7 +194,9 @@ class Steps:
             of = {t.kind for t in CATALOGUE[name].terms(self.setting)}
             current, self.setting = with_finer_curves(current, self.setting, self.noise, self.report, of)
             if kinds.STOP in of:
+                current = self._with_carried_memory(current)
                 current, self.setting = with_closer_radii(current, self.setting, self.noise, self.report)
+                current = self.with_new_flux_before(current)
             current, accepted, dropped = self._backward(current, accepted, accepted[:-1])
             refused = idle | set(dropped)
 
@@ -389,7 +394,7 @@ class Steps:
             return current
         full = with_flux_before(self.full, current.model, self.layout)
         record = self._part_of(full)
-        old, new = (np.array([s.flux_before_wb for s in r.segments]) for r in (self.record, record))
+        old, new = (np.array([s.left_before_wb for s in r.segments]) for r in (self.record, record))
         if not np.isfinite(new).all() or np.abs(new - old).max() < 1e-3 * np.abs(new).max():
             return current
         again = fit(current.model, record, self.layout, self.noise)
@@ -397,6 +402,24 @@ class Steps:
             return current
         self.full, self.setting = full, replace(self.setting, record=record)
         return again
+
+    def _with_carried_memory(self, current: Fit) -> Fit:
+        """The fit in which the iron goes into every segment with what it remembers of the one before, where that is better."""
+        if current.model.has_kind(kinds.MEMORY) or not any(s.iron_before_wb is not None for s in self.record.segments):
+            return current
+        best, full = current, self.full
+        for _ in range(CARRIED_ROUNDS):
+            model = best.model if best is not current else current.model.with_terms([CARRIED])
+            told = with_flux_before(full, model, self.layout)
+            trial = fit(model, self._part_of(told), self.layout, self.noise, wanted_chi2=current.chi2 - required_chi2(1))
+            if trial.chi2 >= best.chi2:
+                break
+            best, full = trial, told
+        self.report(f"  iron that remembers the segment before: gained {current.chi2 - best.chi2:.4g}")
+        if current.chi2 - best.chi2 < required_chi2(1):
+            return current
+        self.full, self.setting = full, replace(self.setting, record=self._part_of(full))
+        return best
 
     def with_new_dictionaries(self, current: Fit) -> Fit:
         current, self.setting = following(current, self.setting, self.noise)

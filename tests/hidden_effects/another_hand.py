@@ -52,11 +52,13 @@ class Machine:
     """Part by which that current is larger at little flux, where the sheet is less permeable: exp(-(flux / foot_wb)^2) of it."""
     foot_wb: float = 0.2
     loop_a: float = 0.0
-    """Half the width of the iron's loops at no flux, far from their ends: a Preisach model along the axis, whose relays are 2 h wide,
+    """Half the width of the iron's loops at no flux, far from their ends: along an axis a Preisach model, whose relays are 2 h wide,
 
     h exponentially distributed about `loop_wb`, and fewer the further their middle is from no flux: 1 / cosh^2 of it over `meet_wb`,
-    so that the branches of a loop meet in saturation.
+    so that the branches of a loop meet in saturation; in the plane its plays are vectors, dragged along at a distance h.
     """
+    remembers: bool = False
+    """The iron goes into a segment with what it remembers of the one before; else every one begins demagnetized."""
     loop_wb: float = 0.1
     meet_wb: float = 0.6
     iron_ohm: float = math.inf
@@ -130,14 +132,19 @@ def command(machine: Machine, level: float, bias: float, seconds: float, seed: i
 
 
 def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> StandstillRecording:
-    """All segments one after the other, the machine at rest and without flux before each."""
+    """All segments one after the other, the machine at rest before each, and without flux but for what its iron keeps."""
     random = np.random.default_rng([seed, 7])
     times, numbers, axes, volts, currents, links = [], [], [], [], [], []
-    begin = 0.0
+    begin, kept, plays = 0.0, 0j, np.zeros(60, dtype=np.complex128)
     for k, (axis, level, bias) in enumerate(SEGMENTS):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
-        seen, lost = _simulated(volt * along, PERIOD_S, FINE, begin, complex(machine.left_wb), along, *_numbers(machine))
+        left = complex(machine.left_wb) + kept
+        seen, lost, last = _simulated(volt * along, PERIOD_S, FINE, begin, left, kept, plays, *_numbers(machine))
+        if machine.remembers:
+            kept = _at_rest(last, plays, PAUSE_S, *_iron(machine))
+        else:
+            plays[:] = 0.0
         t = begin + np.arange(volt.size) * PERIOD_S
         phases = np.stack([(seen * cmath.exp(-2j * math.pi * p / 3.0)).real for p in range(3)])
         hum = machine.hum_a * np.cos(2.0 * math.pi * 49.97 * t[None] + np.array([[0.3], [2.0], [4.1]]))
@@ -155,6 +162,10 @@ def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> Standstil
         np.concatenate(times), np.concatenate(numbers), np.concatenate(axes), np.concatenate(volts), u, v, w,
         np.concatenate(links), PERIOD_S, PLATE,
     )  # fmt: skip
+
+
+def _iron(m: Machine) -> tuple[float, ...]:
+    return m.r_r, m.l_r, m.l_m, m.loop_a, m.loop_wb, m.meet_wb
 
 
 def _numbers(m: Machine) -> tuple[float, ...]:
@@ -182,16 +193,37 @@ def _leg_loss(current, leg_v, leg_a, legs):
 
 @njit(cache=True)
 def _relays(flux, plays, loop_a, loop_wb, meet_wb):
-    """Extra magnetizing current of the loops at a flux along the axis; every play follows it."""
+    """Extra magnetizing current of the loops at a flux; every play follows it."""
     most = 0.0
-    total = 0.0
+    total = 0.0j
     for k in range(plays.size):
         half = (k + 0.5) / plays.size * 5.0 * loop_wb
         weight = math.exp(-half / loop_wb)
-        plays[k] = min(max(plays[k], flux - half), flux + half)
+        apart = abs(flux - plays[k])
+        if apart > half:
+            plays[k] = flux - half / apart * (flux - plays[k])
         most += weight
-        total += weight * math.tanh(plays[k] / meet_wb)
-    return loop_a * (meet_wb / loop_wb) * (math.tanh(flux / meet_wb) - total / most)
+        total += weight * _bent(plays[k], meet_wb)
+    return loop_a * (meet_wb / loop_wb) * (_bent(flux, meet_wb) - total / most)
+
+
+@njit(cache=True)
+def _bent(flux, meet_wb):
+    size = abs(flux)
+    return flux * (math.tanh(size / meet_wb) / size) if size > 0.0 else 0.0j
+
+
+@njit(cache=True)
+def _at_rest(rotor, plays, pause, r_r, l_r, l_m, loop_a, loop_wb, meet_wb):
+    """Flux of the magnetizing branch that is left of the rotor's after a pause with open terminals; the plays follow it."""
+    steps = 20_000
+    loops = 0.0j
+    for _ in range(steps):
+        middle = (rotor / l_r - loops) / (1.0 / l_r + 1.0 / l_m)
+        if loop_a > 0.0:
+            loops = _relays(middle, plays, loop_a, loop_wb, meet_wb)
+        rotor -= pause / steps * r_r * (rotor - middle) / l_r
+    return middle
 
 
 @njit(cache=True)
@@ -238,11 +270,11 @@ def _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, along, loop_a, loop_wb, meet_wb, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
-    """Current (n,) that the sensors see, `delay` old, before noise; and what the link has lost then, of it."""
+def _simulated(volts, period, fine, begin, left, kept, plays, loop_a, loop_wb, meet_wb, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
+    """Current (n,) that the sensors see, `delay` old, before noise; what the link has lost then, of it; and the last rotor flux."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
-    x[0], x[1], x[2] = left, left * (l_m + l_r) / l_m, left
+    x[0], x[1], x[2] = left, kept + (left - kept) * (l_m + l_r) / l_m, left
     late, after = round(delay / h), round(read_late / h)
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)
@@ -250,7 +282,7 @@ def _simulated(volts, period, fine, begin, left, along, loop_a, loop_wb, meet_wb
     at = 0
     v = 0.0j
     load = drops = 0.0
-    loops, plays = 0.0j, np.zeros(60)
+    loops = _relays(kept, plays, loop_a, loop_wb, meet_wb) if loop_a > 0.0 else 0.0j
     for k in range(n):
         omega = swing * math.cos(swings * (begin + k * period))
         r_s = cold * (1.0 + warming * (begin + k * period))
@@ -271,9 +303,9 @@ def _simulated(volts, period, fine, begin, left, along, loop_a, loop_wb, meet_wb
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             if loop_a > 0.0:
                 flux = x[2] if iron > 0.0 else _middle(x, (1.0 - bar) * l_r, l_s, l_m, knee, foot, foot_wb, loops)
-                loops = along * _relays((flux * along.conjugate()).real, plays, loop_a, loop_wb, meet_wb)
+                loops = _relays(flux, plays, loop_a, loop_wb, meet_wb)
             if sag > 0.0:
                 load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - (0.0 if diodes and load < 0.0 else load))
                 drops = drops + h / again_s * (load - drops) if again_s > 0.0 else load
             v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 1.5) / fine) * period))
-    return out, lost
+    return out, lost, x[1]

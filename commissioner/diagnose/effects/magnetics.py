@@ -65,6 +65,10 @@ def _split(effect_name: str) -> Term:
     return Term(effect_name, "split", "1", kinds.NU, 0, 0.1, -0.5, 0.5)
 
 
+CARRIED = Term("magnetic_hysteresis", "carried", "1", kinds.MEMORY, 0, 1.0, 0.0, 1.0, start=1.0)
+"""1: the iron goes into a segment with what it remembers of the one before; 0: it has been demagnetized, or starts anew."""
+
+
 def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """Largest current of the memory, and the flux at which it is, of those reached."""
     rates = setting.layout.stop_radius_wb[:, 1]
@@ -79,7 +83,7 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     signature="a loop that does not depend on rate; broad odd lines falling slowly with order",
     confounders=("magnetizing_saturation", "dead_time", "rotor_skin_effect"),
     source="stop operators: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996; exponential: P. R. Dahl, 1968",
-    split_by="repeat the lowest tone at several amplitudes",
+    split_by="repeat the lowest tone at several amplitudes", exchanged=(CARRIED,),
 )
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
     """Extra current sum h_k w_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential

@@ -13,6 +13,8 @@ import numpy as np
 
 from commissioner.compiled import kernel
 
+MOST_STEPS_TO_REST, AT_REST_WB = 2000, 1e-9
+
 
 @kernel
 def remembered(za, zb, da, db, radius):
@@ -26,6 +28,38 @@ def remembered(za, zb, da, db, radius):
     forgotten = -math.expm1(length / radius)
     f = -radius * forgotten / length
     return za * (1.0 - forgotten) + f * da, zb * (1.0 - forgotten) + f * db
+
+
+@kernel
+def replayed(path, radius):
+    """States (s, 2) of operators of these `radius` (s,) after a flux `path` (2, m), from none at its beginning."""
+    z = np.zeros((radius.shape[0], 2))
+    for m in range(1, path.shape[1]):
+        for s in range(radius.shape[0]):
+            z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], path[0, m] - path[0, m - 1], path[1, m] - path[1, m - 1], radius[s])
+    return z
+
+
+@kernel
+def at_rest(pa, pb, z, stiffness, radius, l_m):
+    """Flux at which the memory's current and that of L_M cancel, no voltage and no current being left, from flux (pa, pb) and states
+
+    `z` (s, 2), which follow; `stiffness` (s,) of each operator, A/Wb.
+    """
+    share = 0.5 / (1.0 + l_m * stiffness.sum())
+    for _ in range(MOST_STEPS_TO_REST):
+        ja = jb = 0.0
+        for s in range(radius.shape[0]):
+            ja += stiffness[s] * z[s, 0]
+            jb += stiffness[s] * z[s, 1]
+        da, db = -share * (pa + l_m * ja), -share * (pb + l_m * jb)
+        pa += da
+        pb += db
+        for s in range(radius.shape[0]):
+            z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], da, db, radius[s])
+        if da * da + db * db < AT_REST_WB**2:
+            break
+    return pa, pb
 
 
 @kernel

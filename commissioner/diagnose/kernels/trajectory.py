@@ -176,9 +176,9 @@ def propagate(
     voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega_rad_per_s,
     period, substeps, crossing_substeps,
     base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
-    stop_gain, stop_radius, branch_gain, branch_time, initial_state,
+    stop_gain, stop_radius, branch_gain, branch_time, initial_state, initial_memory,
 ):
-    """Trajectory of one segment from `initial_state` (psi_s, psi_R).
+    """Trajectory of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2).
 
     `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,) and
     `phase_factor` (n, 3) known functions of time; curves as cells (intervals, 4), those without any size empty. Returns
@@ -193,7 +193,7 @@ def propagate(
     current, rotor_current = np.zeros((2, samples)), np.zeros((2, samples))
     slope_after, slope_before = np.zeros((2, samples)), np.zeros((2, samples))
     x, y, k, total = np.zeros(order), np.zeros(order), np.zeros(order), np.zeros(order)
-    z = np.zeros((stops, 2))
+    z = initial_memory.copy()
     nu, rs, r_r = base[4], base[0], base[1]
     x[0:4] = initial_state
     has_link = legs_link.shape[0] > 0
