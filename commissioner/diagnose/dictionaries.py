@@ -17,10 +17,11 @@ from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
-from commissioner.diagnose.record import Record
+from commissioner.diagnose.plant import predict
+from commissioner.diagnose.record import TO_PHASES, Record, each_segment
 from commissioner.diagnose.screen import required_chi2
 from commissioner.diagnose.settle import CLOSER, with_closer_loops, without_curves, without_springs
-from commissioner.diagnose.trial import Trial
+from commissioner.diagnose.trial import Trial, whiten
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -140,15 +141,36 @@ def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
 
 
 def with_faster_speed(current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]) -> tuple[Fit, Record, Setting]:
-    """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz."""
+    """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz. Not tried where less than that
+
+    is left across the axes, along which no speed moves anything to first order.
+    """
     record = with_fine_hats(full, setting.lines_hz)
     there = replace(setting, record=record.first(setting.record.commanded))
     speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
     wanted = current.chi2 - max(required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained)
+    if left_across(current.model, setting, noise) < current.chi2 - wanted:
+        return current, full, setting
     faster = fit(model, there.record, there.layout, noise, wanted_chi2=wanted)
     report(f"  a speed on closer knots: gained {current.chi2 - faster.chi2:.4g}")
     return (faster, record, there) if faster.chi2 < wanted else (current, full, setting)
+
+
+def left_across(model: Model, setting: Setting, noise: Noise) -> float:
+    """Chi2, above the noise's, of what the model leaves across the axis of each segment."""
+    record = setting.record
+
+    def of_segment(k: int) -> float:
+        segment = record.segments[k]
+        angle = np.deg2rad(segment.axis_deg)
+        along = TO_PHASES[: record.facts.phases] @ np.array([np.cos(angle), np.sin(angle)])
+        left = segment.currents_a - predict(model, record, k, setting.layout).currents_a
+        across = left - np.outer(along, along @ left) / float(along @ along)
+        white = whiten(across, segment.is_good, noise, record.facts.sample_period_s)
+        return float(white @ white) - segment.good_count * (record.facts.phases - 1)
+
+    return sum(each_segment(of_segment, record))
 
 
 def with_finer_curves(

@@ -69,7 +69,7 @@ def as_a_lag(
     for group in (("sensor_lag",), ("sampling_delay", "sensor_lag")):
         if not set(group) <= set(names):
             continue
-        terms = [t for n in group for t in CATALOGUE[n].terms(setting)]
+        terms = [t for n in group for t in CATALOGUE[n].forms(CATALOGUE[n].terms(setting))[0]]
         share = {"lag": 0.7 if len(group) > 1 else 1.0, "delay": 0.3}
         started = model.with_terms([replace(t, start=share[t.symbol] * late) if t.symbol in share else t for t in terms])
         wanted = current.chi2 + cost - sum(required_chi2(sum(t.effect == n for t in terms)) for n in group)
@@ -79,6 +79,23 @@ def as_a_lag(
         if trial.chi2 < wanted and all(is_plausible(trial.model, n, setting) for n in group):
             return trial, (*(n for n in accepted if n not in mine), *group), setting
     return None
+
+
+def as_rippled(
+    current: Fit, name: str, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report
+) -> Exchanged | None:
+    """A lag that sees the switching's ripple in place of the delay or the smooth lag that imitates it: at zero nothing promises one."""
+    if name not in LATE or "sensor_lag" not in names or (name != "sensor_lag" and "sensor_lag" in accepted):
+        return None
+    entry = CATALOGUE["sensor_lag"]
+    form = entry.forms(entry.terms(setting))[-1]
+    numbers = len(form) - sum(t.effect == name for t in current.model.terms)
+    wanted = current.chi2 - required_chi2(max(numbers, 0))
+    trial = fit(current.model.without(name).with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted)
+    report(f"  a lag that sees the ripple in place of {name}: gained {current.chi2 - trial.chi2:.4g}")
+    if trial.chi2 > wanted:
+        return None
+    return trial, (*(n for n in accepted if n != name), "sensor_lag"), setting
 
 
 def as_read_late(
@@ -184,7 +201,7 @@ def regrouped(
         if without.chi2 - HOPEFUL * net > wanted - least:
             continue
         numbers = sum(price(screening.scores[n].numbers) for n in group)
-        terms = [t for n in group for t in CATALOGUE[n].terms(setting)]
+        terms = [t for n in group for t in screening.scores[n].form]
         to_beat = wanted - least - numbers
         trial, there = fit(without.model.with_terms(terms), record, layout, noise, wanted_chi2=to_beat), setting
         if to_beat < trial.chi2 < to_beat + NEARLY * (without.chi2 - current.chi2):

@@ -79,7 +79,7 @@ def by_shape(current: Between, lag: float, shape: float, late: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _unforced(u, lag, shape, out):
+def unforced(u, lag, shape, out):
     """The filter without input, `u` samples on: values from a value and from a slope of 1, then the slopes of both."""
     if shape == 0.0:
         out[0], out[1] = np.exp(-u / lag), 0.0
@@ -117,7 +117,7 @@ def _behind(values, after, before, held, late, lag, shape, value, slope):
     rows, n = values.shape
     lagged, rate = np.zeros((rows, n)), np.zeros((rows, n))
     whole, part, at_start, there = np.zeros(4), np.zeros(4), np.zeros(2), np.zeros(2)
-    _unforced(1.0, lag, shape, whole)
+    unforced(1.0, lag, shape, whole)
     for c in range(rows):
         lagged[c, 0] = values[c, 0]
         for k in range(n - 1):
@@ -133,7 +133,7 @@ def _behind(values, after, before, held, late, lag, shape, value, slope):
         j = min(max(int(np.floor(at)), 0), n - 2)
         u = min(max(at - j, 0.0), 2.0)
         if u != last:
-            _unforced(u, lag, shape, part)
+            unforced(u, lag, shape, part)
             last = u
         for c in range(rows):
             y0, y1 = values[c, j] + held[c, j], values[c, j + 1] + held[c, j]

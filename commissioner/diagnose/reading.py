@@ -5,7 +5,7 @@ The current is cubic between samples, and steps where the held voltage does by w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,8 +17,11 @@ from commissioner.diagnose.lag import SHORT_LAG, Between, behind, by_lag, by_sha
 from commissioner.diagnose.model import Model, Term
 from commissioner.diagnose.record import Segment
 from commissioner.diagnose.resample import held_at, resample, resample_hermite, step_shown
+from commissioner.diagnose.ripple import Pulses
 
 Array = NDArray[np.float64]
+SHAPE, RIPPLED = 1, 2
+"""Of a lag's numbers: its shape, and the lag of a filter that sees the switching's ripple."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,20 @@ class Reading:
     period_s: float
     turns: Array
     clock: Array
+    pulses: Pulses | None = None
+    filtered: tuple[float, float] = (0.0, 0.0)
+    """Lag (samples) and shape of the filter that sees them; `per_henry` of the leakage inductance."""
+    per_henry: float = 0.0
 
     @cached_property
     def shown(self) -> NDArray[np.intp]:
         """Which step of the held voltage each sample shows."""
         return step_shown(self.late)
+
+    @cached_property
+    def ripple_a(self) -> Array:
+        """(3, n) of the switching, as it is seen behind the filter."""
+        return self.per_henry * self.pulses.behind(*self.filtered) if self.pulses else np.zeros((3, self.late.size))
 
     def of(self, current: Terminals) -> tuple[Array, Array]:
         """Values and slopes (1/s) read of the current."""
@@ -66,10 +78,18 @@ class Reading:
             return np.asarray(-slope * self.turns[term.index])
         if term.kind == CLOCK:
             return np.asarray(-slope * self.clock[term.index])
+        smooth, rows = self._by_filter(term, current, slope), slope.shape[0]
+        if self.pulses is None or term.index == 0:
+            return smooth
+        by = self.pulses.by_lag if term.index == RIPPLED else self.pulses.by_shape
+        per_number = self.per_henry / (self.period_s if term.index == RIPPLED else 1.0)
+        return np.asarray(smooth + per_number * by(*self.filtered)[:rows])
+
+    def _by_filter(self, term: Term, current: Terminals, slope: Array) -> Array:
         if not self.lag:
-            return np.asarray(-slope if term.index == 0 else np.zeros_like(slope))
+            return np.asarray(-slope if term.index != SHAPE else np.zeros_like(slope))
         between = current.between(self.period_s)
-        if term.index == 0:
+        if term.index != SHAPE:
             return by_lag(between, self.lag, self.shape, self.late) / self.period_s
         return by_shape(between, self.lag, self.shape, self.late)
 
@@ -91,16 +111,20 @@ class Terminals:
         return Between(self.unheld, self.after * period_s, self.before * period_s, self.held)
 
 
-def reading(model: Model, segment: Segment, listed: Sequence[Term]) -> Reading:
+def reading(model: Model, segment: Segment, listed: Sequence[Term], pulses: Callable[[], Pulses]) -> Reading:
     """Of one segment, from the model's delay, clock and lag; `listed`: numbers whose derivatives will be asked for."""
     at_work = {t.kind for t in (*model.terms, *listed)}
     turns = _delays(segment) if DELAY in at_work else np.zeros((0, segment.count))
     clock = 1e-6 * clock_courses(segment) if CLOCK in at_work else np.zeros((0, segment.count))
     late = model.sum_kind(DELAY, len(turns)) @ turns + model.sum_kind(CLOCK, len(clock)) @ clock
     period = segment.period_s
-    lag, shape = model.total(LAG) / period, model.total(LAG, 1)
+    rippled, shape = model.total(LAG, RIPPLED) / period, model.total(LAG, SHAPE)
+    lag = model.total(LAG) / period + rippled
     is_short = lag < SHORT_LAG
-    return Reading(late / period + (lag if is_short else 0.0), 0.0 if is_short else lag, shape, period, turns, clock)
+    smooth = late / period + (lag if is_short else 0.0), 0.0 if is_short else lag, shape, period, turns, clock
+    if rippled or any(t.kind == LAG and t.index == RIPPLED for t in listed):
+        return Reading(*smooth, pulses(), (rippled, shape), 1.0 / model.nominal[2])
+    return Reading(*smooth)
 
 
 def conductance_per_volt(model: Model) -> tuple[float, float]:

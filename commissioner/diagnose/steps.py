@@ -21,6 +21,7 @@ from commissioner.diagnose.exchanges import (
     Exchanged,
     as_a_lag,
     as_read_late,
+    as_rippled,
     in_other_forms,
     large_delay,
     regrouped,
@@ -189,6 +190,9 @@ class Steps:
                 current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
                 current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
+            rippled = as_rippled(current, name, accepted, self.setting, self.noise, self.names, self.report)
+            if rippled is not None:
+                current, accepted, self.setting = rippled
             current = self._with_unequal_legs(current, accepted[:-1])
             current = self.with_new_dictionaries(self.with_new_flux_before(current))
             of = {t.kind for t in CATALOGUE[name].terms(self.setting)}

@@ -13,6 +13,7 @@ from commissioner.diagnose.kinds import CABLE, CLOCK, DELAY, DRIFT, END, EVEN, G
 from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.reading import Terminals, conductance_per_volt, reading
 from commissioner.diagnose.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.ripple import Pulses
 
 Array = NDArray[np.float64]
 CURVES = {EVEN: sensor_curve.even, ODD: sensor_curve.odd}
@@ -31,7 +32,7 @@ def sense(
     if capacitance.any() or any(t.kind == CABLE for t in listed):
         edges = _edges(to_phases @ segment.voltage_ab_v / period)
         current = current + sum(c * e for c, e in zip(capacitance, edges, strict=True))
-    reader = reading(model, segment, listed)
+    reader = reading(model, segment, listed, lambda: Pulses.of(record.facts, TO_PHASES @ held_v))
     held = to_phases @ held_v
     per_volt, grows = conductance_per_volt(model)
     there = Terminals(current, after, before, per_volt * held)
@@ -42,6 +43,11 @@ def sense(
         for row in rows:
             is_conductance = row > 3 and listed[row - 4].kind == kinds.IRON_LOSS
             jacobian[row] = reader.of_row(jacobian[row], grows * listed[row - 4].step * held if is_conductance else None)
+    if reader.pulses is not None:
+        ripple = reader.ripple_a[:phases]
+        current = current + ripple
+        if rows:
+            jacobian[2] -= ripple
     scale = layout.nonlinearity_scale_a
     gain = model.sum_kind(GAIN, 3)[:phases, None]
     sensed = current + model.sum_kind(OFFSET, 3)[:phases, None]

@@ -11,6 +11,7 @@ from commissioner.diagnose.channel_end import COUNT, reported
 from commissioner.diagnose.effects.effect import Effect, Setting, Sizes, effect, listed
 from commissioner.diagnose.kinds import CLOCK, DELAY, DRIFT, END, EVEN, GAIN, LAG, ODD, OFFSET, TONE
 from commissioner.diagnose.model import Term
+from commissioner.diagnose.reading import RIPPLED, SHAPE
 
 PHASES = ("u", "v", "w")
 
@@ -45,15 +46,18 @@ def sampling_delay(setting: Setting) -> tuple[Term, ...]:
 MOST_RESONANT = 0.5
 
 
+FIRST_RIPPLED = 0.07
+"""Of a sample, where the fit of a lag that sees the ripple begins: from none there is no way to it, a short one hardly shows."""
 LEAST_SHAPE = 0.02
 """Of a lag, from which on it may be a delay of 2 % of it, and a lag of first order."""
 
 
 def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """The sum, and how much of it a delay before a lag of first order may be, whose second order is the same."""
-    sizes = {"time_constant_us": (values["lag"] * 1e6, "us")}
-    if (shape := values.get("shape", 0.0)) > LEAST_SHAPE:
-        sizes["may_be_delay_us"] = (values["lag"] * 1e6 * (1.0 - max(1.0 - 2.0 * shape, 0.0) ** 0.5), "us")
+    lag = values.get("lag", 0.0) + values.get("rippled", 0.0)
+    sizes = {"time_constant_us": (lag * 1e6, "us")}
+    if (shape := values.get("shape", 0.0)) > LEAST_SHAPE and not values.get("rippled"):
+        sizes["may_be_delay_us"] = (lag * 1e6 * (1.0 - max(1.0 - 2.0 * shape, 0.0) ** 0.5), "us")
     return sizes
 
 
@@ -63,15 +67,17 @@ def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
     source="anti-alias filter or sensor bandwidth: tau dy/dt = i - y, once or twice",
     split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
+    either=(("lag", "shape"), ("rippled", "shape")),
 )
 def sensor_lag(setting: Setting) -> tuple[Term, ...]:
     """Sum S >= 0 [s] of the time constants of 1 / (1 + s S + s² q S²) and its shape q: 0 one lag, 1/4 two equal ones, 1/2
 
-    Butterworth's. The size is the sum.
+    Butterworth's; of a current without ripple, or of one that ripples with the inverter's pulses (`ripple`). The size is the sum.
     """
     return (
         Term("sensor_lag", "lag", "s", LAG, 0, 1e-6, 0.0, 0.02),
-        Term("sensor_lag", "shape", "1", LAG, 1, 1e-2, 0.0, MOST_RESONANT),
+        Term("sensor_lag", "shape", "1", LAG, SHAPE, 1e-2, 0.0, MOST_RESONANT),
+        Term("sensor_lag", "rippled", "s", LAG, RIPPLED, 1e-6, 0.0, 0.02, start=FIRST_RIPPLED * setting.facts.sample_period_s),
     )
 
 
