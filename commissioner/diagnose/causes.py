@@ -33,6 +33,11 @@ COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
 noise power.
 """
 TRUNCATION_SLACK = 0.15
+NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.99, 0.2, 0.9
+"""A cause that takes so much of what is not another's is named with so much confidence, unless a rival that takes its place loses less
+
+than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
+"""
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
@@ -99,7 +104,13 @@ def _may_be_named(found: Found, name: str, rest: Leftover, trust: float) -> bool
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     sure = trust * confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
-    return sure >= LEAST_CONFIDENCE and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+    is_likely = sure >= LEAST_CONFIDENCE or _is_dominant(found.gains[name], rest, count)
+    return is_likely and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+
+
+def _is_dominant(gain: float, rest: Leftover, count: float) -> bool:
+    """Whether a cause alone takes nearly all of the error that there is beside other named ones: then it is there, whatever else is."""
+    return rest.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
 
 
 def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
@@ -134,6 +145,8 @@ def _cause(
     )
     features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
+    if _is_dominant(gain, rest, count) and all(r.loss > LEAST_LOST_TO_A_RIVAL * gain for r in without.rivals.values()):
+        sure = max(sure, DOMINANT_CONFIDENCE * trust)
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
     strength = float(np.sqrt(gain / count))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
-from scipy.special import erfc
+from scipy.special import erfc, gammainccinv
 
 from commissioner.diagnose.record import Record, Segment
 
@@ -33,6 +33,10 @@ simulation adds no noise.
 """
 NOTHING_MORE = 1e-6
 """Of the variance."""
+MAINS_HZ, LOBE_BINS, AROUND_BINS = (50.0, 60.0), 5, 16
+"""Mains lines, and bins next to one: those that its skirts fill, and those that tell what is noise there."""
+STANDS_OUT, ONCE_IN = 1.5, 1e-6
+"""A line is none of the noise where its bins hold so many times what chance makes of them once in so many recordings."""
 SPIKE, RARE = 12.0, 1e-3
 """Of the median deviation, and of the samples: fewer than these beyond that are spikes, not noise."""
 WHITE_WITHIN = 0.12
@@ -271,6 +275,7 @@ def _noise(
     quantile = 0.5 if is_known else 0.15
     correction = -np.log(1.0 - quantile)
     frequency, power, phase_count = [], [], values[0].shape[0]
+    spectra = []
     for piece in values:
         n = piece.shape[1]
         window = _window(n)
@@ -278,8 +283,12 @@ def _noise(
         if is_known:
             centred = _without_spikes(centred)
         spectrum = np.abs(np.fft.rfft(centred * window, axis=1)) ** 2 / float(window @ window)
-        frequency.append(np.fft.rfftfreq(n, period)[2:])
-        power.append(spectrum[:, 2:])
+        spectra.append((np.fft.rfftfreq(n, period)[2:], spectrum[:, 2:]))
+    hum = [hz for hz in MAINS_HZ if _stands_out(spectra, hz)]
+    for here, spectrum in spectra:
+        kept = ~np.any([np.abs(here - hz) < LOBE_BINS * here[0] / 2.0 for hz in hum], axis=0) if hum else np.ones(here.size, dtype=bool)
+        frequency.append(here[kept])
+        power.append(spectrum[:, kept])
     f, p = np.concatenate(frequency), np.concatenate(power, axis=1)
     top = 0.5 / period
     least = (RESOLVED * record.facts.current_peak_a) ** 2
@@ -325,6 +334,24 @@ def _noise(
         np.sqrt(white), at, relative, source, is_known, float(1.5 * np.sqrt(1.0 / max(total, 1))),
         is_white, listed,
     )
+
+
+def _stands_out(spectra: Sequence[tuple[Array, Array]], hz: float) -> bool:
+    """Whether mains hum stands above what is around it in these spectra, (b,) Hz and (phases, b): in a stretch of a third of a second its
+
+    skirts are the whole neighbourhood, and what is hum would be noise.
+    """
+    power, bins = 0.0, 0
+    for frequency, spectrum in spectra:
+        apart = np.abs(frequency - hz) / (frequency[0] / 2.0)
+        around = spectrum[:, (apart >= LOBE_BINS) & (apart < AROUND_BINS)]
+        if around.shape[1] < LOBE_BINS or hz > frequency[-1]:
+            continue
+        level = np.median(around, axis=1) / np.log(2.0)
+        if level.min() > 0.0:
+            power += float((spectrum[:, int(np.argmin(apart))] / level).sum())
+            bins += spectrum.shape[0]
+    return bins > 0 and power > STANDS_OUT * float(gammainccinv(bins, ONCE_IN))
 
 
 def _without_spikes(values: Array) -> Array:

@@ -195,7 +195,7 @@ def _settled(
     most = max(nominal.chi2 - fitted.chi2, 0.0)
     gains = {name: min(loss, most) for name, loss in losses_of(fitted, reached.accepted).items()}
     # what settling gained may be the same
-    alien = replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0))
+    alien = replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0)) if alien.chi2 else alien
     return Found(
         nominal, fitted, reached.accepted, steps.record, layout, setting, reached.screening, first,
         steps.below, gains, tuple(x for x in losses if not x.is_spike),
