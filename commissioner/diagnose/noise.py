@@ -283,7 +283,7 @@ def _noise(
         if is_known:
             centred = _without_spikes(centred)
         spectrum = np.abs(np.fft.rfft(centred * window, axis=1)) ** 2 / float(window @ window)
-        spectra.append((np.fft.rfftfreq(n, period)[2:], spectrum[:, 2:]))
+        spectra.append((np.asarray(np.fft.rfftfreq(n, period)[2:], dtype=np.float64), spectrum[:, 2:]))
     hum = [hz for hz in MAINS_HZ if _stands_out(spectra, hz)]
     for here, spectrum in spectra:
         kept = ~np.any([np.abs(here - hz) < LOBE_BINS * here[0] / 2.0 for hz in hum], axis=0) if hum else np.ones(here.size, dtype=bool)

@@ -25,8 +25,8 @@ SEGMENTS = ((0.0, 1.0, 0.0), (60.0, 1.5, 0.0), (120.0, 1.0, 0.3), (0.0, 1.0, 0.0
 TONES_HZ = (0.5, 2.3, 8.0, 33.0, 110.0, 329.0)
 SHARE = 0.08
 PAUSE_S = 1.0
-STEPS = 3
-"""Runge-Kutta steps between two edges."""
+LONGEST_S = 4e-6
+"""Runge-Kutta step between two edges."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Drive:
     l_m: float = 0.27
     lag_s: float = 0.0
     """Of a first-order filter before the converter."""
+    dead_s: float = 0.0
+    """Between one switch of a leg and the other: meanwhile the current chooses the diode."""
     charging_ohm: float = 0.0
     """Resistance between a stiff source and the link's capacitor."""
     link_f: float = 2e-4
@@ -65,7 +67,7 @@ def switched(drive: Drive, seconds: float = 2.0, seed: int = 1) -> StandstillRec
         volts = _command(drive, level, bias, seconds, np.random.default_rng([seed, 0 if k == 3 else k]))
         angles = math.radians(axis) - 2.0 * math.pi / 3.0 * np.arange(3)
         legs = np.cos(angles)[:, None] * volts
-        numbers = (drive.r_s, drive.r_r, drive.l_sigma, drive.l_m, drive.lag_s, drive.charging_ohm, drive.link_f)
+        numbers = (drive.r_s, drive.r_r, drive.l_sigma, drive.l_m, drive.lag_s, drive.dead_s, drive.charging_ohm, drive.link_f)
         phases, link = _through_the_pulses(np.ascontiguousarray(legs), *numbers)
         phases += drive.noise * PEAK_A * random.normal(size=phases.shape)
         t = k * (seconds + PAUSE_S) + np.arange(volts.size) * PERIOD_S
@@ -94,13 +96,13 @@ def _phase(x, p):
 
 
 @njit(cache=True)
-def _through_the_pulses(legs_v, r_s, r_r, l_sigma, l_m, lag, charging, farad):
+def _through_the_pulses(legs_v, r_s, r_r, l_sigma, l_m, lag, dead, charging, farad):
     """Phase currents (3, n) that the converter takes and link voltage (n,), where the carrier turns: all legs low on both sides."""
     n = legs_v.shape[1]
     out, link = np.zeros((3, n)), np.zeros(n)
     x, y, v = np.zeros(7), np.zeros(7), np.zeros(2)
     k1, k2, k3, k4 = np.zeros(7), np.zeros(7), np.zeros(7), np.zeros(7)
-    edges, on = np.zeros(7), np.zeros(3)
+    edges, on = np.zeros(13), np.zeros(3)
     u = LINK_V
     for k in range(n):
         for p in range(3):
@@ -108,15 +110,19 @@ def _through_the_pulses(legs_v, r_s, r_r, l_sigma, l_m, lag, charging, farad):
         link[k] = u
         for p in range(3):
             duty = 0.5 + legs_v[p, k] / LINK_V
-            edges[2 * p], edges[2 * p + 1] = 0.5 * PERIOD_S * (1.0 - duty), 0.5 * PERIOD_S * (1.0 + duty)
-        edges[6] = PERIOD_S
+            edges[p], edges[3 + p] = 0.5 * PERIOD_S * (1.0 - duty), 0.5 * PERIOD_S * (1.0 + duty)
+        edges[6:12] = edges[:6] + dead
+        edges[12] = PERIOD_S
         begin = 0.0
         for end in np.sort(edges):
-            h = (end - begin) / STEPS
-            drawn = 0.0
-            for p in range(3):
-                on[p] = 1.0 if edges[2 * p] < 0.5 * (begin + end) < edges[2 * p + 1] else 0.0
-            for _ in range(STEPS if h > 0.0 else 0):
+            steps = math.ceil((end - begin) / LONGEST_S)
+            h = (end - begin) / max(steps, 1)
+            middle = 0.5 * (begin + end)
+            for _ in range(steps):
+                for p in range(3):
+                    waits = edges[p] < middle < edges[6 + p] or edges[3 + p] < middle < edges[9 + p]
+                    is_on = edges[6 + p] < middle < edges[3 + p]
+                    on[p] = 1.0 if is_on or (waits and _phase(x, p) < 0.0) else 0.0
                 v[0] = u * (2.0 * on[0] - on[1] - on[2]) / 3.0
                 v[1] = u * (on[1] - on[2]) / math.sqrt(3.0)
                 _rates(x, v, r_s, r_r, l_sigma, l_m, lag, k1)

@@ -34,3 +34,12 @@ def test_a_charging_resistor_that_was_left_in_is_a_sag_as_large_as_the_link_show
     # S = R P / V^2 of the stiff source, small powers
     at_rated = ohms * PLATE["rated_power_w"] / LINK_V**2
     assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(at_rated, rel=0.05)
+
+
+def test_a_real_dead_time_is_named_though_what_ripple_makes_of_it_is_left():
+    """24 times the noise, of which its curve leaves 1.4: nothing had been named, and all of it called unknown."""
+    seen, names = named(Drive(dead_s=2e-6))
+    assert names == {"dead_time"} and seen.causes[0].confidence >= 0.9
+    assert seen.left.sigma < 0.1 * seen.causes[0].strength_sigma
+    if seen.verdict.value == "unexplained":
+        assert "consistent with dead_time" in seen.reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -134,16 +134,21 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
     ])
 
-    powers, period = [power_of(record, s) for s in first], record.facts.sample_period_s
-    holds = any(values.get(n) for n in HELD)
-    if any(values.get(n) for n in DRAWN):
-        powers = [np.maximum(p, 0.0) for p in powers]
+    both_ways, period = [power_of(record, s) for s in first], record.facts.sample_period_s
+    one_way = [np.maximum(p, 0.0) for p in both_ways]
+    holds, draws = any(values.get(n) for n in HELD), any(values.get(n) for n in DRAWN)
 
-    def lagged(log_lag: float, shape: float = 0.0) -> Array:
-        lag = float(np.exp(log_lag))
-        return -np.concatenate(behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape))
+    def lagged_of(powers: Sequence[Array]) -> Callable[..., Array]:
+        def lagged(log_lag: float, shape: float = 0.0) -> Array:
+            lag = float(np.exp(log_lag))
+            return -np.concatenate(behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape))
 
-    size, log_lag = nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)
+        return lagged
+
+    # beside a recorded link the powers only mend its course: what they are made of says nothing of the source
+    tried = [lagged_of(p) for p in ((both_ways, one_way) if values.get(RECORDED_LINK) and not holds else (one_way if draws else both_ways,))]
+    read = [(lagged, *nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)) for lagged in tried]
+    lagged, size, log_lag = min(read, key=lambda r: float(np.linalg.norm(as_much_of(r[0](r[2]), course, weight)[1])))
     if holds:
         return size, float(np.exp(log_lag))
     left = as_much_of(lagged(log_lag), course, weight)[1]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.noise import Noise, measure_noise
@@ -32,3 +33,29 @@ def test_a_few_spikes_are_not_noise():
     rows[1, [500, 3000, 19000]] = 40.0
     noise = measure_noise(prepare([replace(blank, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[0])
     assert noise.source == "repeated segments" and noise.sigma_a == pytest.approx(0.01, rel=0.05)
+
+
+def test_hum_in_a_short_rest_is_not_noise():
+    """Its skirts fill the neighbourhood of 50 Hz there: hum of 0.3 of the noise had been whitened away, and nothing named."""
+    quiet, hummed = (_resting(hum_a) for hum_a in (0.0, 0.006))
+    assert quiet.is_white and hummed.is_white
+    assert hummed.sigma_a == pytest.approx(0.01, rel=0.05)
+
+
+def test_noise_that_rises_slowly_is_no_hum():
+    rising = _resting(0.0, memory=0.97)
+    at = np.searchsorted(rising.frequency_hz, [20.0, 50.0, 120.0])
+    assert not rising.is_white and np.all(np.diff(rising.density[0, at]) < 0.0)
+
+
+def _resting(hum_a, memory=0.0):
+    """Measured on four tests that begin with 0.3 s at zero voltage, none a repeat."""
+    blank = recording(axes=(0.0, 60.0, 120.0, 30.0))
+    random = np.random.default_rng(4)
+    rows = 0.01 * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], random.standard_normal((3, blank.time_s.size)))
+    rows += hum_a * np.sin(2.0 * np.pi * 49.97 * blank.time_s + np.array([[0.3], [1.1], [2.0]]))
+    volts = blank.voltage_axis_v * (blank.time_s % 2.2 > 0.3)
+    rows += 0.1 * volts * np.cos(np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg))
+    noise = measure_noise(prepare([replace(blank, voltage_axis_v=volts, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[0])
+    assert noise.source == "zero voltage"
+    return noise
