@@ -20,6 +20,7 @@ from commissioner.diagnose.model import LEG_TAIL, NO_DICTIONARY, Layout, Model, 
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.plant import predict
 from commissioner.diagnose.record import Record, each_segment
+from commissioner.diagnose.starts import per_ampere
 
 Array = NDArray[np.float64]
 SILENT = (1.0, 1.0, 0.01, 0.2)
@@ -204,13 +205,11 @@ def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
 
 def _kept_flux(model: Model, layout: Layout, path: Array) -> Array:
     """(2,) flux that the iron's memory keeps up once all currents have decayed, after this path of its flux (2, m)."""
-    radius = layout.stop_radius_wb
-    narrow = np.where(radius[:, 1] > 0.0, 0.0, 1.0 / np.abs(radius[:, 0]))
-    stiffness = model.sum_kind(kinds.STOP, len(radius)) * narrow if model.total(kinds.MEMORY) else np.zeros(len(radius))
-    if not stiffness.any():
+    radius = np.ascontiguousarray(layout.stop_radius_wb[:, 0])
+    stiffness = model.sum_kind(kinds.STOP, radius.size) * per_ampere(layout.stop_radius_wb)
+    if not model.total(kinds.MEMORY) or not stiffness.any():
         return np.zeros(2)
-    z = replayed(path, np.ascontiguousarray(radius[:, 0]))
-    return np.array(at_rest(path[0, -1], path[1, -1], z, stiffness, np.ascontiguousarray(radius[:, 0]), model.nominal[3]))
+    return np.array(at_rest(path[0, -1], path[1, -1], replayed(path, radius), stiffness, radius, model.nominal[3]))
 
 
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:

@@ -76,7 +76,7 @@ def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], la
     left = _left(model, segment, machine, cells_of(layout.iron_vectors if bends else layout.iron_vectors[:0]))
     per_tilt = left.rates_spent * left.even
     per_memory = _per_memory_current(machine)
-    of_all = _per_ampere(layout.stop_radius_wb)[:, None] * _memory(model, segment, layout.stop_radius_wb)
+    of_all = per_ampere(layout.stop_radius_wb)[:, None] * _memory(model, segment, layout.stop_radius_wb)
     tilts = {kinds.ROTOR_ANISOTROPY: 1.0, kinds.LEAKAGE_ANISOTROPY: coupled, kinds.MAGNETIZING_ANISOTROPY: 1.0 - coupled}
     out = np.zeros((4 + len(asked), 4))
     out[kinds.GAMMA_M] = np.tile(left.derivatives[0] * left.flux, 2)
@@ -106,7 +106,7 @@ def _memory(model: Model, segment: Segment, radius: Array) -> Array:
 
 def _magnetized(machine: tuple[Any, ...], memory: Array) -> Array:
     """(psi_s, psi_R) that the memory keeps up."""
-    return np.asarray(_per_memory_current(machine) @ ((machine[9] * _per_ampere(machine[10])) @ memory))
+    return np.asarray(_per_memory_current(machine) @ ((machine[9] * per_ampere(machine[10])) @ memory))
 
 
 def _per_memory_current(machine: tuple[Any, ...]) -> Array:
@@ -115,7 +115,7 @@ def _per_memory_current(machine: tuple[Any, ...]) -> Array:
     return np.vstack([-(l_m + nu * l_sigma) * np.eye(2), -l_m * np.eye(2)])
 
 
-def _per_ampere(radius: Array) -> Array:
+def per_ampere(radius: Array) -> Array:
     """(s,) current of each memory operator per ampere and state (1/Wb), near no flux; `radius` (s, 2) with its loop's rate."""
     return np.where(radius[:, 1] > 0.0, 0.0, 1.0 / np.abs(radius[:, 0]))
 

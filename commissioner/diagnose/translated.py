@@ -40,8 +40,9 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
     effects = {}
     for cause in causes:
         sizes = {key: value for key, (value, _, _) in cause.sizes.items()}
-        if cause.name in TRANSLATED:
-            effects[cause.name] = TRANSLATED[cause.name](sizes, model.of(cause.name), setting, model)
+        translate = TRANSLATED.get(cause.name)
+        if translate and (entry := translate(sizes, model.of(cause.name), setting, model)):
+            effects[cause.name] = entry
     return {
         "nameplate": plate,
         "machine": {**gamma_machine(model.at_rest(setting.layout)[0]), "saturation_at_rated_flux": 0.0},
@@ -95,7 +96,9 @@ def _delay(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> E
 
 
 def _lag(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
-    """One time constant, or from half of the shape of two equal ones on, those."""
+    """One time constant, or from half of the shape of two equal ones on, those; none that sees a ripple, which the simulator has not."""
+    if values.get("rippled"):
+        return {}
     shape = "second_order" if values.get("shape", 0.0) > 0.125 else "first_order"
     return {"size": 1e-6 * sizes["time_constant_us"], "shape": shape}
 

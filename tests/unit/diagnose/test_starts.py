@@ -10,10 +10,11 @@ from scipy.linalg import expm
 
 from commissioner.diagnose import kinds
 from commissioner.diagnose.effects import CATALOGUE
+from commissioner.diagnose.effects.magnetics import CARRIED
 from commissioner.diagnose.model import Model
-from commissioner.diagnose.nominal import CARRY
+from commissioner.diagnose.nominal import CARRY, with_flux_before
 from commissioner.diagnose.plant import predict, trajectory
-from commissioner.diagnose.starts import slopes_of_start
+from commissioner.diagnose.starts import per_ampere, slopes_of_start
 from tests.unit.diagnose.test_effects import central_slope
 
 BEFORE_WB = np.array([0.4, -0.3])
@@ -111,3 +112,50 @@ def test_slopes_of_the_start_are_those_of_the_start(nominal, behind, effects, sh
         expected = (more - less) / 2e-4
         about = model.terms[row - 4].symbol if row > 3 else row
         assert scale[row] * slopes[row] == pytest.approx(expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-3)), about
+
+
+@pytest.fixture
+def remembering(setting):
+    """The setting whose second segment follows one in which the iron went up and down along 40 degrees."""
+    size = setting.iron_flux_wb * np.array([0.0, 0.9, -0.7, 0.5, -0.1, 0.0])
+    path = np.outer([np.cos(np.deg2rad(40.0)), np.sin(np.deg2rad(40.0))], np.interp(np.linspace(0.0, 5.0, 400), np.arange(6.0), size))
+    segments = list(setting.record.segments)
+    segments[1] = replace(segments[1], iron_before_wb=path)
+    return replace(setting, record=replace(setting.record, segments=tuple(segments)))
+
+
+def loops_that_remember(nominal, setting, split=0.3):
+    terms = (*CATALOGUE["magnetic_hysteresis"].terms(setting), CARRIED)
+    held = {"loop_1": 0.05, "loop_3": 0.03, "loop_7": 0.04, "loop_9": 0.02, "loop_13": 0.03, "split": split, "carried": 1.0}
+    return Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
+
+
+def test_iron_that_remembers_keeps_a_flux_without_any_current(nominal, remembering):
+    path = trajectory(loops_that_remember(nominal, remembering), remembering.record, 1, remembering.layout, ())
+    assert np.hypot(*path.states[0, 2:4]) > 1e-3
+    # loops that widen or narrow are taken as they are near no flux
+    held_a = np.hypot(*path.states[0, 2:4]) / nominal.nominal[3]
+    assert np.abs(path.current[:, 0]).max() < 1e-3 * held_a and np.abs(path.rotor_current[:, 0]).max() < 1e-3 * held_a
+
+
+def test_slopes_of_what_memory_keeps_up_are_those_of_the_start(nominal, remembering):
+    model = loops_that_remember(nominal, remembering)
+    path = trajectory(model, remembering.record, 1, remembering.layout, model.terms)
+    slopes = slopes_of_start(model, remembering.record.segments[1], path.machine, remembering.layout, model.terms)
+    for row, per_theta in ((3, -1.0 / model.nominal[3]), *((4 + k, t.step) for k, t in enumerate(model.terms) if t.symbol.startswith("loop"))):
+        h = 1e-4 * np.eye(slopes.shape[0])[row]
+        more, less = (start_of(model.moved(model.theta + sign * h), remembering) for sign in (1.0, -1.0))
+        expected = (more - less) / 2e-4
+        assert per_theta * slopes[row] == pytest.approx(expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-6)), row
+
+
+def test_the_flux_that_stays_is_where_the_memory_and_the_magnetizing_current_cancel(nominal, remembering):
+    """Its loops then hold what they had: told once more they keep the same flux."""
+    model = loops_that_remember(nominal, remembering, split=-0.5)
+    told = with_flux_before(remembering.record, model, remembering.layout)
+    radius = remembering.layout.stop_radius_wb
+    for segment in told.segments[1:]:
+        kept, z = segment.iron_before_wb[:, -1], segment.memory(np.ascontiguousarray(radius[:, 0]))
+        memory_a = (model.sum_kind(kinds.STOP, len(radius)) * per_ampere(radius)) @ z
+        assert kept / model.nominal[3] + memory_a == pytest.approx(0.0, abs=1e-4 * np.abs(memory_a).max())
+        assert np.abs(memory_a).max() > 1e-3
