@@ -98,6 +98,22 @@ def as_rippled(
     return trial, (*(n for n in accepted if n != name), "sensor_lag"), setting
 
 
+def as_a_delay(
+    current: Fit, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report
+) -> Exchanged | None:
+    """A delay, one number, in place of a lag and its shape where it is as good by Schwarz' criterion: in the end a filter of any order is one."""
+    lag = current.model.of("sensor_lag")
+    if not lag.get("shape") or lag.get("rippled") or "sampling_delay" in accepted or "sampling_delay" not in names:
+        return None
+    delay = replace(CATALOGUE["sampling_delay"].terms(setting)[0], start=lag["lag"])
+    wanted = current.chi2 + float(np.log(current.normal.count.sum()))
+    trial = fit(current.model.without("sensor_lag").with_terms([delay]), setting.record, setting.layout, noise, wanted_chi2=wanted)
+    report(f"  instead of sensor_lag and its shape sampling_delay: gained {current.chi2 - trial.chi2:.4g} more")
+    if trial.chi2 > wanted:
+        return None
+    return trial, (*(n for n in accepted if n != "sensor_lag"), "sampling_delay"), setting
+
+
 def as_read_late(
     current: Fit, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report
 ) -> Exchanged | None:

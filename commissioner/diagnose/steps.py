@@ -19,6 +19,7 @@ from commissioner.diagnose.effects.magnetics import CARRIED
 from commissioner.diagnose.exchanges import (
     LATE,
     Exchanged,
+    as_a_delay,
     as_a_lag,
     as_read_late,
     as_rippled,
@@ -353,6 +354,11 @@ class Steps:
         if "cable_capacitance" in late and "sensor_lag" in self.names and late not in self.lagging:
             self.lagging.add(late)
             other = as_a_lag(current, accepted, self.setting, self.noise, self.names, self.report)
+            if other is not None:
+                return other
+        if late == {"sensor_lag"} and late not in self.lagging:
+            self.lagging.add(late)
+            other = as_a_delay(current, accepted, self.setting, self.noise, self.names, self.report)
             if other is not None:
                 return other
         if "iron_loss" in mine and mine not in self.lagging:
