@@ -18,8 +18,6 @@ from commissioner.diagnose.lag import unforced
 from commissioner.diagnose.record import Facts
 
 Array = NDArray[np.float64]
-MOST_PULSES, FORGOTTEN = 64, 12.0
-"""Pulses that a filter may still show, and after how many of its lags one is forgotten."""
 STEP, FIRST_STEP, SHAPE_STEP = 1e-3, 0.01, 5e-3
 """Of the lag, relative, and of a sample where there is none yet; of the shape: for derivatives."""
 LEAST_LINK = 2.0
@@ -68,30 +66,20 @@ def _carriers_of(facts: Facts) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _ramp(t, lag, shape, free):
-    """Answer of the filter, `t` samples after its input began to rise by 1 per sample."""
-    if t <= 0.0:
-        return 0.0
-    unforced(t, lag, shape, free)
-    # the ramp behind the filter is t - lag, from a value of lag and a slope of -1 that die out; of first order it has no slope of its own
-    return t - lag + lag * free[0] - free[1]
-
-
-@njit(cache=True, nogil=True)
 def _behind(legs_v, link_v, carriers, lag, shape, out):
     n, length = legs_v.shape[1], 1.0 / carriers
-    free = np.zeros(4)
-    pulses = min(math.ceil(FORGOTTEN * lag * carriers) + 1, MOST_PULSES)
+    whole, rise, fall = np.zeros(4), np.zeros(4), np.zeros(4)
+    unforced(length, lag, shape, whole)
     for leg in range(3):
-        for k in range(n):
-            total = 0.0
-            for i in range(pulses):
-                at = k - 1 - i // carriers
-                if at < 0:
-                    break
-                duty = min(max(0.5 + legs_v[leg, at] / link_v, 0.0), 1.0)
-                ago = (i + 1) * length
-                rise, fall = ago - 0.5 * length * (1.0 - duty), ago - 0.5 * length * (1.0 + duty)
-                total += _ramp(rise, lag, shape, free) - _ramp(fall, lag, shape, free)
-                total -= duty * (_ramp(ago, lag, shape, free) - _ramp(ago - length, lag, shape, free))
-            out[leg, k] = link_v * total
+        value = slope = 0.0
+        for k in range(1, n):
+            duty = min(max(0.5 + legs_v[leg, k - 1] / link_v, 0.0), 1.0)
+            unforced(0.5 * length * (1.0 + duty), lag, shape, rise)
+            unforced(0.5 * length * (1.0 - duty), lag, shape, fall)
+            # a ramp's answer is t - lag + lag u0 - u1. The pulse's three ramps and the mean's add up to none at the period's end:
+            # only what dies out is left
+            added = lag * (rise[0] - fall[0]) - (rise[1] - fall[1]) - duty * (lag * (whole[0] - 1.0) - whole[1])
+            added_slope = lag * (rise[2] - fall[2]) - (rise[3] - fall[3]) - duty * (lag * whole[2] - whole[3] + 1.0)
+            for _ in range(carriers):
+                value, slope = whole[0] * value + whole[1] * slope + added, whole[2] * value + whole[3] * slope + added_slope
+            out[leg, k] = link_v * value
