@@ -125,6 +125,9 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     if held.is_measured and held.share < WORSE_THAN_NONE and gained < WEAK_SIGMA:
         trust = 0.0
     causes, unsure = causes_of(found, rest, trust, audit, noise, excluded)
+    if all(c.from_audit for c in causes):
+        # nothing is gained by causes that are not named
+        held = hold_out(found.nominal, found.nominal, record, layout, noise)
     # what an unsure cause takes is left as well, yet no more than there was
     before = float(np.sqrt(max(found.nominal.normal.unexplained, 0.0) / found.nominal.normal.count.sum()))
     left = float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure])))
