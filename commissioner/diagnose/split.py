@@ -21,7 +21,7 @@ MOST_TONES = 12
 
 @dataclass(frozen=True)
 class Split:
-    """Power by line class in dB relative to the excited lines, mean over segments; NaN where it cannot be formed."""
+    """Power by line class in dB relative to the excited lines, mean over segments; a class that cannot be formed is not there."""
 
     level_db: Mapping[str, float]
     tones_hz: tuple[float, ...]
@@ -39,9 +39,7 @@ def split_lines(record: Record) -> Split:
     power = {name: float(np.mean(values)) for name, values in collected.items() if values}
     power["drifting"] = _drifting(record)
     reference = max(power.get("excited", 0.0), 1e-300)
-    return Split(
-        {n: float(10.0 * np.log10(max(p, 1e-300) / reference)) for n, p in power.items()}, tuple(tones)
-    )
+    return Split({n: float(10.0 * np.log10(p / reference)) for n, p in power.items() if p > 0.0}, tuple(tones))
 
 
 def _segment_levels(segment: Segment, tones: list[float], period: float) -> dict[str, float]:

@@ -66,12 +66,12 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
 
 
 def _levels(document: Document) -> list[str]:
-    """Model-free levels; an infinitely weak class is left out."""
+    """Model-free levels of the classes that could be formed."""
     words = {
         "odd": "odd distortion", "even": "even distortion", "cross_axis": "the axis that gets no voltage",
         "drifting": "the difference between repeats of one test",
     }
-    levels = [f"{words[k]} {v:.0f} dB" for k, v in document["line_levels_db"].items() if k in words and v > -250.0]
+    levels = [f"{words[k]} {v:.0f} dB" for k, v in document["line_levels_db"].items() if k in words]
     if not levels:
         return []
     return [f"In the measured current, before any model, against the test's own frequencies: {', '.join(levels)}. 20 dB less is a tenth."]
