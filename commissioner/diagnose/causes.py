@@ -33,8 +33,8 @@ COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
 noise power.
 """
 TRUNCATION_SLACK = 0.15
-NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.99, 0.2, 0.9
-"""A cause that takes so much of what is not another's is named with so much confidence, unless a rival that takes its place loses less
+MUCH_LEFT_SIGMA, NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.3, 0.99, 0.2, 0.9
+"""Where more than this is left, a cause that takes so much of what is not another's is named with so much confidence, unless a rival that takes its place loses less
 
 than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
 """
@@ -109,8 +109,11 @@ def _may_be_named(found: Found, name: str, rest: Leftover, trust: float) -> bool
 
 
 def _is_dominant(gain: float, rest: Leftover, count: float) -> bool:
-    """Whether a cause alone takes nearly all of the error that there is beside other named ones: then it is there, whatever else is."""
-    return rest.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
+    """Whether so much is left that nothing like it was among what the confidence learned from, and yet one cause alone takes nearly all of
+
+    the error that is not another's: then it is there, whatever else is.
+    """
+    return MUCH_LEFT_SIGMA**2 * count < rest.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
 
 
 def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
