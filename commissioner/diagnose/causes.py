@@ -41,7 +41,7 @@ than this part of its gain: real dead times, with ripple and a current that stop
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 LEAST_CONFIDENCE = 0.5
 """Below it a name is more likely wrong than right, and is not given."""
-IMITATED = frozenset({("sensor_offset", "sensor_drift")})
+IMITATED = frozenset({("sensor_offset", "sensor_drift"), ("sensor_gain_mismatch", "sensor_nonlinearity")})
 """Simple causes, each with one of many numbers that has it as a limit."""
 DELAY_OR_LAG_TIE = 1e-5
 SAME_ORDER_TIE = 2e-3
@@ -191,7 +191,7 @@ def _share_open(name: str, rival: str) -> float:
 def _more_numbers(found: Found, name: str, rival: str) -> float:
     """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
 
-    has settled at once.
+    has settled at once, a sensor's bend that has.
     """
     if (name, rival) not in IMITATED:
         return 0.0
