@@ -34,9 +34,9 @@ noise power.
 """
 TRUNCATION_SLACK = 0.15
 MUCH_LEFT_SIGMA, NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.3, 0.99, 0.2, 0.9
-"""Where more than this is left, a cause that takes so much of what is not another's is named with so much confidence, unless a rival that takes its place loses less
+"""Where more than this is left, a cause that takes so much of what is not another's is named with so much confidence, unless a rival
 
-than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
+that takes its place loses less than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
 """
 ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
 LEAST_CONFIDENCE = 0.5

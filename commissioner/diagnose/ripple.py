@@ -14,12 +14,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from commissioner.diagnose.lag import unforced
+from commissioner.diagnose.lag import SHAPE_STEP, STEP, unforced
 from commissioner.diagnose.record import Facts
 
 Array = NDArray[np.float64]
-STEP, FIRST_STEP, SHAPE_STEP = 1e-3, 0.01, 5e-3
-"""Of the lag, relative, and of a sample where there is none yet; of the shape: for derivatives."""
+FIRST_STEP = 0.01
+"""Of a sample, for the derivative by a lag where there is none yet."""
 LEAST_LINK = 2.0
 """Times the largest command: what a leg can give. Where the link is not known it is the plate's voltage, rectified."""
 

@@ -12,6 +12,7 @@ from commissioner.diagnose.fit import Fit, bounded_step, fit, limits, on_part
 from commissioner.diagnose.guards import loss_without, shows
 from commissioner.diagnose.model import Layout, Model
 from commissioner.diagnose.noise import Noise
+from commissioner.diagnose.reading import SHAPE
 from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
 MOST_OF_THE_FLUX = 0.75
 """A stop whose radius is a larger share of the flux reached is a spring."""
-REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (1,), kinds.LEG_SHARE: (1, 2)}
+REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (SHAPE,), kinds.LEG_SHARE: (1, 2)}
 """Indices of the numbers that only refine a clock, a delay, a lag or the legs."""
 WARMING = frozenset({"stator_heating", "rotor_heating"})
 

@@ -146,8 +146,9 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         return lagged
 
     # beside a recorded link the powers only mend its course: what they are made of says nothing of the source
-    tried = [lagged_of(p) for p in ((both_ways, one_way) if values.get(RECORDED_LINK) and not holds else (one_way if draws else both_ways,))]
-    read = [(lagged, *nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)) for lagged in tried]
+    is_beside_a_link = values.get(RECORDED_LINK) and not holds
+    sources = [both_ways, one_way] if is_beside_a_link else [one_way if draws else both_ways]
+    read = [(lagged, *nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)) for lagged in map(lagged_of, sources)]
     lagged, size, log_lag = min(read, key=lambda r: float(np.linalg.norm(as_much_of(r[0](r[2]), course, weight)[1])))
     if holds:
         return size, float(np.exp(log_lag))
