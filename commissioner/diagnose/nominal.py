@@ -28,6 +28,8 @@ SILENT = (1.0, 1.0, 0.01, 0.2)
 CORNERS_HZ, EDDY_CORNERS_HZ = 12.5 * 2.0 ** (2.0 / 3.0 * np.arange(10)), np.array([150.0, 400.0, 1000.0])
 """Of rotor branches, two thirds of an octave apart, and of eddy-current paths of the iron."""
 BRANCH_TIME_S = 1.0 / (2.0 * np.pi * np.r_[CORNERS_HZ, -EDDY_CORNERS_HZ])
+AT_AN_END = 1e-3
+"""Of a number, by which it may miss the end of its box."""
 SKIRT_BINS = 4
 """The Hann window's main lobe and first side lobes: no second tone is looked for so near."""
 MOST_LEAK_RATIO = 0.35
@@ -172,6 +174,12 @@ CARRY = (
 )
 """Nuisances of the nominal model: how much of the rotor flux outlives the pause between two segments, and what a shaft
 that turns meanwhile makes of its direction."""
+
+
+def is_astray(model: Model, layout: Layout) -> bool:
+    """Whether the four numbers are no motor's: one at an end of where it may be, or less magnetizing inductance than leakage."""
+    box, four = np.array(layout.nominal_box), np.array(model.nominal)
+    return bool((four <= (1.0 + AT_AN_END) * box[:, 0]).any() or (four >= (1.0 - AT_AN_END) * box[:, 1]).any() or four[3] < four[2])
 
 
 def starts_of(record: Record) -> list[Term]:

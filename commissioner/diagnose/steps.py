@@ -41,7 +41,7 @@ from commissioner.diagnose.guards import (
 from commissioner.diagnose.lines import LINES, with_clearer_lines
 from commissioner.diagnose.model import Layout
 from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import impedance_starts, with_flux_before
+from commissioner.diagnose.nominal import impedance_starts, is_astray, with_flux_before
 from commissioner.diagnose.record import Record
 from commissioner.diagnose.screen import Score, Screening, price, required_chi2, screen
 from commissioner.diagnose.settle import placed
@@ -187,7 +187,7 @@ class Steps:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
-            if len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count:
+            if (len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count) or is_astray(current.model, self.layout):
                 current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
                 current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
@@ -206,9 +206,9 @@ class Steps:
             refused = idle | set(dropped)
 
     def _from_other_starts(self, current: Fit) -> Fit:
-        """The best fit of the same causes beside what the impedance at the tones says of the four: a dead time of thirty times the noise
+        """The best fit of the same causes beside what the impedance at the tones says of the four: dead times of 3.5 and of thirty times
 
-        had left them in a valley without a magnetizing inductance.
+        the noise had left them in a valley without a magnetizing inductance.
         """
         starts = [replace(current.model, nominal=start) for start in impedance_starts(self.record)]
         best = min((current, *(fit(m, self.record, self.layout, self.noise) for m in starts)), key=lambda f: f.chi2)

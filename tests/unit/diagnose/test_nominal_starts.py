@@ -1,11 +1,13 @@
 """Where the four parameters are looked for: around the impedance of the tones, whatever noise lies beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from commissioner.diagnose.audit import prepare
 from commissioner.diagnose.model import NO_DICTIONARY, Model
-from commissioner.diagnose.nominal import bare_layout, impedance_starts
+from commissioner.diagnose.nominal import bare_layout, impedance_starts, is_astray
 from commissioner.diagnose.plant import predict
 from tests.unit.diagnose.conftest import recording
 
@@ -26,3 +28,15 @@ def test_box_holds_the_machine_under_noise(seed):
     assert 0.8 < leakage / LARGE[2] < 1.25
     for (low, high), true in zip(bare_layout(record).nominal_box, LARGE, strict=True):
         assert 3.0 * low < true < high / 1.5
+
+
+@pytest.mark.parametrize(
+    ("four", "expected"),
+    [
+        ((0.4, 0.3, 0.008, 0.2), False), ((0.4, 0.3, 0.008, 0.0075), True), ((0.4, 2.4, 0.008, 0.2), True), ((2.8, 0.3, 0.008, 0.2), True),
+        ((0.4, 0.3, 0.03, 0.2), False),
+    ],
+)  # fmt: skip
+def test_four_numbers_that_no_motor_has_are_astray(four, expected):
+    layout = replace(NO_DICTIONARY, nominal_box=((0.007, 2.8), (0.007, 2.4), (2e-4, 0.04), (3e-3, 10.0)))
+    assert is_astray(Model(four), layout) is expected
