@@ -259,7 +259,8 @@ def _sensor_nonlinearity(effect, plant, p, s):
     s[at.S_QUADRATIC] = effect.details.get("even", 0.0)
 
 
-@_entry("quantization", "A", "step of the converter", ("mid_tread", "floor"), 0.005, 0.15)
+# no finer than 12 bits over three times the rated peak: such steps count as noise (`hidden.draw` gives them to recordings without a cause)
+@_entry("quantization", "A", "step of the converter", ("mid_tread", "floor"), 0.013, 0.15)
 def _quantization(effect, plant, p, s):
     s[at.S_LSB_A] = effect.size
     if _shape(effect) == 1:

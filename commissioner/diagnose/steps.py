@@ -105,7 +105,7 @@ class Steps:
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
         self.placed: frozenset[str] = frozenset()
-        self.tried: tuple[Fit | None, dict[str, Fit]] = (None, {})
+        self.tried: tuple[Fit | None, dict[str, tuple[Fit, float]]] = (None, {})
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
         self.rms_a = float(np.sqrt(np.mean(np.concatenate([s.currents_a.ravel() for s in self.record.segments]) ** 2)))
@@ -279,12 +279,17 @@ class Steps:
         return None if best is None or current.chi2 - best[2].chi2 < self._crumb(rest) else (best[1], best[2])
 
     def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
-        """The refit with one more cause; lines looked for meanwhile concern only their own causes."""
+        """The refit with one more cause; lines looked for meanwhile concern only their own causes. One that was given up is begun again
+
+        only where less is wanted of it.
+        """
         known, name = self._known(current), score.name
-        if name not in known or not known[name].has_converged or name in LINES.values():
+        last, out_of_reach = known.get(name, (None, -np.inf))
+        if last is None or name in LINES.values() or (not last.has_converged and wanted_chi2 > out_of_reach):
             model = current.model.with_terms(score.form)
-            known[name] = fit(model, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
-        return known[name]
+            last = fit(model, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
+            known[name] = last, wanted_chi2
+        return last
 
     def _with_legs_alike(self, current: Fit, score: Score, wanted_chi2: float) -> Fit | None:
         """A leg error of the same size in all legs, where that is plausible and unequal ones are not: what legs differ by may be the phases'
@@ -314,11 +319,11 @@ class Steps:
         known = self._known(current)
         if f"without {name}" not in known:
             less = current.model.without(name)
-            known[f"without {name}"] = fit(less, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
-        return known[f"without {name}"]
+            known[f"without {name}"] = fit(less, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2), wanted_chi2
+        return known[f"without {name}"][0]
 
-    def _known(self, current: Fit) -> dict[str, Fit]:
-        """What was fitted from here already: a search that looks again begins where it was."""
+    def _known(self, current: Fit) -> dict[str, tuple[Fit, float]]:
+        """What was fitted from here already, and the chi2 that was wanted of it: a search that looks again begins where it was."""
         if self.tried[0] is not current:
             self.tried = (current, {})
         return self.tried[1]
