@@ -38,10 +38,10 @@ FRESH_STATOR_HEAT, FRESH_CAGE_HEAT = "fresh", "rotor_heat_fresh"
 SETTLED = 4.0
 """Thermal time constants in a recording, for a temperature that settles within it."""
 HAT, FINE_HAT = "hat_", "hat_fine_"
-SPEED_KNOTS_S = {HAT: (0.4, 40), FINE_HAT: (0.16, 80)}
+SPEED_KNOTS_S = {HAT: (0.4, 40), FINE_HAT: (0.1, 80)}
 """Spacing of a speed's cubic splines, and the most intervals of a segment. A shaft held by its load swings below about 1 Hz, which the
 
-wide ones follow to a per cent; the fine ones follow 2.5 Hz to some per cent."""
+wide ones follow to a per cent; the fine ones follow 2.5 Hz to a per cent."""
 Named = tuple[tuple[str, ...], list[Array]]
 
 

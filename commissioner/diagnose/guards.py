@@ -56,8 +56,11 @@ SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leaka
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
 LEAST_BESIDE = 800.0
 """Lost samples must gain at least so much beside accepted causes."""
-MOST_CONSTANT, LEAST_SHOWN = 0.95, 0.9
-"""Of the power of a clock's delay: an even drift has 0.75 to 0.82, a rate that swings to and fro 0.67 to 0.72."""
+LEAST_INCONSTANT = 0.15
+"""Of what an even drift's delay has that no constant one makes (0.05 to 0.25 of its power): lags and conductances that pass for a clock
+
+have 0.04 to 0.09 of it in whole recordings, clocks 0.9 and more.
+"""
 CLOCK_RATES = RESTARTS + RUNS_ON
 SHOWN_BY_A_PART = 0.3
 """Of its gain per sample: a cause of which the first part of the segments shows less is late, or met seldom."""
@@ -167,12 +170,8 @@ def _shown_by_the_link(model: Model, name: str, record: Record) -> tuple[float, 
 
 
 def _is_a_delay(rates: Mapping[str, float], record: Record) -> bool:
-    """Whether a clock only makes currents late alike (or early, as a conductance does); where the command moves too briefly to show a
-
-    drift, nobody knows.
-    """
-    shows_drifts = constancy({"drift": 1.0}, record) < LEAST_SHOWN
-    return shows_drifts and constancy(rates, record) > MOST_CONSTANT
+    """Whether a clock only makes currents late alike (or early, as a conductance does), beside what a drift would show."""
+    return 1.0 - constancy(rates, record) < LEAST_INCONSTANT * (1.0 - constancy({"drift": 1.0}, record))
 
 
 def constancy(rates: Mapping[str, float], record: Record) -> float:

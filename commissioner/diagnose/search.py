@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from commissioner.diagnose import kinds
 from commissioner.diagnose.dictionaries import begun, carried_over, respread
 from commissioner.diagnose.effects import CATALOGUE, Setting
 from commissioner.diagnose.fit import Fit, fit
 from commissioner.diagnose.guards import LINES_OF_THEIR_OWN, guard_of_lost_samples, losses_of
 from commissioner.diagnose.lost import Loss, mend
-from commissioner.diagnose.model import Layout, Model
+from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.noise import Noise
 from commissioner.diagnose.nominal import (
     bare_layout,
@@ -266,8 +267,27 @@ def _on_more(reached: _Reached, setting: Setting, noise: Noise) -> tuple[Fit, Se
     seen, model = reached.steps, reached.fit.model
     there = replace(setting, layout=seen.layout, iron_flux_wb=seen.setting.iron_flux_wb)
     fluxes = largest_fluxes(seen.record, model, seen.layout)
-    wider, there = respread(carried_over(_completed(model, reached.accepted, there), seen.layout, fluxes, seen.layout), there)
+    completed = _without_unseen_speed(_completed(model, reached.accepted, there), seen.record, setting.record)
+    wider, there = respread(carried_over(completed, seen.layout, fluxes, seen.layout), there)
     return begun(wider, there, noise), there
+
+
+def _without_unseen_speed(model: Model, part: Record, record: Record) -> Model:
+    """The model with splines of the speed at zero that lie for the most part beyond the part it was fitted to: the part's last samples
+
+    held them, at anything.
+    """
+    uids = [s.uid for s in record.segments]
+
+    def is_seen(term: Term) -> bool:
+        at = uids.index(term.segment)
+        seen, whole = (float(np.square(r.channels[at][: r.segments[at].count, r.channel(term.channel)]).sum()) for r in (part, record))
+        return seen > 0.5 * whole
+
+    values = tuple(
+        0.0 if t.kind == kinds.OMEGA and not is_seen(t) else v for t, v in zip(model.terms, model.values, strict=True)
+    )
+    return replace(model, values=values)
 
 
 def _completed(model: Model, accepted: Sequence[str], setting: Setting) -> Model:

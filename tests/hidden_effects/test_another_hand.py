@@ -169,12 +169,17 @@ def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(loop_a):
     assert value == pytest.approx(loop_a, abs=max(0.05 * loop_a, 3.0 * spread))
 
 
-def test_legs_that_differ_are_told_apart():
-    """Where all three had to be alike, legs 8 % apart were an error without a name."""
-    seen, names = named(Machine(leg_v=4.0, legs=(0.97, 1.08, 0.95)))
+@pytest.mark.parametrize("legs", [(0.97, 1.08, 0.95), (1.6, 0.4, 1.0), long((1.4, -0.3, 0.8))])
+def test_legs_that_differ_are_told_apart(legs):
+    """Where all three had to be alike, legs 8 % apart were an error without a name; where they might differ by 40 %, what lay beyond was
+
+    unequal phases, a shaft, a sag and a bent sensor, up to 0.99 sure.
+    """
+    seen, names = named(Machine(leg_v=4.0, legs=legs))
     assert len(names) == 1 and "dead_time" in names and seen.left.sigma < 0.1
-    sizes = seen.causes[0].sizes
-    assert sizes["unequal_v"][0] == pytest.approx(0.08, abs=0.005) and sizes["unequal_w"][0] == pytest.approx(-0.05, abs=0.005)
+    sizes, mean = seen.causes[0].sizes, sum(legs) / 3.0
+    assert sizes["unequal_v"][0] == pytest.approx(legs[1] / mean - 1.0, abs=0.01)
+    assert sizes["unequal_w"][0] == pytest.approx(legs[2] / mean - 1.0, abs=0.01)
 
 
 @pytest.mark.parametrize("late_s", [2e-5, long(5e-6)])
@@ -197,13 +202,15 @@ def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(
     assert seen.causes[0].sizes[f"amplitude_{hz:.0f}_hz"][0] == pytest.approx(0.006, rel=0.02)
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("hz", [0.0, 0.7, 1.7])
-def test_a_shaft_that_swings_has_its_speed(hz):
-    """At 1.7 Hz splines on a knot every 0.4 s cannot follow, and the speed is no steady one's equal."""
-    seen, names = named(Machine(swing=0.5, swing_hz=hz), 4.0)
+@pytest.mark.parametrize(("hz", "rad_per_s", "seconds"), [long(0.0, 0.5, 4.0), long(0.7, 0.5, 4.0), long(1.7, 0.5, 4.0), (2.4, 1.5, 4.0)])
+def test_a_shaft_that_swings_has_its_speed(hz, rad_per_s, seconds):
+    """At 1.7 Hz splines on a knot every 0.4 s cannot follow, nor those on one every 0.16 s at 2.4, and the speed is no steady one's equal.
+
+    Speeds that the first part of a test ended with, at anything, had led the whole astray: 3.4 times the noise, without a name.
+    """
+    seen, names = named(Machine(swing=rad_per_s, swing_hz=hz), seconds)
     assert set(names) == {"shaft_motion"} and seen.left.sigma < 0.1
-    rms = 0.5 if hz == 0.0 else 0.5 / math.sqrt(2.0)
+    rms = rad_per_s if hz == 0.0 else rad_per_s / math.sqrt(2.0)
     assert seen.causes[0].sizes["speed_rad_per_s"][0] == pytest.approx(rms, rel=0.05)
 
 

@@ -36,8 +36,8 @@ from commissioner.diagnose.model import Layout, Model, Term
 from commissioner.diagnose.record import Record
 
 Array = NDArray[np.float64]
-MOST_UNEQUAL = 0.4
-"""Of the mean of the three legs, by which one may differ."""
+MOST_UNEQUAL = 4.0
+"""Of the mean of the three legs, by which one may differ: what a compensation leaves may have another sign in one of them."""
 MOST_OF_A_LAG, MOST_OF_THE_LINK = 5.0, 2.0
 LEFT_BY_THE_LOAD = 0.5
 """Of the power of a recorded link's course: what leaves more is no sag under the motor's load."""
