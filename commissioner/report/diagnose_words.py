@@ -26,6 +26,8 @@ UNFINISHED, HIDDEN = "The time allowed was over", "Helps the fit, but"
 """How the remarks begin that are said in the headline, and in the block of uncertain names."""
 MOST_OF_LINK = 0.04
 """Share of the link voltage that a leg usually loses at most: 4 µs of dead time at 8 kHz and a volt or two of the switches."""
+LEGS_ALIKE = 0.25
+"""Of the mean of the three, by which a leg may differ before somebody should look at it."""
 GO_ON = "commissioner diagnose recording.csv --out diagnosis"
 
 
@@ -82,6 +84,8 @@ def _how_normal(cause: Cause, document: Document) -> str:
     if not plain_of(cause).is_normal:
         return ""
     if members(cause) & TOGETHER:
+        if (apart := _legs_apart(cause)) > LEGS_ALIKE:
+            return f" Its legs should lose alike; one is {percent(apart)} off their mean: check its gate driver and the compensation."
         link = document.get("dc_link_v")
         lost = cause["parameters"].get("voltage_v", {}).get("value")
         if not link or lost is None:
@@ -89,6 +93,12 @@ def _how_normal(cause: Cause, document: Document) -> str:
         if lost > MOST_OF_LINK * link:
             return f" Every inverter loses some; {percent(lost / link)} of its DC link is much."
     return " That is normal."
+
+
+def _legs_apart(cause: Cause) -> float:
+    """Of the mean of the three, by which the leg that is furthest from it differs."""
+    v, w = (cause["parameters"].get(k, {}).get("value", 0.0) for k in ("unequal_v", "unequal_w"))
+    return float(max(abs(v), abs(w), abs(v + w)))
 
 
 def tone(document: Document) -> Tone:

@@ -65,6 +65,13 @@ def test_a_leg_voltage_is_named_as_what_it_is_and_as_normal():
     assert "over 99.9 %" in words and tone(document("not_distinguishable", [LEGS])) == "good"
 
 
+@pytest.mark.parametrize(("v", "w", "said"), [(-0.6, 0.0, "60.0 % off"), (-0.2, -0.2, "40.0 % off"), (0.1, -0.1, "")])
+def test_legs_that_lose_unlike_voltages_are_not_called_normal(v, w, said):
+    legs = cause("dead_time", LOST | {"unequal_v": (v, 0.01, "1"), "unequal_w": (w, 0.01, "1")}, ["device_drop"])
+    words = headline(document("not_distinguishable", [legs]))
+    assert ("normal" not in words and f"one is {said} their mean: check its gate driver" in words) if said else "That is normal" in words
+
+
 def test_much_leg_voltage_is_not_called_normal():
     words = headline(document("not_distinguishable", [LEGS], dc_link_v=48.0))
     assert "normal" not in words and "16.5 % of its DC link is much" in words
