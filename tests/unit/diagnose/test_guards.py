@@ -16,13 +16,13 @@ def test_clocks_pass_and_what_imitates_a_delay_does_not(setting):
     moves = np.concatenate([np.gradient(s.voltage_axis_v) for s in record.segments])
     like_a_delay = np.linalg.lstsq((forms * moves).T, moves, rcond=None)[0]
     constant = 1.0 - LEAST_INCONSTANT * (1.0 - constancy({"drift": 1.0}, record))
-    assert 0.85 < constant < 1.0
+    assert 0.95 < constant < 1.0
     assert constancy(dict(zip(CLOCK_RATES, like_a_delay, strict=True)), record) > constant
     for rates in ({"drift": 3.0}, {"wander_cos": 1.0}, {"wander_sin": 2.0}, {"running": 1.0}, {}):
-        assert constancy(rates, record) < constant - 0.03
+        assert constancy(rates, record) < min(constant, 0.95) - 0.1
     assert constancy(dict(zip(CLOCK_RATES, -like_a_delay, strict=True)), record) > constant  # early alike: a conductance
     both = [constancy({"drift": 1.0, "wander_sin": x}, record) for x in np.linspace(-10.0, 10.0, 81)]
-    assert max(both) < constant
+    assert max(both) < min(constant, 0.95)
 
 
 def test_constancy_is_a_share(setting):
