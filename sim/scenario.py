@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim import effects
-from sim.laws import SATURATION_SHAPES, SIGN_SHAPES
-from sim.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, Sensors
-from sim.states import Setup
+from sim.drive.states import Setup
+from sim.physics import effects
+from sim.physics.laws import SATURATION_SHAPES, SIGN_SHAPES
+from sim.physics.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, Sensors
 
 FOLDER = Path(__file__).parent / "scenarios"
 MACHINE_TABLE = FOLDER / "machines.csv"

@@ -16,7 +16,7 @@ from typer.exceptions import TyperException
 
 from commissioner.cli.secrets import Secrets
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
-from commissioner.link.url import without_secrets
+from commissioner.link.wire.url import without_secrets
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 INTERRUPTED = 130
@@ -61,7 +61,7 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
 
 
 def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:
-    from commissioner.cli import screen
+    from commissioner.cli.screens import screen
 
     for fact in ("what", "step", "value", "limit", "remedy"):
         setattr(error, fact, hide(getattr(error, fact)))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
 
-from commissioner.link.url import USERINFO
+from commissioner.link.wire.url import USERINFO
 
 HIDDEN = "***"
 _OPTION = re.compile(r"--?[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL)

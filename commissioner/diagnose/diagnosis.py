@@ -8,8 +8,17 @@ from enum import Enum
 
 import numpy as np
 
-from commissioner.diagnose.audit import Audit, prepare
-from commissioner.diagnose.causes import (
+from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.catalogue.inverter import tail_of_legs
+from commissioner.diagnose.export.model_file import model_document
+from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
+from commissioner.diagnose.fit.gauss_newton import Fit, inverse
+from commissioner.diagnose.intake.audit import Audit, prepare
+from commissioner.diagnose.intake.line_classes import Split, split_lines
+from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
+from commissioner.diagnose.plant.model import Layout
+from commissioner.diagnose.search.search import Found, search
+from commissioner.diagnose.verdict.causes import (
     LEAST_SHARE,
     MOSTLY_EXPLAINED_SIGMA,
     Cause,
@@ -17,19 +26,10 @@ from commissioner.diagnose.causes import (
     doubt,
     explained_share,
 )
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.effects.inverter import tail_of_legs
-from commissioner.diagnose.evidence import HeldOut, hold_out
-from commissioner.diagnose.experiment import next_experiment
-from commissioner.diagnose.extended import model_document
-from commissioner.diagnose.fit import Fit, inverse
-from commissioner.diagnose.leftover import Leftover, leftover
-from commissioner.diagnose.model import Layout
-from commissioner.diagnose.moved import PARAMETERS
-from commissioner.diagnose.noise import Noise, measure_noise, resting_share
-from commissioner.diagnose.refusals import check_before_search, check_one_state
-from commissioner.diagnose.search import Found, search
-from commissioner.diagnose.split import Split, split_lines
+from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
+from commissioner.diagnose.verdict.experiment import next_experiment
+from commissioner.diagnose.verdict.lack_of_fit import Leftover, leftover
+from commissioner.diagnose.verdict.parameter_shift import PARAMETERS
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording

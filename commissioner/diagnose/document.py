@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.diagnose.causes import Cause
-from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
-from commissioner.diagnose.points_diagnosis import PointsDiagnosis
+from commissioner.diagnose.points.diagnosis import PointsDiagnosis
+from commissioner.diagnose.verdict.causes import Cause
+from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from commissioner.diagnose.diagnosis import Diagnosis, diagnose
 from commissioner.diagnose.document import as_document
-from commissioner.diagnose.moved import moved_parameters
+from commissioner.diagnose.verdict.parameter_shift import moved_parameters
 from commissioner.errors import CommissionerError
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.run.archive import RunFolder, plain
+from commissioner.run.archive.folder import RunFolder, plain
 
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
 

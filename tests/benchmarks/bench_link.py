@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
-from commissioner.link.url import parse_url
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import parse_url
 from commissioner.registers.window import StreamCursor
 from tests.support.sim_process import SimProcess
 

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TARGETS = {
     "commissioner.safety.limits": ("tests/unit/safety/test_limits.py",),
     "commissioner.safety.watch": ("tests/unit/safety/test_watch.py",),
-    "commissioner.procedure.states": ("tests/unit/test_states.py",),
+    "commissioner.procedure.states": ("tests/unit/procedure/test_states.py",),
 }
 """commands.py holds records only: there is nothing to mutate."""
 EXPLAINED = {

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import diagnose
-from tests.hidden_effects.another_hand import PEAK_A, TONES_HZ, Machine, recorded
+from commissioner.diagnose.verdict.detection_limits import detection_limits
 from tests.hidden_effects.cases import class_of
+from tests.hidden_effects.generators.another_hand import PEAK_A, TONES_HZ, Machine, recorded
 
 
 def named(machine, seconds=1.0):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.packing import pack
+from sim.physics import kernel
+from sim.physics.packing import pack
 from tests.hidden_effects import scoring
 from tests.hidden_effects.cases import WEIGHTS, Case, class_of, plan
 from tests.hidden_effects.sizes import carried_by_memory

@@ -5,7 +5,7 @@ import pytest
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.report.summary import diagnosis_sentences
+from commissioner.report.run.summary import diagnosis_sentences
 from tests.support.command_line import call
 from tests.support.sim_process import SimProcess
 

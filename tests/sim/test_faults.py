@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from sim.faults import DRIVE, SERVER, WIRE, FaultError, parse
 from sim.scenario import load
-from sim.server import run_in_thread
-from sim.station import Options
+from sim.wire.faults import DRIVE, SERVER, WIRE, FaultError, parse
+from sim.wire.server import run_in_thread
+from sim.wire.station import Options
 from tests.sim.client import Refused, RtuClient, Silent, TcpClient, crc_bytes, floats
 
 SCENARIO = load("default")

@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.linalg import expm
 
-from sim import hidden
-from sim.effects import CATALOGUE
-from sim.inductance import inverse_gamma
-from sim.recording import record, write_table
+from sim.physics.effects import CATALOGUE
+from sim.physics.inductance import inverse_gamma
+from sim.recordings import hidden
+from sim.recordings.standstill import record, write_table
 from sim.scenario import build, load
 
 NAMES = [

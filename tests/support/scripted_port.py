@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, RequestRefused
-from commissioner.link.port import LinkStats
+from commissioner.link.wire.port import LinkStats
 
 MAP = Path(__file__).resolve().parents[2] / "config" / "drives" / "simulated.toml"
 WORDS = {"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1}

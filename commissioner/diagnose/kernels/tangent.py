@@ -19,10 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from commissioner.compiled import kernel
-from commissioner.diagnose import kinds
+from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels import samples as row
-from commissioner.diagnose.kernels.march import forced, marched, marched_with_memory
-from commissioner.diagnose.kernels.pushes import INTO_FLUX, pushes, through_the_circuit
+from commissioner.diagnose.kernels.forcing import INTO_FLUX, pushes, through_the_circuit
+from commissioner.diagnose.kernels.recursion import forced, marched, marched_with_memory
 from commissioner.diagnose.kernels.samples import at_samples
 from commissioner.diagnose.kernels.trajectory import SQRT3
 

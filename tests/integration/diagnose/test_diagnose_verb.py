@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from commissioner.diagnose.model import Model
-from sim.hidden import draw
-from sim.recording import record, write_table
+from commissioner.diagnose.plant.model import Model
+from sim.recordings.hidden import draw
+from sim.recordings.standstill import record, write_table
 from tests.support.command_line import call, truth
 from tests.unit.diagnose.conftest import NOMINAL, setting_of
-from tests.unit.diagnose.test_extended import document_of
+from tests.unit.diagnose.export.test_model_file import document_of
 
 TYPE_TEST = "tests/data/siemens_200kw_type_test/{}.csv"
 

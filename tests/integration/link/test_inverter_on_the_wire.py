@@ -22,12 +22,12 @@ from commissioner.errors import (
     UsageError,
     WriteBackFailed,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TcpUrl, parse_url
-from sim.faults import parse
-from tests.campaigns import truth
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TcpUrl, parse_url
+from sim.wire.faults import parse
+from tests.campaigns.short_run import truth
 from tests.support.raw_servers import Bank, TcpDevice
 from tests.support.sim_process import SimProcess
 

@@ -9,9 +9,9 @@ import pytest
 from pymodbus import exceptions as pymodbus_exceptions
 
 from commissioner.errors import LinkError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import TcpUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.url import TcpUrl
 from tests.support.raw_servers import Bank, TcpDevice
 
 PROFILE = load_profile("simulated")
@@ -227,9 +227,9 @@ def test_errors_that_pymodbus_lets_through_become_ours(kind, monkeypatch):
 LISTEN_TO_NOBODY = """
 import sys
 from commissioner.errors import ReplyTimeout
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TcpUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TcpUrl
 
 port = open_port(TcpUrl("127.0.0.1", int(sys.argv[1])), load_profile("simulated"), reply_timeout_s=0.05)
 try:

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from commissioner.errors import CommissionerError, ConfigurationError, DataRefused, UsageError
-from commissioner.link.drive_file import load_profile
-from commissioner.recordings import baseline, bounds, matlab, plate, table
+from commissioner.link.files.drive_file import load_profile
+from commissioner.recordings import baseline, bounds, plate, table
+from commissioner.recordings.formats import matlab
 from commissioner.recordings.importers import import_table
 from commissioner.recordings.table import read_table
 from commissioner.settings import load_motor
@@ -161,7 +162,7 @@ def test_a_packed_mdf_is_held_to_what_it_may_unpack_to(monkeypatch):
 def test_a_foreign_text_above_its_limit_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "scope.csv"
     path.write_text("t;ia;ib\n" + "0,1;2,0;3,0\n" * 1000)
-    monkeypatch.setattr("commissioner.recordings.foreign_csv.MAX_FOREIGN_BYTES", 1000)
+    monkeypatch.setattr("commissioner.recordings.formats.foreign_csv.MAX_FOREIGN_BYTES", 1000)
     with pytest.raises(DataRefused):
         import_table(path)
 

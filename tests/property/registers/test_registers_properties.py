@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.link.rtu import find_answers
-from commissioner.link.url import parse_url
+from commissioner.link.wire.rtu import find_answers
+from commissioner.link.wire.url import parse_url
 from commissioner.registers.codec import crc16_bytes, decode_item, encode_item
 from commissioner.registers.profile import WORDS_PER_ELEMENT, Item, WindowLayout, plan_spans
 from commissioner.registers.status import DriveState, decode_state

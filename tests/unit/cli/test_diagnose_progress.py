@@ -1,6 +1,6 @@
 """The search's own lines become words; what was named and taken back is remembered."""
 
-from commissioner.cli.diagnose_progress import Progress
+from commissioner.cli.screens.diagnosis_progress import Progress
 
 
 def test_the_searchs_arithmetic_becomes_words():

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from commissioner.errors import UsageError
-from commissioner.link.url import RtuUrl, TcpUrl, TlsUrl, parse_url, without_secrets
+from commissioner.link.wire.url import RtuUrl, TcpUrl, TlsUrl, parse_url, without_secrets
 
 
 @pytest.mark.parametrize(

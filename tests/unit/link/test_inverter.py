@@ -13,9 +13,9 @@ from commissioner.errors import (
     RequestRefused,
     UsageError,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import Action
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import Action
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from tests.support.scripted_port import ScriptedDrive
 
 PROFILE = load_profile("simulated")

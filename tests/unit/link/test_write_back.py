@@ -10,9 +10,9 @@ from commissioner.errors import (
     UsageError,
     WriteBackFailed,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import Action
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import Action
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.circuit import InverseGamma
 from commissioner.settings import load_motor
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
@@ -308,7 +308,7 @@ class Registers:
     """A commercial drive: nothing but registers; parameters survive only while `is_storing`."""
 
     def __init__(self) -> None:
-        from commissioner.link.port import LinkStats
+        from commissioner.link.wire.port import LinkStats
 
         self.words = [0] * 0x10000
         self.stats, self.read_retries, self.reply_timeout_s = LinkStats(), 0, 0.1

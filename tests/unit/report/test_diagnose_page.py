@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.alike import look_alikes
 from commissioner.diagnose.document import refused_document
-from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
-from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.record import Facts, Record, Segment
-from commissioner.diagnose.refusals import refused
-from commissioner.diagnose.residuals import residuals
-from commissioner.diagnose.screen import Score, Screening
-from commissioner.diagnose.trial import Normal
-from commissioner.report import diagnose_figures as figures
-from commissioner.report.diagnose_numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
-from commissioner.report.diagnose_words import headline, next_promise, next_sentence
+from commissioner.diagnose.fit.normal_equations import Normal
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.intake.record import Facts, Record, Segment
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.diagnose.plant.model import NO_DICTIONARY, Model, Term
+from commissioner.diagnose.search.screening import Score, Screening
+from commissioner.diagnose.verdict.collinearity import look_alikes
+from commissioner.diagnose.verdict.residuals import residuals
+from commissioner.report.diagnosis import figures
+from commissioner.report.diagnosis.numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
+from commissioner.report.diagnosis.words import headline, next_promise, next_sentence
 from commissioner.report.page import picture
 
 PERIOD, SAMPLES, SIGMA = 2.5e-4, 4000, 0.01
@@ -95,7 +95,7 @@ def seen():
 
 def seen_by(sensors):
     """Residuals of a true and of a wrong model (R_R 20 % off) on a multisine with white noise and one masked stretch."""
-    from commissioner.diagnose.plant import predict
+    from commissioner.diagnose.plant.prediction import predict
 
     time = PERIOD * np.arange(SAMPLES)
     voltage = sum(5.0 * np.sin(2 * np.pi * f * time + k) for k, f in enumerate(TONES))
@@ -150,7 +150,7 @@ def test_without_causes_only_the_error_as_it_is_is_drawn(seen, has_causes):
 
 
 def test_dense_tones_leave_excited_lines_and_others(seen):
-    from commissioner.diagnose.split import class_bins
+    from commissioner.diagnose.intake.line_classes import class_bins
 
     bins = class_bins(np.arange(1.0, 60.0, 2.0), SAMPLES, PERIOD)
     assert set(bins) == {"excited"} and bins["excited"].size == 30

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.audit import Audit
+from commissioner.diagnose.catalogue import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis, Verdict
 from commissioner.diagnose.document import as_document, refused_document
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure, what_decides
-from commissioner.diagnose.record import Facts
-from commissioner.diagnose.refusals import refused
-from commissioner.report import diagnose_sections as sections
-from commissioner.report.diagnose_names import (
+from commissioner.diagnose.intake.audit import Audit
+from commissioner.diagnose.intake.record import Facts
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.diagnose.verdict.experiment import DECIDES, next_experiment, procedure, what_decides
+from commissioner.report.diagnosis import sections
+from commissioner.report.diagnosis.names import (
     class_name,
     main_name,
     main_quantity,
@@ -24,9 +24,9 @@ from commissioner.report.diagnose_names import (
     spoken,
     sure_words,
 )
-from commissioner.report.diagnose_page import page_of
-from commissioner.report.diagnose_plain import PLAIN
-from commissioner.report.diagnose_words import actions, headline, meaning, remarks, tone
+from commissioner.report.diagnosis.page import page_of
+from commissioner.report.diagnosis.plain import PLAIN
+from commissioner.report.diagnosis.words import actions, headline, meaning, remarks, tone
 from commissioner.report.page import Page, Table, render
 
 FACTS = Facts(2e-4, 5.0, 1500.0, 0.8, 5.0, 5000.0, 540.0, 3)
