@@ -302,7 +302,16 @@ def _effect(name: str, entry: Any, source: str) -> Effect:
 
 def _setup(drive: dict[str, Any], interlocks: dict[str, Any], source: str) -> Setup:
     parameters = drive.pop("parameters", None)
-    fixed = {"interlocks", "parameters", "ignores", "commit_sticks", "store_fails", "refuses", "heeds_heartbeat", "runs_away"}
+    fixed = {
+        "interlocks",
+        "parameters",
+        "ignores",
+        "commit_sticks",
+        "store_fails",
+        "refuses",
+        "heeds_heartbeat",
+        "runs_away",
+    }
     defaults = Setup()
     fields = {f.name for f in dataclasses.fields(Setup)} - fixed
     _known(drive, fields, source, "drive.")

@@ -58,7 +58,13 @@ def demo(
     from commissioner.cli.verbs.demo import demo as verb
 
     verb(
-        scenario=scenario, speed=speed, seed=seed, axes=axes, write_back=write_back, runs=runs, as_json=json,
+        scenario=scenario,
+        speed=speed,
+        seed=seed,
+        axes=axes,
+        write_back=write_back,
+        runs=runs,
+        as_json=json,
         diagnosis=diagnosis,
     )
 
@@ -109,7 +115,9 @@ def run(
 
 @app.command()
 def identify(
-    files: Annotated[list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")
+    ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
     write_back: Annotated[

@@ -73,14 +73,16 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
 
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return UsageError(
-        text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call"
-    )
+    return UsageError(text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call")
 
 
 def _stopped() -> CommissionerError:
     return Aborted(
-        "stopped by the operator", step="wait", value="Ctrl-C, SIGTERM or no", limit="no stop", remedy="start again when ready"
+        "stopped by the operator",
+        step="wait",
+        value="Ctrl-C, SIGTERM or no",
+        limit="no stop",
+        remedy="start again when ready",
     )
 
 

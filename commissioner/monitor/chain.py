@@ -158,9 +158,7 @@ def _invert(
     solved = with_sensors(
         waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
     )
-    period = characteristic(
-        audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia
-    )
+    period = characteristic(audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia)
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
     ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))

@@ -145,7 +145,9 @@ def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnd
     try:
         return _saved(order, folder, findings, ended)
     except OSError as failure:
-        raise archive_lost(folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}") from failure
+        raise archive_lost(
+            folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}"
+        ) from failure
 
 
 def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:

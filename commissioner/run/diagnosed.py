@@ -23,14 +23,23 @@ def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]
     try:
         recording = to_standstill(read_table(folder.path / RECORDING))
     except CommissionerError as error:
-        return {"verdict": "refused", "reason": error.what, "causes": [], "moved": [], "is_complete": True, "file": None}
+        return {
+            "verdict": "refused",
+            "reason": error.what,
+            "causes": [],
+            "moved": [],
+            "is_complete": True,
+            "file": None,
+        }
     seen = diagnose([recording], go_on=go_on)
     document = plain(as_document(seen, None))
     folder.save(FILE, document)
     return {
         "verdict": document["verdict"],
         "reason": document["reason"],
-        "causes": [{key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]],
+        "causes": [
+            {key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]
+        ],
         "moved": _moved(seen),
         "remarks": document["remarks"],
         "is_complete": document["is_complete"],

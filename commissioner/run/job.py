@@ -28,7 +28,6 @@ WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
 
 
-
 @contextmanager
 def open_drive(url: str, profile: DriveProfile, plan: ProcedurePlan) -> Iterator[ModbusPort]:
     port = open_port(parse_url(url), profile, reply_timeout_s=plan.supervision.reply_timeout_s)

@@ -89,8 +89,13 @@ def load_map(path: Path = MAP_FILE, shift: int = 0) -> DriveMap:
     by_address = {item.address + k: item for item in items.values() for k in range(item.words)}
     window = document["window"]
     return DriveMap(
-        items, by_address, window["address"] + shift, sum(_header_words(h) for h in window["header"]),
-        window["data_registers"], {k[5:]: v for k, v in window.items() if k.startswith("flag_")}, document,
+        items,
+        by_address,
+        window["address"] + shift,
+        sum(_header_words(h) for h in window["header"]),
+        window["data_registers"],
+        {k[5:]: v for k, v in window.items() if k.startswith("flag_")},
+        document,
     )
 
 
@@ -101,6 +106,13 @@ def _header_words(entry: str) -> int:
 def _item(name: str, entry: dict[str, Any], shift: int) -> Item:
     address = entry["address"] + (shift if entry["address"] >= 32 else 0)
     return Item(
-        name, address, entry["type"], entry.get("length", 1), "w" in entry["access"], entry.get("needs_stop", False),
-        entry.get("min", -math.inf), entry.get("max", math.inf), entry.get("scale", 1.0),
+        name,
+        address,
+        entry["type"],
+        entry.get("length", 1),
+        "w" in entry["access"],
+        entry.get("needs_stop", False),
+        entry.get("min", -math.inf),
+        entry.get("max", math.inf),
+        entry.get("scale", 1.0),
     )

@@ -91,7 +91,10 @@ class Registers:
         if skip == 0 or not self.window:
             fitting = samples.fitting(count) if skip == 0 else 0
             self.window = samples.window(
-                int(self.drive.values["window_index"]), fitting, self.drive.session, self.drive.x[at.X_LINK],
+                int(self.drive.values["window_index"]),
+                fitting,
+                self.drive.session,
+                self.drive.x[at.X_LINK],
                 is_running=self.drive.is_energised,
             )
         return self.window[skip : skip + count]

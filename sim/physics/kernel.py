@@ -69,12 +69,29 @@ class Now(NamedTuple):
 def load(p):
     """The Model in a packed parameter array."""
     return Model(
-        p[at.P_ORDER] > 4.0, 1.0 / p[at.P_LEAK_H], 1.0 / p[at.P_LIN_H], 1.0 / (p[at.P_FLUX_N] * p[at.P_FLUX_N]),
-        p[at.P_SAT], p[at.P_SAT_ORDER], p[at.P_SAT_SHAPE], p[at.P_SALIENT_C], p[at.P_SALIENT_S],
-        p[at.P_LEAKSAT], 1.0 / p[at.P_LEAKSAT_WB] if p[at.P_LEAKSAT_WB] > 0.0 else 0.0, p[at.P_LEAKSAT_SHAPE],
-        p[at.P_ANISO_C], p[at.P_ANISO_S], p[at.P_RR_C], p[at.P_RR_S], p[at.P_IRON_S],
-        p[at.P_DEAD_FRACTION], p[at.P_DEAD_PER_A], p[at.P_DEAD_SHAPE],
-        p[at.P_DROP_V], p[at.P_DROP_PER_A], p[at.P_DROP_SHAPE],
+        p[at.P_ORDER] > 4.0,
+        1.0 / p[at.P_LEAK_H],
+        1.0 / p[at.P_LIN_H],
+        1.0 / (p[at.P_FLUX_N] * p[at.P_FLUX_N]),
+        p[at.P_SAT],
+        p[at.P_SAT_ORDER],
+        p[at.P_SAT_SHAPE],
+        p[at.P_SALIENT_C],
+        p[at.P_SALIENT_S],
+        p[at.P_LEAKSAT],
+        1.0 / p[at.P_LEAKSAT_WB] if p[at.P_LEAKSAT_WB] > 0.0 else 0.0,
+        p[at.P_LEAKSAT_SHAPE],
+        p[at.P_ANISO_C],
+        p[at.P_ANISO_S],
+        p[at.P_RR_C],
+        p[at.P_RR_S],
+        p[at.P_IRON_S],
+        p[at.P_DEAD_FRACTION],
+        p[at.P_DEAD_PER_A],
+        p[at.P_DEAD_SHAPE],
+        p[at.P_DROP_V],
+        p[at.P_DROP_PER_A],
+        p[at.P_DROP_SHAPE],
     )
 
 
@@ -171,8 +188,14 @@ def _standing(v_a, v_b, t, link, x, p):
     r_v = p[at.P_RSB] * (1.0 + x[at.X_HEAT_B]) + p[at.P_SLOPE_OHM]
     r_w = p[at.P_RSC] * (1.0 + x[at.X_HEAT_C]) + p[at.P_SLOPE_OHM]
     return Now(
-        v_a, v_b, (4.0 * r_u + r_v + r_w) / 6.0, (r_w - r_v) / (4.0 * HALF_SQRT3), 0.5 * (r_v + r_w),
-        p[at.P_RR] * (1.0 + x[at.X_HEAT_R]), _shaft_speed(t, p), link,
+        v_a,
+        v_b,
+        (4.0 * r_u + r_v + r_w) / 6.0,
+        (r_w - r_v) / (4.0 * HALF_SQRT3),
+        0.5 * (r_v + r_w),
+        p[at.P_RR] * (1.0 + x[at.X_HEAT_R]),
+        _shaft_speed(t, p),
+        link,
     )
 
 
@@ -285,9 +308,11 @@ def _warm(x, is_a, is_b, ir_a, ir_b, p):
         dose = i * i if p[at.P_HEAT_S_SHAPE] == 0.0 else mean
         wall = x[at.X_HEAT_IRON]
         x[at.X_HEAT_A + j] += dt * (p[at.P_HEAT_S] * dose - (x[at.X_HEAT_A + j] - wall) / p[at.P_HEAT_S_TAU])
-    x[at.X_HEAT_IRON] += dt * (
-        (x[at.X_HEAT_A] + x[at.X_HEAT_B] + x[at.X_HEAT_C]) / 3.0 - 2.0 * x[at.X_HEAT_IRON]
-    ) / (8.0 * p[at.P_HEAT_S_TAU])
+    x[at.X_HEAT_IRON] += (
+        dt
+        * ((x[at.X_HEAT_A] + x[at.X_HEAT_B] + x[at.X_HEAT_C]) / 3.0 - 2.0 * x[at.X_HEAT_IRON])
+        / (8.0 * p[at.P_HEAT_S_TAU])
+    )
     power = ir_a * ir_a + ir_b * ir_b
     x[at.X_HEAT_R] += dt * (p[at.P_HEAT_R] * power - x[at.X_HEAT_R] / p[at.P_HEAT_R_TAU])
 
@@ -513,7 +538,10 @@ def coast(x, p, seconds):
         ir_a, ir_b = rotor_current(x[2] - x[0], x[3] - x[1], m)
         lost_a, lost_b = _cage_drop(ir_a, ir_b, p[at.P_RR], m)
         share = rate / size if size > 1e-12 else 0.0
-        side_a, side_b = step * (share * x[2] - lost_a), step * (share * x[3] - lost_b)  # what a direction keeps more than the mean
+        side_a, side_b = (
+            step * (share * x[2] - lost_a),
+            step * (share * x[3] - lost_b),
+        )  # what a direction keeps more than the mean
         turn = step * _shaft_speed(x[at.X_TIME] + spent, p)  # the rotor takes its flux along
         c, s = math.cos(turn), math.sin(turn)
         left_a, left_b = keep * (x[2] + side_a), keep * (x[3] + side_b)

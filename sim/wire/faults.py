@@ -16,16 +16,38 @@ from sim.drive.firmware import Firmware
 from sim.drive.states import Trip
 
 WIRE = {
-    "late": 0.5, "lost": None, "lost_request": None, "repeated": None, "truncated": 3, "corrupted": None,
-    "reordered": None, "stray_before": "00ff", "stray_after": "7f00", "wrong_unit": 17, "wrong_function": None,
-    "short_reply": 1, "wrong_transaction": None,
+    "late": 0.5,
+    "lost": None,
+    "lost_request": None,
+    "repeated": None,
+    "truncated": 3,
+    "corrupted": None,
+    "reordered": None,
+    "stray_before": "00ff",
+    "stray_after": "7f00",
+    "wrong_unit": 17,
+    "wrong_function": None,
+    "short_reply": 1,
+    "wrong_transaction": None,
 }
 """Faults of a single reply (or request) and their default argument."""
 SERVER = {"stall": 1.0, "restart": 1.0, "half_open": None}
 DRIVE = {
-    "overcurrent": None, "heatsink": None, "winding": None, "earth_fault": None, "sto": None, "undervoltage": None,
-    "overrun": 100, "sample_gap": 5, "power_cycle": None, "stuck_commit": None, "store_fails": None,
-    "heartbeat_ignored": None, "ignore": "control_word", "refuse": "watchdog_ms", "other_map": 100,
+    "overcurrent": None,
+    "heatsink": None,
+    "winding": None,
+    "earth_fault": None,
+    "sto": None,
+    "undervoltage": None,
+    "overrun": 100,
+    "sample_gap": 5,
+    "power_cycle": None,
+    "stuck_commit": None,
+    "store_fails": None,
+    "heartbeat_ignored": None,
+    "ignore": "control_word",
+    "refuse": "watchdog_ms",
+    "other_map": 100,
     "runs_away": None,
 }
 WRITE_REGISTERS = 16

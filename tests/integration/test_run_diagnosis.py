@@ -48,4 +48,7 @@ def test_a_diagnosis_whose_time_is_over_does_not_say_that_nothing_fits(ended):
     document = as_document(diagnose([to_standstill(read_table(path))], go_on=lambda: False), None)
     assert not document["is_complete"]
     assert document["reason"].startswith("Not finished")
-    assert "stopped before every cause was tried" in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
+    assert (
+        "stopped before every cause was tried"
+        in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
+    )

@@ -168,7 +168,9 @@ def test_a_changed_end_is_reported(fresh, tmp_path):
     assert difference is not None and difference.archived["kind"] == "run_ended"
 
 
-@pytest.mark.parametrize(("action", "key"), [("prepare", "watchdog_ms"), ("energise", "tones"), ("steer", "amplitude_scale")])
+@pytest.mark.parametrize(
+    ("action", "key"), [("prepare", "watchdog_ms"), ("energise", "tones"), ("steer", "amplitude_scale")]
+)
 def test_a_command_that_was_carried_out_otherwise_is_reported(fresh, tmp_path, action, key):
     was_changed = []
 

@@ -312,7 +312,9 @@ def test_a_fault_among_writes_counts_only_requests_that_write():
     assert [plain.hits(request, write) for request, write in ((2, None), (2, 1), (9, 2))] == [1, 1, 0]
 
 
-@pytest.mark.parametrize("text", ["nonsense", "late:x", "lost@", "lost@soon", "lost@w", "lost@w2s", "stray_before:zz", "Late", "late:1@2x"])
+@pytest.mark.parametrize(
+    "text", ["nonsense", "late:x", "lost@", "lost@soon", "lost@w", "lost@w2s", "stray_before:zz", "Late", "late:1@2x"]
+)
 def test_unclear_fault_texts_are_refused(text):
     with pytest.raises(FaultError):
         parse(text)

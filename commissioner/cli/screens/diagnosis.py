@@ -23,7 +23,14 @@ from commissioner.report.diagnosis.words import (
 )
 
 COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}
-COMMON = ("dead_time", "leakage_saturation", "magnetizing_saturation", "rotor_skin_effect", "sampling_delay", "sensor_offset")
+COMMON = (
+    "dead_time",
+    "leakage_saturation",
+    "magnetizing_saturation",
+    "rotor_skin_effect",
+    "sampling_delay",
+    "sensor_offset",
+)
 MOST_LIMITS = 6
 
 
@@ -76,10 +83,14 @@ def _causes(document: Mapping[str, Any]) -> None:
     rows = []
     for cause in found:
         is_fit = cause.get("found_by") != "audit"
-        rows.append((
-            class_name(cause), main_quantity(cause),
-            part_word(cause["gain_share"], largest) if is_fit else "-", sure(cause["confidence"]),
-        ))
+        rows.append(
+            (
+                class_name(cause),
+                main_quantity(cause),
+                part_word(cause["gain_share"], largest) if is_fit else "-",
+                sure(cause["confidence"]),
+            )
+        )
     screen.print(table("", ("cause", "size", "part of the error", "sure of the name"), rows))
     for cause in found:
         if cause["equivalent"]:
@@ -96,7 +107,9 @@ def _uncertain(document: Mapping[str, Any]) -> None:
     for one in seen:
         screen.print(f"  {spoken(one['name'])}: {escape(one['decides'])}")
     if hidden:
-        screen.print(f"[dim]not seen, but could hide behind a named cause: {', '.join(spoken(u['name']) for u in hidden)}[/]")
+        screen.print(
+            f"[dim]not seen, but could hide behind a named cause: {', '.join(spoken(u['name']) for u in hidden)}[/]"
+        )
 
 
 def _next(document: Mapping[str, Any]) -> None:
@@ -116,5 +129,3 @@ def _limits(document: Mapping[str, Any]) -> str:
     apart = {u["name"] for u in document.get("uncertain", ())} | {n for c in document["causes"] for n in members(c)}
     names = [n for n in dict.fromkeys((*COMMON, *known)) if n in known and n not in apart]
     return ", ".join(f"{spoken(n)} from {limit_words(document, n)}" for n in names[:MOST_LIMITS])
-
-

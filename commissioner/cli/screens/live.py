@@ -41,7 +41,9 @@ class LiveView:
             case told.WarmingUp():
                 self._line("[dim]preparing the observer (compiles on the first run, about a minute)[/]")
             case told.Diagnosing(seconds=seconds):
-                self._line(f"[bold]diagnosing the samples[/]  [dim]the drive is let go; at most {seconds:.0f} s, Ctrl-C ends it[/]")
+                self._line(
+                    f"[bold]diagnosing the samples[/]  [dim]the drive is let go; at most {seconds:.0f} s, Ctrl-C ends it[/]"
+                )
             case told.StateEntered(state=state, axis_deg=axis):
                 self._line(f"[bold]{state}[/]" + (f"  [dim]axis {axis:g}°[/]" if axis is not None else ""))
             case told.DriveIdentified():

@@ -94,7 +94,9 @@ def quantity(value: float, std: float, unit: str) -> str:
 
 def kept(is_stored: bool) -> str:
     """How lasting a write is, in words."""
-    return "read back and stored" if is_stored else "read back, not stored: save at the drive or it is lost at power-off"
+    return (
+        "read back and stored" if is_stored else "read back, not stored: save at the drive or it is lost at power-off"
+    )
 
 
 def wear(count: int, fraction: float) -> str:
@@ -145,7 +147,9 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
         for remark in (*finding_sentences(document), *document.get("remarks", ())):
             out.print(f"  [dim]•[/] {escape(remark)}")
         if standing(document) == ACCEPTED:
-            out.print("  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones")
+            out.print(
+                "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"
+            )
     out.print(f"  energised {document['energised_s']:.1f} s in all")
 
 

@@ -19,9 +19,7 @@ def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_js
     failure = check_failed(inspection.checks)
     document: dict[str, Any] = {
         "outcome": "rejected" if failure else "passed",
-        "reason": failure.what
-        if failure
-        else "every check passed; nothing was energised or written",
+        "reason": failure.what if failure else "every check passed; nothing was energised or written",
         "drive": inspection.identity,
         "nameplate_in_drive": inspection.nameplate,
         "parameters_in_drive": inspection.parameters,

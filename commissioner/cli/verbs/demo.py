@@ -21,7 +21,15 @@ START_S = 120.0
 
 
 def demo(
-    *, scenario: str, speed: str, seed: int, axes: str | None, write_back: bool, runs: Path, as_json: bool, diagnosis: bool
+    *,
+    scenario: str,
+    speed: str,
+    seed: int,
+    axes: str | None,
+    write_back: bool,
+    runs: Path,
+    as_json: bool,
+    diagnosis: bool,
 ) -> None:
     """Commission the simulated inverter; exits with the code of the outcome."""
     from commissioner.cli.screens import screen

@@ -77,8 +77,10 @@ def _standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Stands
         running = [c for c in RUNNING_COLUMNS if c in table.columns]
         if running and "voltage_axis_v" not in table.columns:
             raise DataRefused(
-                f"{table.source}: this is a recording of a running motor (column {running[0]})", step="diagnose",
-                value=", ".join(table.columns), limit="a standstill recording or a table of test points",
+                f"{table.source}: this is a recording of a running motor (column {running[0]})",
+                step="diagnose",
+                value=", ".join(table.columns),
+                limit="a standstill recording or a table of test points",
                 remedy="use `commissioner monitor` for a running motor",
             )
         unknown = sorted(set(table.columns) - STANDSTILL_COLUMNS)
@@ -96,7 +98,14 @@ def _without_copies(recordings: Sequence[StandstillRecording]) -> tuple[list[Sta
     kept: list[StandstillRecording] = []
     remarks = []
     for one in recordings:
-        same = next((k for k in kept if np.array_equal(k.current_u_a, one.current_u_a) and np.array_equal(k.time_s, one.time_s)), None)
+        same = next(
+            (
+                k
+                for k in kept
+                if np.array_equal(k.current_u_a, one.current_u_a) and np.array_equal(k.time_s, one.time_s)
+            ),
+            None,
+        )
         if same is None:
             kept.append(one)
         else:
@@ -120,14 +129,20 @@ def _same_motor(recordings: Sequence[StandstillRecording]) -> None:
         seen = {r.metadata[key]: r.source for r in recordings if key in r.metadata}
         if len(seen) > 1:
             raise DataRefused(
-                f"the files are of different motors: {key} is {' and '.join(str(k) for k in seen)}", step="diagnose",
-                value=", ".join(seen.values()), limit="recordings of one motor", remedy="diagnose them one by one",
+                f"the files are of different motors: {key} is {' and '.join(str(k) for k in seen)}",
+                step="diagnose",
+                value=", ".join(seen.values()),
+                limit="recordings of one motor",
+                remedy="diagnose them one by one",
             )
     periods = {r.sample_period_s for r in recordings}
     if max(periods) > 1.000001 * min(periods):
         raise DataRefused(
-            "the files are sampled at different rates", step="diagnose", value=", ".join(f"{p:g} s" for p in periods),
-            limit="one sample period", remedy="diagnose them one by one",
+            "the files are sampled at different rates",
+            step="diagnose",
+            value=", ".join(f"{p:g} s" for p in periods),
+            limit="one sample period",
+            remedy="diagnose them one by one",
         )
 
 

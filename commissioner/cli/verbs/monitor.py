@@ -128,7 +128,9 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
         rows.append(("load torque", document["waveforms"]["load_torque"]))
     if seen.inertia_kg_m2 is not None:
         rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
-    rows.append(("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)"))
+    rows.append(
+        ("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)")
+    )
     out.print(table("", ("", ""), rows))
     out.print(
         table(
@@ -172,7 +174,9 @@ def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -
     )
     out.print(document["cannot_be_fixed"]["sentence"])
     for finding in seen.findings:
-        if (finding not in wiring and finding.kind == "corrected") or (finding.kind == "note" and finding.code != "frequency_wander"):
+        if (finding not in wiring and finding.kind == "corrected") or (
+            finding.kind == "note" and finding.code != "frequency_wander"
+        ):
             out.print(f"[yellow]{finding.kind}[/] {finding.what}")
     if verdict is not None:
         colour = "red" if verdict.names else "green"

@@ -71,7 +71,13 @@ def commission_and_show(
         _ask(url, profile, nameplate, plan, write_back=write_back)
     with LiveView(screen.err if as_json else screen.out) as view:
         done = commission(
-            url, profile, nameplate, plan, write_back=write_back, runs=runs, present=view,
+            url,
+            profile,
+            nameplate,
+            plan,
+            write_back=write_back,
+            runs=runs,
+            present=view,
             diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
         )
     show_and_exit(done, as_json=as_json)

@@ -24,8 +24,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
         screen.out.print(f"no runs in {folder}/")
         return
     rows = [
-        (run.run, screen.outcome_mark(run.standing), run.drive, OLD_OR_NEW if run.is_unknown else "")
-        for run in found
+        (run.run, screen.outcome_mark(run.standing), run.drive, OLD_OR_NEW if run.is_unknown else "") for run in found
     ]
     screen.out.print(screen.table("", ("run", "outcome", "drive", "holds"), rows))
 

@@ -18,8 +18,15 @@ SAMPLE_PERIOD_S = 2e-4
 
 
 def simulate(
-    model: str, out: Path, like: Path | None = None, seconds: float = 6.0, axes: str = "0,60,120", noise_a: float = 0.0,
-    seed: int = 1, plain: bool = False, as_json: bool = False,
+    model: str,
+    out: Path,
+    like: Path | None = None,
+    seconds: float = 6.0,
+    axes: str = "0,60,120",
+    noise_a: float = 0.0,
+    seed: int = 1,
+    plain: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Write the currents of `model` (a model.json of `diagnose`, or a motor's name or file) as a recording.
 
@@ -45,7 +52,9 @@ def simulate(
     keys = {k: v for k, v in plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
     write_table(out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     summary = {
-        "recording": str(out), "samples": int(columns["time_s"].shape[0]), "segments": len(segments),
+        "recording": str(out),
+        "samples": int(columns["time_s"].shape[0]),
+        "segments": len(segments),
         "effects": sorted({t.effect for t in made.terms if t.effect}),
     }
     if as_json:
@@ -63,18 +72,28 @@ def _played(model: str, play: Callable[[], dict[str, Any]]) -> dict[str, Any]:
             columns = play()
     except (IndexError, np.linalg.LinAlgError) as error:
         raise ConfigurationError(
-            file=model, key="terms", value=str(error), expected="numbers that its own dictionary has, as `commissioner diagnose` writes them"
+            file=model,
+            key="terms",
+            value=str(error),
+            expected="numbers that its own dictionary has, as `commissioner diagnose` writes them",
         ) from error
     if not all(np.isfinite(values).all() for values in columns.values()):
-        raise ConfigurationError(file=model, key="nominal and terms", value="currents that run away", expected="numbers of a motor")
+        raise ConfigurationError(
+            file=model, key="nominal and terms", value="currents that run away", expected="numbers of a motor"
+        )
     return columns
 
 
 def _check_size(seconds: float, noise_a: float) -> None:
     for name, value, low, high in (("--seconds", seconds, 0.1, 3600.0), ("--noise-a", noise_a, 0.0, 1e4)):
         if not low <= value <= high:
-            raise UsageError(f"{name} {value:g} is out of range", step="command line", value=value,
-                             limit=f"{low:g} ... {high:g}", remedy=f"give {name} a value in this range")
+            raise UsageError(
+                f"{name} {value:g} is out of range",
+                step="command line",
+                value=value,
+                limit=f"{low:g} ... {high:g}",
+                remedy=f"give {name} a value in this range",
+            )
 
 
 def _model(name: str, plain: bool) -> tuple[Model, Layout | None, dict[str, float], dict[str, Any]]:
@@ -100,10 +119,17 @@ def _extended(path: Path, plain: bool) -> tuple[Model, Layout | None, dict[str, 
     from commissioner.diagnose.export.model_file import plain as without_effects
 
     if not path.is_file():
-        raise UsageError(f"there is no file {path}", step="read model", value=str(path), limit="an existing file",
-                         remedy="check the path")
+        raise UsageError(
+            f"there is no file {path}",
+            step="read model",
+            value=str(path),
+            limit="an existing file",
+            remedy="check the path",
+        )
     if path.stat().st_size > MAX_BYTES:
-        raise ConfigurationError(file=str(path), key="size", value=path.stat().st_size, expected=f"at most {MAX_BYTES} bytes")
+        raise ConfigurationError(
+            file=str(path), key="size", value=path.stat().st_size, expected=f"at most {MAX_BYTES} bytes"
+        )
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         document = without_effects(document) if plain else document
@@ -113,7 +139,6 @@ def _extended(path: Path, plain: bool) -> tuple[Model, Layout | None, dict[str, 
             file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
         ) from error
     return made, layout, dict(document.get("lines_hz", {})), dict(document.get("nameplate", {}))
-
 
 
 def _facts(plate: dict[str, Any]) -> Any:

@@ -95,14 +95,26 @@ class Effect:
 
 
 def effect(
-    name: str, title: str, *, sign: int, signature: str, confounders: tuple[str, ...], source: str, family: str,
-    split_by: str, sizes: Callable[[Setting, Mapping[str, float]], Sizes], course: str = "",
-    either: tuple[tuple[str, ...], ...] = (), exchanged: tuple[Term, ...] = (),
+    name: str,
+    title: str,
+    *,
+    sign: int,
+    signature: str,
+    confounders: tuple[str, ...],
+    source: str,
+    family: str,
+    split_by: str,
+    sizes: Callable[[Setting, Mapping[str, float]], Sizes],
+    course: str = "",
+    either: tuple[tuple[str, ...], ...] = (),
+    exchanged: tuple[Term, ...] = (),
 ) -> Callable[[Callable[[Setting], tuple[Term, ...]]], Effect]:
     """Turns the function that lists an effect's terms into its catalogue entry."""
 
     def enter(terms: Callable[[Setting], tuple[Term, ...]]) -> Effect:
-        entry = Effect(name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course, either, exchanged)
+        entry = Effect(
+            name, title, sign, terms, sizes, signature, confounders, source, family, split_by, course, either, exchanged
+        )
         object.__setattr__(entry, "__doc__", terms.__doc__)
         return entry
 
@@ -125,7 +137,9 @@ def listed(values: Mapping[str, float], prefix: str, count: int) -> Array:
     return np.array([values.get(f"{prefix}_{k}", 0.0) for k in range(count)])
 
 
-def nearest_course(course: Array, of: Callable[[float], Array], tried: Array, weight: float | Array = 1.0) -> tuple[float, float]:
+def nearest_course(
+    course: Array, of: Callable[[float], Array], tried: Array, weight: float | Array = 1.0
+) -> tuple[float, float]:
     """Size >= 0 and number x of the one course `of(x)` that comes nearest to `course` but for a constant; x from those `tried`
 
     (ascending) and between them.
@@ -136,7 +150,9 @@ def nearest_course(course: Array, of: Callable[[float], Array], tried: Array, we
 
     at = int(np.argmin([misfit(float(x)) for x in tried]))
     ends = float(tried[max(at - 1, 0)]), float(tried[min(at + 1, tried.size - 1)])
-    best = float(minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-6 * (ends[1] - ends[0])}).x)
+    best = float(
+        minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-6 * (ends[1] - ends[0])}).x
+    )
     return as_much_of(of(best), course, weight)[0], best
 
 

@@ -58,7 +58,9 @@ def _on_points(setting: Setting, values: Mapping[str, float]) -> tuple[Array, Ar
         if segment.file == record.segments[0].file:
             at = np.linspace(0, segment.count - 1, HEAT_POINTS).astype(int)
             times.append(segment.time_s[at])
-            sums.append(sum(value * channels[at][:, _columns(setting, symbol)].mean(axis=1) for symbol, value in values.items()))
+            sums.append(
+                sum(value * channels[at][:, _columns(setting, symbol)].mean(axis=1) for symbol, value in values.items())
+            )
     return np.concatenate(times), np.concatenate(sums)
 
 
@@ -77,11 +79,16 @@ def _heating_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "stator_heating", "Stator winding that warms during the test", sign=1, family="drifting", sizes=_heating_sizes,
+    "stator_heating",
+    "Stator winding that warms during the test",
+    sign=1,
+    family="drifting",
+    sizes=_heating_sizes,
     signature="skirts around the lowest tone, resistance higher in later segments, most in the phase that carried most",
     confounders=("rotor_heating", "resistance_anisotropy", "sensor_gain_mismatch"),
     source="adiabatic heating, IEC 60079-7 form; copper 0.393 %/K; d theta/dt = P/C - theta/tau",
-    split_by="repeat the first segment last, axes in the order a-b-c-c-b-a", either=(STATOR_HEAT, (FRESH_STATOR_HEAT,)),
+    split_by="repeat the first segment last, axes in the order a-b-c-c-b-a",
+    either=(STATOR_HEAT, (FRESH_STATOR_HEAT,)),
 )
 def stator_heating(setting: Setting) -> tuple[Term, ...]:
     """R_x = R_s (1 + k integral i_x^2 / I_N^2 dt): relative rise per minute at rated current, k >= 0, each phase by its
@@ -92,17 +99,32 @@ def stator_heating(setting: Setting) -> tuple[Term, ...]:
     kinds_of_heat = STATOR_HEAT + ((FRESH_STATOR_HEAT,) if setting.spans_segments else ())
     channels = {kind: f"heat_{kind}_u" for kind in kinds_of_heat}
     return tuple(
-        Term("stator_heating", kind, "1/min", kinds.PHASE_RESISTANCE, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE, channel=n)
+        Term(
+            "stator_heating",
+            kind,
+            "1/min",
+            kinds.PHASE_RESISTANCE,
+            setting.record.channel(n),
+            0.01,
+            0.0,
+            FASTEST_RISE,
+            channel=n,
+        )
         for kind, n in channels.items()
     )
 
 
 @effect(
-    "rotor_heating", "Rotor cage that warms during the test", sign=1, family="drifting", sizes=_heating_sizes,
+    "rotor_heating",
+    "Rotor cage that warms during the test",
+    sign=1,
+    family="drifting",
+    sizes=_heating_sizes,
     signature="rotor resistance higher in later segments; only AC content heats it",
     confounders=("stator_heating", "resistance_anisotropy", "sensor_gain_mismatch"),
     source="as stator heating, driven by the rotor current of the nominal model",
-    split_by="a DC-bias segment between two AC segments", either=(CAGE_HEAT, (FRESH_CAGE_HEAT,)),
+    split_by="a DC-bias segment between two AC segments",
+    either=(CAGE_HEAT, (FRESH_CAGE_HEAT,)),
 )
 def rotor_heating(setting: Setting) -> tuple[Term, ...]:
     """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current, with the leaks of the stator's;
@@ -111,7 +133,9 @@ def rotor_heating(setting: Setting) -> tuple[Term, ...]:
     """
     names = CAGE_HEAT + ((FRESH_CAGE_HEAT,) if setting.spans_segments else ())
     return tuple(
-        Term("rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE, channel=n)
+        Term(
+            "rotor_heating", n, "1/min", kinds.ROTOR_MOD, setting.record.channel(n), 0.01, 0.0, FASTEST_RISE, channel=n
+        )
         for n in names
     )
 

@@ -88,13 +88,18 @@ def _dead_time_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def _legs(name: str, kind: int, setting: Setting) -> tuple[Term, ...]:
     count = setting.layout.legs_vectors.shape[0]
     shares = tuple(
-        Term(name, f"unequal_{leg}", "1", kinds.LEG_SHARE, k, 0.01, -MOST_UNEQUAL, MOST_UNEQUAL) for k, leg in ((1, "v"), (2, "w"))
+        Term(name, f"unequal_{leg}", "1", kinds.LEG_SHARE, k, 0.01, -MOST_UNEQUAL, MOST_UNEQUAL)
+        for k, leg in ((1, "v"), (2, "w"))
     )
     return (*(Term(name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count)), *shares)
 
 
 @effect(
-    "dead_time", "Dead time of the inverter legs", sign=1, family="odd", sizes=_dead_time_sizes,
+    "dead_time",
+    "Dead time of the inverter legs",
+    sign=1,
+    family="odd",
+    sizes=_dead_time_sizes,
     signature="each leg loses a voltage with the sign of its own current, largest relative to the command at small "
     "current; odd lines around every tone; leaks into the cross axis off the multiples of 30 degrees",
     confounders=("device_drop", "dc_link_sag", "sensor_nonlinearity"),
@@ -110,7 +115,11 @@ def dead_time(setting: Setting) -> tuple[Term, ...]:
 
 
 @effect(
-    "device_drop", "Threshold voltage of the switches and diodes", sign=1, family="odd", sizes=_leg_sizes,
+    "device_drop",
+    "Threshold voltage of the switches and diodes",
+    sign=1,
+    family="odd",
+    sizes=_leg_sizes,
     signature="as dead time, but independent of switching frequency and link voltage",
     confounders=("dead_time", "dc_link_sag"),
     source="A. R. Munoz, T. A. Lipo, IEEE Trans. Power Electron. 14(2), 1999; slope resistance is part of R_s",
@@ -130,9 +139,12 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     record = setting.record
     first = [s.first(SAG_SAMPLES) for s in record.segments]
     weight = np.concatenate([s.voltage_axis_v for s in first])
-    course = np.concatenate([
-        sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items()) for k, s in enumerate(first)
-    ])
+    course = np.concatenate(
+        [
+            sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items())
+            for k, s in enumerate(first)
+        ]
+    )
 
     both_ways, period = [power_of(record, s) for s in first], record.facts.sample_period_s
     one_way = [np.maximum(p, 0.0) for p in both_ways]
@@ -141,7 +153,9 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     def lagged_of(powers: Sequence[Array]) -> Callable[..., Array]:
         def lagged(log_lag: float, shape: float = 0.0) -> Array:
             lag = float(np.exp(log_lag))
-            return -np.concatenate(behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape))
+            return -np.concatenate(
+                behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape)
+            )
 
         return lagged
 
@@ -154,7 +168,9 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         return size, float(np.exp(log_lag))
     left = as_much_of(lagged(log_lag), course, weight)[1]
     second = least_squares(
-        lambda x: as_much_of(lagged(*x), course, weight)[1], (log_lag, 0.1), x_scale=(0.1, 0.1),
+        lambda x: as_much_of(lagged(*x), course, weight)[1],
+        (log_lag, 0.1),
+        x_scale=(0.1, 0.1),
         bounds=((np.log(SAG_LAGS_S[0] / 2.0), LEAST_RINGING), (np.log(2.0 * SAG_LAGS_S[-1]), MOST_RINGING)),
     )
     if 2.0 * second.cost < SECOND_ORDER_LEAVES * float(left @ left):
@@ -203,7 +219,9 @@ def _courses(record: Record) -> dict[str, Array]:
     command = np.concatenate([s.voltage_axis_v[at] for s, at in zip(record.segments, some, strict=True)])
     out = {}
     for name in [n for n in record.channel_names if n in (*SWINGING, *DRAWN, *ROOT, *HELD, RECORDED_LINK)]:
-        moved = command * np.concatenate([c[at, record.channel(name)] for c, at in zip(record.channels, some, strict=True)])
+        moved = command * np.concatenate(
+            [c[at, record.channel(name)] for c, at in zip(record.channels, some, strict=True)]
+        )
         out[name] = moved - command * float(command @ moved) / max(float(command @ command), 1e-300)
     return out
 
@@ -222,7 +240,11 @@ def without_the_recorded_link(model: Model, record: Record) -> Model:
 
 
 @effect(
-    "dc_link_sag", "DC link that sags under load, uncompensated", sign=1, family="odd", sizes=_sag_sizes,
+    "dc_link_sag",
+    "DC link that sags under load, uncompensated",
+    sign=1,
+    family="odd",
+    sizes=_sag_sizes,
     signature="voltage error proportional to command times power: odd lines that grow with the cube of the level",
     confounders=("dead_time", "sensor_nonlinearity", "leakage_saturation"),
     source="v = v* (1 - k LP(p) / P_N); six-pulse rectifier regulation, e.g. N. Mohan, Power Electronics, ch. 5",
@@ -238,12 +260,24 @@ def dc_link_sag(setting: Setting) -> tuple[Term, ...]:
     """
     record = setting.record
     lags = tuple(
-        Term("dc_link_sag", n, "1", kinds.VOLTAGE_MOD, record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n)
+        Term(
+            "dc_link_sag", n, "1", kinds.VOLTAGE_MOD, record.channel(n), 0.01, -MOST_OF_A_LAG, MOST_OF_A_LAG, channel=n
+        )
         for n in (*SWINGING, *DRAWN, *ROOT, *HELD)
     )
     if RECORDED_LINK not in record.channel_names:
         return lags
-    seen = Term("dc_link_sag", RECORDED_LINK, "1", kinds.VOLTAGE_MOD, record.channel(RECORDED_LINK), 0.1, 0.0, MOST_OF_THE_LINK, channel=RECORDED_LINK)
+    seen = Term(
+        "dc_link_sag",
+        RECORDED_LINK,
+        "1",
+        kinds.VOLTAGE_MOD,
+        record.channel(RECORDED_LINK),
+        0.1,
+        0.0,
+        MOST_OF_THE_LINK,
+        channel=RECORDED_LINK,
+    )
     return (*lags, seen)
 
 
@@ -257,7 +291,11 @@ def _ripple_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "dc_link_ripple", "Ripple of the DC link", sign=0, family="non-periodic", sizes=_ripple_sizes,
+    "dc_link_ripple",
+    "Ripple of the DC link",
+    sign=0,
+    family="non-periodic",
+    sizes=_ripple_sizes,
     signature="side lines at every tone plus and minus 100, 120, 300 or 360 Hz, proportional to the tone",
     confounders=("mains_pickup",),
     source="v = v* (1 + a cos wt + b sin wt); rectifier ripple, N. Mohan, Power Electronics, ch. 5",
@@ -267,8 +305,18 @@ def dc_link_ripple(setting: Setting) -> tuple[Term, ...]:
     """Relative amplitudes a, b of the rectifier's ripple line (frequency refined on the data)."""
     names = [n for n in setting.record.channel_names if n.startswith("ripple_")]
     return tuple(
-        Term("dc_link_ripple", f"{n}_{s.uid}", "1", kinds.VOLTAGE_MOD, setting.record.channel(n), 0.01, segment=s.uid, channel=n)
-        for s in setting.record.segments for n in names
+        Term(
+            "dc_link_ripple",
+            f"{n}_{s.uid}",
+            "1",
+            kinds.VOLTAGE_MOD,
+            setting.record.channel(n),
+            0.01,
+            segment=s.uid,
+            channel=n,
+        )
+        for s in setting.record.segments
+        for n in names
     )
 
 
@@ -277,7 +325,11 @@ def _cable_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "cable_capacitance", "Capacitance of the motor cable", sign=1, family="linear", sizes=_cable_sizes,
+    "cable_capacitance",
+    "Capacitance of the motor cable",
+    sign=1,
+    family="linear",
+    sizes=_cable_sizes,
     signature="a current that leads the voltage by 90 degrees, growing with frequency; no distortion",
     confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
     source="i_sensor = i + C dv/dt at the inverter-side sensor",
@@ -286,7 +338,8 @@ def _cable_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 def cable_capacitance(setting: Setting) -> tuple[Term, ...]:
     """C >= 0 [F] per phase to the star point, charged by the step of the command at, before or after the sample."""
     return tuple(
-        Term("cable_capacitance", when, "F", CABLE, k, 1e-9, 0.0, 1e-4) for k, when in enumerate(("at", "before", "after"))
+        Term("cable_capacitance", when, "F", CABLE, k, 1e-9, 0.0, 1e-4)
+        for k, when in enumerate(("at", "before", "after"))
     )
 
 

@@ -37,7 +37,11 @@ FOOT_SHARE = 0.5
 
 
 @effect(
-    "magnetizing_saturation", "Saturation of the main flux path", sign=1, family="odd", sizes=_saturation_sizes,
+    "magnetizing_saturation",
+    "Saturation of the main flux path",
+    sign=1,
+    family="odd",
+    sizes=_saturation_sizes,
     signature="odd lines of the lowest tone, growing very fast with level; even lines with DC bias",
     confounders=("magnetic_hysteresis", "dc_link_sag"),
     source="i_M = psi/L_M (1 + b |psi/psi_n|^S): Qu, Ranta, Hinkkanen, Luomi, IEEE Trans. Ind. Appl. 48(3), 2012",
@@ -73,17 +77,24 @@ def _hysteresis_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     """Largest current of the memory, and the flux at which it is, of those reached."""
     rates = setting.layout.stop_radius_wb[:, 1]
     fluxes = np.linspace(setting.iron_flux_wb, 0.0, 21)
-    currents = np.array([[loop_width(flux, 0.0, rate)[0] for rate in rates] for flux in fluxes]) @ listed(values, "loop", rates.size)
+    currents = np.array([[loop_width(flux, 0.0, rate)[0] for rate in rates] for flux in fluxes]) @ listed(
+        values, "loop", rates.size
+    )
     widest = int(np.argmax(currents))
     return {"coercive_current_a": (float(currents[widest]), "A"), "at_flux_wb": (float(fluxes[widest]), "Wb")}
 
 
 @effect(
-    "magnetic_hysteresis", "Hysteresis of the iron", sign=1, family="odd", sizes=_hysteresis_sizes,
+    "magnetic_hysteresis",
+    "Hysteresis of the iron",
+    sign=1,
+    family="odd",
+    sizes=_hysteresis_sizes,
     signature="a loop that does not depend on rate; broad odd lines falling slowly with order",
     confounders=("magnetizing_saturation", "dead_time", "rotor_skin_effect"),
     source="stop operators: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996; exponential: P. R. Dahl, 1968",
-    split_by="repeat the lowest tone at several amplitudes", exchanged=(CARRIED,),
+    split_by="repeat the lowest tone at several amplitudes",
+    exchanged=(CARRIED,),
 )
 def magnetic_hysteresis(setting: Setting) -> tuple[Term, ...]:
     """Extra current sum h_k w_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
@@ -117,7 +128,11 @@ def _remanence_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "remanence", "Flux left in the iron before the test", sign=1, family="start", sizes=_remanence_sizes,
+    "remanence",
+    "Flux left in the iron before the test",
+    sign=1,
+    family="start",
+    sizes=_remanence_sizes,
     signature="a transient at the start of a segment that decays with the rotor time constant",
     confounders=("sensor_offset", "magnetic_hysteresis", "shaft_motion"),
     source="initial state of the flux equation; P. Vas, Sensorless Vector and Direct Torque Control, 1998",
@@ -128,7 +143,8 @@ def remanence(setting: Setting) -> tuple[Term, ...]:
     step = 0.01 * max(setting.iron_flux_wb, 1e-6)
     return tuple(
         Term("remanence", f"{axis}_{s.uid}", "Wb", kinds.INITIAL_FLUX, c, step, segment=s.uid)
-        for s in setting.record.segments if s.starts_at_rest
+        for s in setting.record.segments
+        if s.starts_at_rest
         for c, axis in enumerate(("alpha", "beta"))
     )
 
@@ -146,7 +162,11 @@ def _leakage_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "leakage_saturation", "Leakage path that saturates with current", sign=1, family="odd", sizes=_leakage_sizes,
+    "leakage_saturation",
+    "Leakage path that saturates with current",
+    sign=1,
+    family="odd",
+    sizes=_leakage_sizes,
     signature="odd intermodulation around the highest tones, growing with the cube of the current",
     confounders=("sensor_nonlinearity", "dc_link_sag"),
     source="T. A. Lipo, A. Consoli, IEEE Trans. Ind. Appl. IA-20(1), 1984; T. Tuovinen et al., IEEE ECCE 2011",
@@ -175,7 +195,11 @@ def _skin_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "rotor_skin_effect", "Current displacement in the rotor bars", sign=1, family="linear", sizes=_skin_sizes,
+    "rotor_skin_effect",
+    "Current displacement in the rotor bars",
+    sign=1,
+    family="linear",
+    sizes=_skin_sizes,
     signature="rotor resistance rises and leakage falls between 50 and 600 Hz; excited lines only, proportional to level",
     confounders=("iron_loss", "sampling_delay", "sensor_lag", "cable_capacitance"),
     source="ladder network of a bar: A. Levy, H. Auinger, cited in Babb & Williams, Trans. AIEE 70, 1951",
@@ -190,7 +214,8 @@ def rotor_skin_effect(setting: Setting) -> tuple[Term, ...]:
     largest = 600.0 / setting.layout.nominal_box[1][1] if np.isfinite(setting.layout.nominal_box[1][1]) else np.inf
     return tuple(
         Term("rotor_skin_effect", f"branch_{k}", "S", kinds.BRANCH, k, 0.01, 0.0, largest)
-        for k, time in enumerate(setting.layout.branch_time_s) if time > 0.0
+        for k, time in enumerate(setting.layout.branch_time_s)
+        if time > 0.0
     )
 
 
@@ -204,11 +229,16 @@ def _loss_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "iron_loss", "Eddy-current loss of the iron", sign=1, family="linear", sizes=_loss_sizes,
+    "iron_loss",
+    "Eddy-current loss of the iron",
+    sign=1,
+    family="linear",
+    sizes=_loss_sizes,
     signature="resistance rises with the square of frequency up to more than 1 kHz; looks like a lead",
     confounders=("rotor_skin_effect", "sampling_delay", "cable_capacitance"),
     source="conductance across the stator flux: E. Levi, IEEE Trans. Energy Convers. 10(2), 1995",
-    split_by="tones above 1 kHz, or a running no-load test", exchanged=(EDGE,),
+    split_by="tones above 1 kHz, or a running no-load test",
+    exchanged=(EDGE,),
 )
 def iron_loss(setting: Setting) -> tuple[Term, ...]:
     """Conductance g >= 0 [S] fed by the stator's induced voltage, and eddy paths g_k / (1 + s T_k) that lag behind it, with
@@ -217,7 +247,8 @@ def iron_loss(setting: Setting) -> tuple[Term, ...]:
     """
     paths = tuple(
         Term("iron_loss", f"eddy_{k}", "S", kinds.BRANCH, k, 1e-4, 0.0, 0.2)
-        for k, time in enumerate(setting.layout.branch_time_s) if time < 0.0
+        for k, time in enumerate(setting.layout.branch_time_s)
+        if time < 0.0
     )
     return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
 
@@ -242,7 +273,12 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "shaft_motion", "Shaft that moves during the test", sign=0, family="cross", sizes=_motion_sizes, course=HAT,
+    "shaft_motion",
+    "Shaft that moves during the test",
+    sign=0,
+    family="cross",
+    sizes=_motion_sizes,
+    course=HAT,
     signature="current in the axis that gets no voltage, proportional to the rotor flux",
     confounders=("sensor_offset", "sensor_drift", "inductance_anisotropy"),
     source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
@@ -254,13 +290,23 @@ def shaft_motion(setting: Setting) -> tuple[Term, ...]:
     splines; and where in the pause before a segment it carried the flux left from the segment before that.
     """
     speed = tuple(
-        Term("shaft_motion", f"{n}_{s.uid}", "rad/s", kinds.OMEGA, setting.record.channel(n), 0.1, segment=s.uid, channel=n)
+        Term(
+            "shaft_motion",
+            f"{n}_{s.uid}",
+            "rad/s",
+            kinds.OMEGA,
+            setting.record.channel(n),
+            0.1,
+            segment=s.uid,
+            channel=n,
+        )
         for s in setting.record.segments
         for n in _speed_hats(setting.record)
     )
     carried = tuple(
         Term("shaft_motion", f"{name}_{s.uid}", "1", kinds.CARRY, k, 0.01, -2.0, 2.0, segment=s.uid)
-        for before, s in itertools.pairwise(setting.record.segments) if before.file == s.file and s.starts_at_rest
+        for before, s in itertools.pairwise(setting.record.segments)
+        if before.file == s.file and s.starts_at_rest
         for k, name in enumerate(("along", "across"))
     )
     return (*speed, *carried)
@@ -269,12 +315,18 @@ def shaft_motion(setting: Setting) -> tuple[Term, ...]:
 def _anisotropy_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     parts = {p: [values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin")] for p in ("leakage", "magnetizing")}
     return {
-        f"{p}_anisotropy": (float(np.linalg.norm(pair)), "1") for p, pair in parts.items() if any(pair) or p == "leakage"
+        f"{p}_anisotropy": (float(np.linalg.norm(pair)), "1")
+        for p, pair in parts.items()
+        if any(pair) or p == "leakage"
     }
 
 
 @effect(
-    "inductance_anisotropy", "Inductance that depends on the axis", sign=0, family="axis", sizes=_anisotropy_sizes,
+    "inductance_anisotropy",
+    "Inductance that depends on the axis",
+    sign=0,
+    family="axis",
+    sizes=_anisotropy_sizes,
     signature="leakage differs with the axis angle (period 180 degrees) and couples the axes; no distortion",
     confounders=("sensor_gain_mismatch", "resistance_anisotropy"),
     source="second-harmonic tensor of eccentricity and slotting: M. Linke, R. Kennel, J. Holtz, IEEE IECON 2003",
@@ -291,7 +343,8 @@ def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
     parts = (("leakage", kinds.LEAKAGE_ANISOTROPY), ("magnetizing", kinds.MAGNETIZING_ANISOTROPY))
     tilts = tuple(
         Term("inductance_anisotropy", f"{part}_{name}", "1", kind, c, 0.01, -0.5, 0.5)
-        for part, kind in parts for c, name in enumerate(("cos", "sin"))
+        for part, kind in parts
+        for c, name in enumerate(("cos", "sin"))
     )
     return (*tilts, Term("inductance_anisotropy", "split", "1", kinds.ANISOTROPY_SPLIT, 0, 0.1, -0.5, 0.5))
 
@@ -299,12 +352,17 @@ def inductance_anisotropy(setting: Setting) -> tuple[Term, ...]:
 def _resistance_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {
         f"{p}_anisotropy": (float(np.hypot(values.get(f"{p}_cos", 0.0), values.get(f"{p}_sin", 0.0))), "1")
-        for p in ("stator", "rotor") if f"{p}_cos" in values
+        for p in ("stator", "rotor")
+        if f"{p}_cos" in values
     }
 
 
 @effect(
-    "resistance_anisotropy", "Resistance that depends on the axis", sign=0, family="axis", sizes=_resistance_sizes,
+    "resistance_anisotropy",
+    "Resistance that depends on the axis",
+    sign=0,
+    family="axis",
+    sizes=_resistance_sizes,
     signature="resistance differs between phases (joint, winding) or rotor directions (broken bar); excited lines only",
     confounders=("sensor_gain_mismatch", "stator_heating", "inductance_anisotropy"),
     source="R_x = R_s (1 + c cos 2 theta_x + s sin 2 theta_x); rotor: same tensor on R_R",
@@ -316,7 +374,16 @@ def resistance_anisotropy(setting: Setting) -> tuple[Term, ...]:
         return ()
     channel = setting.record.channel
     stator = tuple(
-        Term("resistance_anisotropy", f"stator_{n}", "1", kinds.PHASE_RESISTANCE, channel(f"phase_{n}_u"), 0.01, -0.5, 0.5)
+        Term(
+            "resistance_anisotropy",
+            f"stator_{n}",
+            "1",
+            kinds.PHASE_RESISTANCE,
+            channel(f"phase_{n}_u"),
+            0.01,
+            -0.5,
+            0.5,
+        )
         for n in ("cos", "sin")
     )
     rotor = tuple(
@@ -327,6 +394,13 @@ def resistance_anisotropy(setting: Setting) -> tuple[Term, ...]:
 
 
 ENTRIES: tuple[Effect, ...] = (
-    magnetizing_saturation, magnetic_hysteresis, remanence, leakage_saturation, rotor_skin_effect, iron_loss,
-    shaft_motion, inductance_anisotropy, resistance_anisotropy,
+    magnetizing_saturation,
+    magnetic_hysteresis,
+    remanence,
+    leakage_saturation,
+    rotor_skin_effect,
+    iron_loss,
+    shaft_motion,
+    inductance_anisotropy,
+    resistance_anisotropy,
 )

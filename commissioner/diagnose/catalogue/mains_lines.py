@@ -47,19 +47,25 @@ def with_clearer_lines(
     bare = model
     for kind in kept:
         bare = bare.without(LINES[kind])
-    residuals = each_segment(lambda k: record.segments[k].currents_a - predict(bare, record, k, layout).currents_a, record)
+    residuals = each_segment(
+        lambda k: record.segments[k].currents_a - predict(bare, record, k, layout).currents_a, record
+    )
     readings = len(residuals)
     clear = float(gammainccinv(readings, BY_CHANCE) / gammainccinv(readings, 0.5))
     longest = max(s.count for s in record.segments) * record.facts.sample_period_s
     fresh: dict[str, float] = {}
-    for (old, known), (new, (frequency, ratio)) in zip(lines.items(), found_lines(record, residuals, model, noise).items(), strict=True):
+    for (old, known), (new, (frequency, ratio)) in zip(
+        lines.items(), found_lines(record, residuals, model, noise).items(), strict=True
+    ):
         is_same = old == new and abs(frequency - known) * longest < SAME_LINE
         is_old = is_same or ratio < clear or (old != new and new.partition("_")[0] in kept)
         fresh |= {old: known} if is_old else {new: frequency}
     return (record, lines) if fresh == lines else (with_lines(record, fresh), fresh)
 
 
-def found_lines(record: Record, residuals: Sequence[Array], model: Model, noise: Noise) -> dict[str, tuple[float, float]]:
+def found_lines(
+    record: Record, residuals: Sequence[Array], model: Model, noise: Noise
+) -> dict[str, tuple[float, float]]:
     """Of ripple and mains each the frequency that explains or stands out most, Hz, and by how much it stands out (`ripple_300`: ...)."""
     tones = np.array(excited_lines(record))
     drive = _ripple_drive(record, residuals, model, noise, tones)
@@ -103,7 +109,9 @@ def _without_line(segment: Segment, signal: Array, frequency: float) -> Array:
 
 def without_lines(record: Record) -> Record:
     others = sum(name.partition("_")[0].partition("x")[0] not in HARMONICS for name in record.channel_names)
-    return replace(record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels))
+    return replace(
+        record, channel_names=record.channel_names[:others], channels=tuple(c[:, :others] for c in record.channels)
+    )
 
 
 def with_lines(record: Record, lines: Mapping[str, float]) -> Record:
@@ -142,7 +150,10 @@ def _along(record: Record, segment: Segment, residual: Array, model: Model, nois
     frequency = np.asarray(np.fft.rfftfreq(n, period), dtype=np.float64)
     is_free = np.all(np.abs(frequency[:, None] - tones) >= AT_A_TONE / (n * period), axis=1)
     return _Along(
-        weights @ np.where(segment.is_good, residual, 0.0), impedance(model.nominal, frequency), weights**2 @ noise.weights(n, period) ** 2, is_free
+        weights @ np.where(segment.is_good, residual, 0.0),
+        impedance(model.nominal, frequency),
+        weights**2 @ noise.weights(n, period) ** 2,
+        is_free,
     )
 
 

@@ -19,7 +19,9 @@ from commissioner.diagnose.plant.prediction import predict
 
 Array = NDArray[np.float64]
 SAG_LAGS_S = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
-SWINGING, DRAWN, ROOT, HELD = (tuple(f"sag_{of}{lag * 1e3:g}ms" for lag in SAG_LAGS_S) for of in ("", "drawn_", "root_", "held_"))
+SWINGING, DRAWN, ROOT, HELD = (
+    tuple(f"sag_{of}{lag * 1e3:g}ms" for lag in SAG_LAGS_S) for of in ("", "drawn_", "root_", "held_")
+)
 """Lagged powers: with their sign, from a source that takes back what it gave; without what is given back; the root of that, as of a
 
 rectifier whose current flows in gaps; and of a capacitor behind diodes, which holds what is given back until it is drawn.
@@ -100,8 +102,10 @@ def _heat(record: Record, rotor: Sequence[Array]) -> Named:
         fresh = np.cumsum(rate, axis=1) - rate
         end = ends[segment.file]
         windings = [
-            *(dose[:3] for dose in here), *(np.repeat(dose[:3].mean(axis=0)[None], 3, axis=0) for dose in here),
-            *(np.repeat(end[:3].mean() * x[None], 3, axis=0) for x in (since, settling)), fresh[:3],
+            *(dose[:3] for dose in here),
+            *(np.repeat(dose[:3].mean(axis=0)[None], 3, axis=0) for dose in here),
+            *(np.repeat(end[:3].mean() * x[None], 3, axis=0) for x in (since, settling)),
+            fresh[:3],
         ]
         cage = [*(dose[3] for dose in here), end[3] * since, end[3] * settling, fresh[3]]
         out.append(np.vstack([*windings, *cage]).T)
@@ -140,9 +144,18 @@ def _since_start(record: Record, segment: Segment) -> Array:
 
 def _sag(record: Record) -> Named:
     """Minus lagged electrical power over rated power; and the link's own course where it was recorded."""
-    names, powers, period = (*SWINGING, *DRAWN, *ROOT, *HELD), [power_of(record, s) for s in record.segments], record.facts.sample_period_s
+    names, powers, period = (
+        (*SWINGING, *DRAWN, *ROOT, *HELD),
+        [power_of(record, s) for s in record.segments],
+        record.facts.sample_period_s,
+    )
     drawn = [np.maximum(p, 0.0) for p in powers]
-    laws = [(behind_lag, powers), (behind_lag, drawn), (behind_lag, [np.sqrt(p) for p in drawn]), (behind_rectifier, powers)]
+    laws = [
+        (behind_lag, powers),
+        (behind_lag, drawn),
+        (behind_lag, [np.sqrt(p) for p in drawn]),
+        (behind_rectifier, powers),
+    ]
     lagged = [law(of, period, lag) for law, of in laws for lag in SAG_LAGS_S]
     out = [-np.stack(courses, axis=1) for courses in zip(*lagged, strict=True)]
     recorded = recorded_sag(record)

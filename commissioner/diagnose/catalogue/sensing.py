@@ -26,11 +26,16 @@ def _delay_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "sampling_delay", "Delay between command and sampled current", sign=1, family="linear", sizes=_delay_sizes,
+    "sampling_delay",
+    "Delay between command and sampled current",
+    sign=1,
+    family="linear",
+    sizes=_delay_sizes,
     signature="phase proportional to frequency at excited lines, no distortion",
     confounders=("sensor_lag", "iron_loss", "rotor_skin_effect", "cable_capacitance"),
     source="computation and PWM delay: B.-H. Bae, S.-K. Sul, IEEE Trans. Ind. Appl. 39(3), 2003",
-    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor", exchanged=(EARLY,),
+    split_by="lines closer to half the sampling rate, or a loop-back test of the sensor",
+    exchanged=(EARLY,),
 )
 def sampling_delay(setting: Setting) -> tuple[Term, ...]:
     """Reported current is i(t - tau), tau >= 0 [s], and a part that is added and taken off from sample to sample; tau < 0 only in
@@ -62,7 +67,11 @@ def _lag_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "sensor_lag", "Lag of the current sensors", sign=1, family="linear", sizes=_lag_sizes,
+    "sensor_lag",
+    "Lag of the current sensors",
+    sign=1,
+    family="linear",
+    sizes=_lag_sizes,
     signature="phase and a roll-off with the square of frequency at excited lines, no distortion",
     confounders=("sampling_delay", "iron_loss", "rotor_skin_effect"),
     source="anti-alias filter or sensor bandwidth: tau dy/dt = i - y, once or twice",
@@ -77,7 +86,17 @@ def sensor_lag(setting: Setting) -> tuple[Term, ...]:
     return (
         Term("sensor_lag", "lag", "s", LAG, 0, 1e-6, 0.0, 0.02),
         Term("sensor_lag", "shape", "1", LAG, SHAPE, 1e-2, 0.0, MOST_RESONANT),
-        Term("sensor_lag", "rippled", "s", LAG, RIPPLED, 1e-6, 0.0, 0.02, start=FIRST_RIPPLED * setting.facts.sample_period_s),
+        Term(
+            "sensor_lag",
+            "rippled",
+            "s",
+            LAG,
+            RIPPLED,
+            1e-6,
+            0.0,
+            0.02,
+            start=FIRST_RIPPLED * setting.facts.sample_period_s,
+        ),
     )
 
 
@@ -86,7 +105,11 @@ def _offset_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "sensor_offset", "Offset of the current sensors", sign=0, family="dc", sizes=_offset_sizes,
+    "sensor_offset",
+    "Offset of the current sensors",
+    sign=0,
+    family="dc",
+    sizes=_offset_sizes,
     signature="a constant, also with the inverter off; the three need not add up to zero",
     confounders=("remanence", "shaft_motion"),
     source="data sheets of open-loop Hall sensors: 0.2 to 1 % of range",
@@ -98,7 +121,11 @@ def sensor_offset(setting: Setting) -> tuple[Term, ...]:
 
 
 DRIFTS = {
-    "": 1.0, "_quarter": (1.0 - np.exp(-4.0)) / 4.0, "_sixteenth": (1.0 - np.exp(-16.0)) / 16.0, "_swing": 0.0, "_turn": 0.0,
+    "": 1.0,
+    "_quarter": (1.0 - np.exp(-4.0)) / 4.0,
+    "_sixteenth": (1.0 - np.exp(-16.0)) / 16.0,
+    "_swing": 0.0,
+    "_turn": 0.0,
 }
 """Part of a drift's first slope that is left as its mean slope over the whole recording: evenly, settling, swinging."""
 
@@ -106,12 +133,17 @@ DRIFTS = {
 def _drift_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     return {
         f"drift_{p}_a_per_min": (float(sum(share * values.get(p + k, 0.0) for k, share in DRIFTS.items())), "A/min")
-        for p in PHASES if p in values
+        for p in PHASES
+        if p in values
     }
 
 
 @effect(
-    "sensor_drift", "Offset of the current sensors that drifts", sign=0, family="dc", sizes=_drift_sizes,
+    "sensor_drift",
+    "Offset of the current sensors that drifts",
+    sign=0,
+    family="dc",
+    sizes=_drift_sizes,
     signature="a slow ramp of the mean over the whole recording",
     confounders=("sensor_offset", "remanence"),
     source="temperature drift of Hall sensors",
@@ -124,7 +156,8 @@ def sensor_drift(setting: Setting) -> tuple[Term, ...]:
     """
     return tuple(
         Term("sensor_drift", PHASES[k] + shape, "A/min", DRIFT, k + 3 * m, 1e-3)
-        for m, shape in enumerate(DRIFTS) for k in range(setting.facts.phases)
+        for m, shape in enumerate(DRIFTS)
+        for k in range(setting.facts.phases)
     )
 
 
@@ -133,7 +166,11 @@ def _gain_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "sensor_gain_mismatch", "Current sensors of unequal gain", sign=0, family="axis", sizes=_gain_sizes,
+    "sensor_gain_mismatch",
+    "Current sensors of unequal gain",
+    sign=0,
+    family="axis",
+    sizes=_gain_sizes,
     signature="currents that do not add up to zero in proportion to the signal; R and L differ alike with the axis",
     confounders=("inductance_anisotropy", "resistance_anisotropy", "stator_heating"),
     source="gain tolerance 0.5 to 2 %; the common gain is not visible from terminals",
@@ -166,20 +203,27 @@ BENDS = ("", *(f"_bend_{k}" for k in range(1, sensor_curve.COUNT)))
 
 
 @effect(
-    "sensor_nonlinearity", "Current sensors that are not straight", sign=0, family="even", sizes=_nonlinearity_sizes,
+    "sensor_nonlinearity",
+    "Current sensors that are not straight",
+    sign=0,
+    family="even",
+    sizes=_nonlinearity_sizes,
     signature="even or odd lines that no impedance has filtered, in each sensor by its own current",
     confounders=("leakage_saturation", "dc_link_sag"),
     source="reported = i (1 + n2 i/I_fs + n3 (i/I_fs)^2 + ...), I_fs twice the rated peak; linearity figures of data sheets",
     split_by="DC staircase",
     either=tuple(
-        tuple(f"{part}_{p}{bend}" for part in ("even", "odd") for bend in bends for p in PHASES) for bends in (BENDS[:1], BENDS)
+        tuple(f"{part}_{p}{bend}" for part in ("even", "odd") for bend in bends for p in PHASES)
+        for bends in (BENDS[:1], BENDS)
     ),
 )
 def sensor_nonlinearity(setting: Setting) -> tuple[Term, ...]:
     """n2 and n3 of each sensor, relative to full scale; or these and bends that settle (`sensor_curve`)."""
     return tuple(
         Term("sensor_nonlinearity", f"{part}_{PHASES[k]}{bend}", "1", kind, k + 3 * m, 1e-3)
-        for part, kind in (("even", EVEN), ("odd", ODD)) for m, bend in enumerate(BENDS) for k in range(setting.facts.phases)
+        for part, kind in (("even", EVEN), ("odd", ODD))
+        for m, bend in enumerate(BENDS)
+        for k in range(setting.facts.phases)
     )
 
 
@@ -188,9 +232,15 @@ def _none(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "quantization", "Coarse steps of the converter", sign=1, family="noise", sizes=_none,
+    "quantization",
+    "Coarse steps of the converter",
+    sign=1,
+    family="noise",
+    sizes=_none,
     signature="currents lie on a grid; flat noise of step / sqrt(12), independent of level",
-    confounders=(), source="B. Widrow, I. Kollar, Quantization Noise, 2008", split_by="look at the histogram",
+    confounders=(),
+    source="B. Widrow, I. Kollar, Quantization Noise, 2008",
+    split_by="look at the histogram",
 )
 def quantization(setting: Setting) -> tuple[Term, ...]:
     """Found in the audit (step [A]), not by a fit: it has no waveform of its own."""
@@ -218,16 +268,22 @@ NEAR_THE_END, AT_THE_END = 0.985, 0.04
 
 
 @effect(
-    "clipping", "Current channel at its limit", sign=1, family="odd", sizes=_end_sizes,
+    "clipping",
+    "Current channel at its limit",
+    sign=1,
+    family="odd",
+    sizes=_end_sizes,
     signature="samples pile up at one value, or bend towards it: what lies beyond is not reported",
-    confounders=("sensor_nonlinearity", "leakage_saturation"), source="saturated converter, amplifier or transformer core",
+    confounders=("sensor_nonlinearity", "leakage_saturation"),
+    source="saturated converter, amplifier or transformer core",
     split_by="reduce the level",
 )
 def clipping(setting: Setting) -> tuple[Term, ...]:
     """Shares of the slope that each channel loses towards its end. Samples that pile up there are masked by the audit."""
     return tuple(
         Term("clipping", f"end_{PHASES[p]}_{k}", "1", END, p * COUNT + k, 1e-3, 0.0, 1.0)
-        for p in range(setting.facts.phases) for k in range(COUNT)
+        for p in range(setting.facts.phases)
+        for k in range(COUNT)
     )
 
 
@@ -241,9 +297,14 @@ def _mains_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
 
 
 @effect(
-    "mains_pickup", "Mains hum in the current channels", sign=0, family="non-periodic", sizes=_mains_sizes,
+    "mains_pickup",
+    "Mains hum in the current channels",
+    sign=0,
+    family="non-periodic",
+    sizes=_mains_sizes,
     signature="a line at 50 or 60 Hz that does not depend on the excitation",
-    confounders=("dc_link_ripple",), source="a cos wt + b sin wt per channel, frequency refined on the data",
+    confounders=("dc_link_ripple",),
+    source="a cos wt + b sin wt per channel, frequency refined on the data",
     split_by="record one second with the inverter off",
 )
 def mains_pickup(setting: Setting) -> tuple[Term, ...]:
@@ -251,8 +312,19 @@ def mains_pickup(setting: Setting) -> tuple[Term, ...]:
     record = setting.record
     names = [n for n in record.channel_names if n.startswith("mains_")]
     return tuple(
-        Term("mains_pickup", f"{n}_{PHASES[k]}_{s.uid}", "A", TONE, 3 * record.channel(n) + k, 1e-3, segment=s.uid, channel=n)
-        for s in record.segments for n in names for k in range(record.facts.phases)
+        Term(
+            "mains_pickup",
+            f"{n}_{PHASES[k]}_{s.uid}",
+            "A",
+            TONE,
+            3 * record.channel(n) + k,
+            1e-3,
+            segment=s.uid,
+            channel=n,
+        )
+        for s in record.segments
+        for n in names
+        for k in range(record.facts.phases)
     )
 
 
@@ -268,10 +340,15 @@ RESTARTS, RUNS_ON = ("drift", "wander_cos", "wander_sin"), ("running",)
 
 
 @effect(
-    "clock_drift", "Current and voltage clocks that run apart", sign=0, family="drifting", sizes=_clock_sizes,
+    "clock_drift",
+    "Current and voltage clocks that run apart",
+    sign=0,
+    family="drifting",
+    sizes=_clock_sizes,
     either=(RESTARTS, RUNS_ON),
     signature="a delay that grows with time within the segment, or over the whole recording",
-    confounders=("stator_heating", "lost_samples"), source="i(t - eps t), eps in ppm; crystal tolerance",
+    confounders=("stator_heating", "lost_samples"),
+    source="i(t - eps t), eps in ppm; crystal tolerance",
     split_by="a longer segment",
 )
 def clock_drift(setting: Setting) -> tuple[Term, ...]:
@@ -284,9 +361,14 @@ def clock_drift(setting: Setting) -> tuple[Term, ...]:
 
 
 @effect(
-    "lost_samples", "Samples lost without a gap in the time stamps", sign=1, family="drifting", sizes=_none,
+    "lost_samples",
+    "Samples lost without a gap in the time stamps",
+    sign=1,
+    family="drifting",
+    sizes=_none,
     signature="the delay jumps by whole samples at one instant",
-    confounders=("clock_drift",), source="i(t + n T) after t_0; found by a scan over t_0",
+    confounders=("clock_drift",),
+    source="i(t + n T) after t_0; found by a scan over t_0",
     split_by="number the samples in the logger",
 )
 def lost_samples(setting: Setting) -> tuple[Term, ...]:
@@ -295,6 +377,15 @@ def lost_samples(setting: Setting) -> tuple[Term, ...]:
 
 
 ENTRIES: tuple[Effect, ...] = (
-    sampling_delay, sensor_lag, sensor_offset, sensor_drift, sensor_gain_mismatch, sensor_nonlinearity,
-    quantization, clipping, mains_pickup, clock_drift, lost_samples,
+    sampling_delay,
+    sensor_lag,
+    sensor_offset,
+    sensor_drift,
+    sensor_gain_mismatch,
+    sensor_nonlinearity,
+    quantization,
+    clipping,
+    mains_pickup,
+    clock_drift,
+    lost_samples,
 )

@@ -34,8 +34,10 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
         "kind": "extended_model",
         "format": FORMAT,
         "nominal": {
-            "stator_resistance_ohm": r_s, "rotor_resistance_ohm": r_r,
-            "leakage_inductance_h": l_sigma, "magnetizing_inductance_h": l_m,
+            "stator_resistance_ohm": r_s,
+            "rotor_resistance_ohm": r_r,
+            "leakage_inductance_h": l_sigma,
+            "magnetizing_inductance_h": l_m,
         },
         "nameplate": {k: v for k, v in found.record.facts.metadata.items() if not isinstance(v, bool)},
         "effects": {c.name: {key: value for key, (value, _, _) in c.sizes.items()} for c in causes},
@@ -48,8 +50,14 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
 
 def _term(term: Term, value: float) -> dict[str, Any]:
     return {
-        "effect": term.effect, "symbol": term.symbol, "unit": term.unit, "kind": term.kind, "index": term.index,
-        "segment": term.segment, "channel": term.channel, "value": value,
+        "effect": term.effect,
+        "symbol": term.symbol,
+        "unit": term.unit,
+        "kind": term.kind,
+        "index": term.index,
+        "segment": term.segment,
+        "channel": term.channel,
+        "value": value,
     }
 
 
@@ -68,15 +76,25 @@ def model_from(document: Mapping[str, Any]) -> tuple[Model, Layout | None]:
     if not isinstance(document, Mapping) or document.get("kind") != "extended_model":
         raise ValueError("not an extended model")
     if document.get("format") != FORMAT:
-        raise ValueError(f"an extended model of format {document.get('format')}, read is {FORMAT}: diagnose the recording again")
+        raise ValueError(
+            f"an extended model of format {document.get('format')}, read is {FORMAT}: diagnose the recording again"
+        )
     n = document["nominal"]
     nominal = (
-        float(n["stator_resistance_ohm"]), float(n["rotor_resistance_ohm"]),
-        float(n["leakage_inductance_h"]), float(n["magnetizing_inductance_h"]),
+        float(n["stator_resistance_ohm"]),
+        float(n["rotor_resistance_ohm"]),
+        float(n["leakage_inductance_h"]),
+        float(n["magnetizing_inductance_h"]),
     )
     terms = tuple(
         Term(
-            t["effect"], t["symbol"], t["unit"], int(t["kind"]), int(t["index"]), 1.0, segment=int(t["segment"]),
+            t["effect"],
+            t["symbol"],
+            t["unit"],
+            int(t["kind"]),
+            int(t["index"]),
+            1.0,
+            segment=int(t["segment"]),
             channel=str(t["channel"]),
         )
         for t in document["terms"]

@@ -35,7 +35,10 @@ def default_plan(axes_deg: Sequence[float] = (0.0, 60.0, 120.0)) -> tuple[Test, 
     """Every axis at full level, the first at a third with bias and without, the first repeated last."""
     first = axes_deg[0]
     return (
-        *(Test(a, 1.0, False) for a in axes_deg), Test(first, 0.35, False), Test(first, 0.35, True), Test(first, 1.0, False),
+        *(Test(a, 1.0, False) for a in axes_deg),
+        Test(first, 0.35, False),
+        Test(first, 0.35, True),
+        Test(first, 1.0, False),
     )
 
 
@@ -55,8 +58,13 @@ def command(model: Model, facts: Facts, plan: Sequence[Test], seconds: float, se
 
 
 def play(
-    model: Model, layout: Layout | None, facts: Facts, segments: Sequence[tuple[float, Array]],
-    lines_hz: Mapping[str, float], noise_a: float = 0.0, seed: int = 0,
+    model: Model,
+    layout: Layout | None,
+    facts: Facts,
+    segments: Sequence[tuple[float, Array]],
+    lines_hz: Mapping[str, float],
+    noise_a: float = 0.0,
+    seed: int = 0,
 ) -> dict[str, Array]:
     """Columns of the contract's standstill table. Heat and lagged power follow the model's own currents; of a speed or a line what
 
@@ -76,10 +84,14 @@ def play(
     noise = np.random.default_rng(seed + 1)
     parts = [
         {
-            "time_s": s.time_s, "segment": np.full(s.count, float(s.number)), "axis_deg": np.full(s.count, s.axis_deg),
+            "time_s": s.time_s,
+            "segment": np.full(s.count, float(s.number)),
+            "axis_deg": np.full(s.count, s.axis_deg),
             "voltage_axis_v": s.voltage_axis_v,
-            **{f"current_{p}_a": row + noise_a * noise.standard_normal(s.count)
-               for p, row in zip("uvw", s.currents_a, strict=True)},
+            **{
+                f"current_{p}_a": row + noise_a * noise.standard_normal(s.count)
+                for p, row in zip("uvw", s.currents_a, strict=True)
+            },
         }
         for s in record.segments
     ]
@@ -90,10 +102,21 @@ def _blank(facts: Facts, segments: Sequence[tuple[float, Array]]) -> Record:
     out, start = [], 0.0
     for number, (axis, voltage) in enumerate(segments):
         n = voltage.shape[0]
-        out.append(Segment(
-            number, 0, axis, np.asarray(start + np.arange(n) * facts.sample_period_s, dtype=np.float64), voltage, np.zeros((3, n)),
-            np.ones(n, dtype=bool), np.ones(n), True, number, age_s=start,
-        ))
+        out.append(
+            Segment(
+                number,
+                0,
+                axis,
+                np.asarray(start + np.arange(n) * facts.sample_period_s, dtype=np.float64),
+                voltage,
+                np.zeros((3, n)),
+                np.ones(n, dtype=bool),
+                np.ones(n),
+                True,
+                number,
+                age_s=start,
+            )
+        )
         start += n * facts.sample_period_s + PAUSE_S
     return Record(tuple(out), replace(facts, phases=3))
 

@@ -48,7 +48,12 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
         "machine": {**gamma_machine(model.at_rest(setting.layout)[0]), "saturation_at_rated_flux": 0.0},
         "power_stage": {"dead_time_s": 0.0, "threshold_v": 0.0, "slope_ohm": 0.0, "link_ripple": 0.0},
         "sensors": {
-            "noise_a": 0.0, "bits": 0, "offset_a": [0.0] * 3, "gain": [1.0] * 3, "delay_s": 0.0, "lag_s": 0.0,
+            "noise_a": 0.0,
+            "bits": 0,
+            "offset_a": [0.0] * 3,
+            "gain": [1.0] * 3,
+            "delay_s": 0.0,
+            "lag_s": 0.0,
             "full_scale_a": FULL_SCALE * setting.facts.rated_current_peak_a,
         },
         "heating": {"stator_per_min": 0.0, "rotor_per_min": 0.0},
@@ -74,7 +79,8 @@ def _size(key: str, factor: float = 1.0) -> Translate:
 
 def _legs(half_over_knee: float) -> Translate:
     return lambda sizes, values, setting, model: {
-        "size": sizes["voltage_v"], "knee_a": max(sizes["half_current_a"], 1e-6) / half_over_knee,
+        "size": sizes["voltage_v"],
+        "knee_a": max(sizes["half_current_a"], 1e-6) / half_over_knee,
     }
 
 
@@ -113,7 +119,10 @@ def _line(prefix: str) -> Translate:
     def translate(sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         name, frequency = next((k, f) for k, f in setting.lines_hz.items() if k.startswith(prefix))
         base = name.rpartition("_")[2]
-        return {"size": next(v for k, v in sizes.items() if k.startswith(f"amplitude_{base}")), "frequency_hz": frequency}
+        return {
+            "size": next(v for k, v in sizes.items() if k.startswith(f"amplitude_{base}")),
+            "frequency_hz": frequency,
+        }
 
     return translate
 

@@ -23,7 +23,9 @@ def check_before_search(nominal: Fit, record: Record, noise: Noise) -> None:
         explained = max(1.0 - (nominal.chi2 - count) / flowing, 0.0)
         raise refused(
             f"the command explains only {explained:.0%} of the current's power: voltage and current do not belong together, or "
-            "something else drives the motor", explained, f"at least {1.0 - MOST_UNANSWERED:.0%}",
+            "something else drives the motor",
+            explained,
+            f"at least {1.0 - MOST_UNANSWERED:.0%}",
             "check that both columns are of one test, on one time axis, and that the shaft stands still",
         )
     _compare_files(nominal, record, slice(2, 3), 0.4)
@@ -49,5 +51,8 @@ def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> No
     if spread[worst] > most:
         raise refused(
             f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
-            f"(fitted together: {fitted.model.nominal[worst]:.4g})", float(spread[worst]), f"at most {most:.0%}", ONE_BY_ONE,
+            f"(fitted together: {fitted.model.nominal[worst]:.4g})",
+            float(spread[worst]),
+            f"at most {most:.0%}",
+            ONE_BY_ONE,
         )

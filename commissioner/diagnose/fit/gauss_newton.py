@@ -110,20 +110,31 @@ def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
     """
     box = np.log(np.maximum(np.array(layout.nominal_box), 1e-12))
     four = np.log(np.array(model.nominal))
-    low = np.array([*np.maximum(four - np.log(3.0), np.minimum(box[:, 0], four)), *(t.lower / t.step for t in model.terms)])
-    high = np.array([*np.minimum(four + np.log(3.0), np.maximum(box[:, 1], four)), *(t.upper / t.step for t in model.terms)])
+    low = np.array(
+        [*np.maximum(four - np.log(3.0), np.minimum(box[:, 0], four)), *(t.lower / t.step for t in model.terms)]
+    )
+    high = np.array(
+        [*np.minimum(four + np.log(3.0), np.maximum(box[:, 1], four)), *(t.upper / t.step for t in model.terms)]
+    )
     sides = [k for k, t in enumerate(model.terms) if t.kind == kinds.NU]
     for k in sides if len(sides) > 1 else ():
         term, here = model.terms[k], 4 + k
         low[here], high[here] = (
-            model.theta[here] + (end - model.total(kinds.NU)) / len(sides) / term.step for end in (term.lower, term.upper)
+            model.theta[here] + (end - model.total(kinds.NU)) / len(sides) / term.step
+            for end in (term.lower, term.upper)
         )
     return low, high
 
 
 def fit(
-    model: Model, record: Record, layout: Layout, noise: Noise, rounds: int = 12, tolerance: float = 0.3,
-    report: Callable[[str], None] | None = None, wanted_chi2: float = np.inf,
+    model: Model,
+    record: Record,
+    layout: Layout,
+    noise: Noise,
+    rounds: int = 12,
+    tolerance: float = 0.3,
+    report: Callable[[str], None] | None = None,
+    wanted_chi2: float = np.inf,
 ) -> Fit:
     """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance (or a
 

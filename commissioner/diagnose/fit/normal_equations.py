@@ -134,7 +134,9 @@ class Trial:
             slope[rows] = product[:-1, -1]
             return gram, slope, float(product[-1, -1]), segment.good_count * self._record.facts.phases
 
-        grams, slopes, chi2, counts = (list(column) for column in zip(*each_segment(of_segment, self._record), strict=True))
+        grams, slopes, chi2, counts = (
+            list(column) for column in zip(*each_segment(of_segment, self._record), strict=True)
+        )
         if self._prior.any():
             grams.append(self._prior)
             slopes.append(-self._prior @ self._theta)

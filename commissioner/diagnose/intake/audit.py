@@ -75,9 +75,7 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
     kept = [s for s in segments if s.count >= SHORTEST_STRETCH]
     if len(kept) < len(segments):
         sentences.append(f"{len(segments) - len(kept)} stretches shorter than {SHORTEST_STRETCH} samples are left out.")
-    kept = [
-        replace(s, uid=k, age_s=float(s.time_s[0] - recordings[s.file].time_s[0])) for k, s in enumerate(kept)
-    ]
+    kept = [replace(s, uid=k, age_s=float(s.time_s[0] - recordings[s.file].time_s[0])) for k, s in enumerate(kept)]
     record = Record(tuple(kept), facts)
     clipped = _clip_report(recordings, limits, facts)
     tones = excited_lines(record)
@@ -90,8 +88,13 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
         )
         record = record.beginning(MOST_SAMPLES)
     return record, Audit(
-        tuple(sentences), clipped, steps, tuple(holes), tuple(tones),
-        tuple(sorted({s.axis_deg for s in kept})), refusal,
+        tuple(sentences),
+        clipped,
+        steps,
+        tuple(holes),
+        tuple(tones),
+        tuple(sorted({s.axis_deg for s in kept})),
+        refusal,
     )
 
 
@@ -109,8 +112,15 @@ def _facts(recordings: Sequence[StandstillRecording]) -> Facts:
     if first.dc_link_v is not None:
         link = float(np.median(first.dc_link_v))
     return Facts(
-        first.sample_period_s, float(rated_peak), float(power), float(flux), peak,
-        _number(metadata, "switching_frequency_hz"), link or _number(metadata, "dc_link_v"), phases, metadata,
+        first.sample_period_s,
+        float(rated_peak),
+        float(power),
+        float(flux),
+        peak,
+        _number(metadata, "switching_frequency_hz"),
+        link or _number(metadata, "dc_link_v"),
+        phases,
+        metadata,
     )
 
 
@@ -227,7 +237,8 @@ def _clip_report(
     tops = [
         float(np.abs(row).max())
         for recording, rows in zip(recordings, limits, strict=True)
-        for row, pair in zip(_currents(recording, facts.phases), rows, strict=True) if np.isfinite(pair).any()
+        for row, pair in zip(_currents(recording, facts.phases), rows, strict=True)
+        if np.isfinite(pair).any()
     ]
     if not tops:
         return {}
@@ -238,8 +249,14 @@ def _clip_report(
 
 
 def _pieces(
-    recording: StandstillRecording, currents: NDArray[np.float64], good: NDArray[np.bool_], link: Signal,
-    swing: Signal | None, part: slice, file: int, facts: Facts,
+    recording: StandstillRecording,
+    currents: NDArray[np.float64],
+    good: NDArray[np.bool_],
+    link: Signal,
+    swing: Signal | None,
+    part: slice,
+    file: int,
+    facts: Facts,
 ) -> tuple[list[Segment], list[tuple[int, float, int]]]:
     time, period = recording.time_s[part], recording.sample_period_s
     number = int(recording.segment[part][0])
@@ -253,14 +270,24 @@ def _pieces(
     out = []
     for begin, end in itertools.pairwise(bounds):
         inner = slice(part.start + int(begin), part.start + int(end))
-        out.append(_on_grid(
-            Segment(
-                number, file, float(axis[begin]), recording.time_s[inner], recording.voltage_axis_v[inner],
-                currents[:, inner], good[inner], link[inner], bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
-                link_swing=None if swing is None else swing[inner],
-            ),
-            np.r_[0, np.cumsum(steps[begin : end - 1])], period,
-        ))
+        out.append(
+            _on_grid(
+                Segment(
+                    number,
+                    file,
+                    float(axis[begin]),
+                    recording.time_s[inner],
+                    recording.voltage_axis_v[inner],
+                    currents[:, inner],
+                    good[inner],
+                    link[inner],
+                    bool(begin == 0) and _is_at_rest(currents[:, inner], facts),
+                    link_swing=None if swing is None else swing[inner],
+                ),
+                np.r_[0, np.cumsum(steps[begin : end - 1])],
+                period,
+            )
+        )
     return out, holes
 
 
@@ -288,7 +315,11 @@ def _on_grid(segment: Segment, index: NDArray[np.int64], period: float) -> Segme
     command = CubicSpline(index, segment.voltage_axis_v)(every)
     command[index] = segment.voltage_axis_v
     return replace(
-        segment, time_s=time_s, voltage_axis_v=command, currents_a=currents, is_good=good,
+        segment,
+        time_s=time_s,
+        voltage_axis_v=command,
+        currents_a=currents,
+        is_good=good,
         link_ratio=np.interp(every, index, segment.link_ratio),
         link_swing=None if segment.link_swing is None else np.interp(every, index, segment.link_swing),
     )
@@ -324,22 +355,33 @@ def excited_lines(record: Record) -> list[float]:
 
 
 def _judge(
-    record: Record, tones: Sequence[float], holes: Sequence[tuple[int, float, int]], clipped: dict[str, float],
+    record: Record,
+    tones: Sequence[float],
+    holes: Sequence[tuple[int, float, int]],
+    clipped: dict[str, float],
     steps: Sequence[float],
 ) -> tuple[DataRefused | None, list[str]]:
     out: list[str] = []
     if not record.segments:
         return refused(
-            "no stretch of the recording is long enough to fit anything", 0, f"{SHORTEST_STRETCH} samples without a hole",
+            "no stretch of the recording is long enough to fit anything",
+            0,
+            f"{SHORTEST_STRETCH} samples without a hole",
             "record again without losses, for longer",
         ), out
     if float(max(np.std(s.voltage_axis_v) for s in record.segments)) == 0.0:
         return refused(
-            "the command is constant: nothing is excited", 0.0, "a command that moves", "record a test with tones (`commissioner run`)",
+            "the command is constant: nothing is excited",
+            0.0,
+            "a command that moves",
+            "record a test with tones (`commissioner run`)",
         ), out
     if record.facts.current_peak_a == 0.0:
         return refused(
-            "every current sample is zero: no sensor or no motor is connected", 0.0, "a current that flows", "check sensors and leads",
+            "every current sample is zero: no sensor or no motor is connected",
+            0.0,
+            "a current that flows",
+            "check sensors and leads",
         ), out
     lost = sum(h[2] for h in holes)
     if lost:
@@ -348,7 +390,12 @@ def _judge(
         out.append(f"{clipped['samples']:.0f} samples sit at a limit of {clipped['limit_a']:.4g} A; they are masked.")
         share = clipped["samples"] / record.samples
         if share > MOST_CLIPPED:
-            return refused(f"{share:.0%} of the samples are clipped", share, f"at most {MOST_CLIPPED:.0%}", "record again at a lower level"), out
+            return refused(
+                f"{share:.0%} of the samples are clipped",
+                share,
+                f"at most {MOST_CLIPPED:.0%}",
+                "record again at a lower level",
+            ), out
     if (refusal := contradiction(record)) is not None:
         return refusal, out
     if max(steps, default=0.0) > 0:

@@ -73,7 +73,9 @@ def _moments_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> 
         blocks = residual[:, : count * BLOCK].reshape(residual.shape[0], count, BLOCK)
         blocks = blocks - (blocks @ line.T) @ line
         power = np.median(blocks.transpose(1, 0, 2).reshape(count, -1) ** 2, axis=1) / MEDIAN_OF_SQUARE
-        moments = np.log(np.maximum(power[segment.is_good[: count * BLOCK].reshape(count, BLOCK).all(axis=1)], RESTING * floor))
+        moments = np.log(
+            np.maximum(power[segment.is_good[: count * BLOCK].reshape(count, BLOCK).all(axis=1)], RESTING * floor)
+        )
         awake = moments[moments > np.log(RESTING * floor)]
         if awake.size:
             usual = float(np.median(awake))

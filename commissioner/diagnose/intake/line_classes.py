@@ -54,7 +54,9 @@ def _segment_levels(segment: Segment, tones: list[float], period: float) -> dict
     spectrum = np.abs(np.fft.rfft((along - along.mean()) * window)) ** 2
     cross = np.abs(np.fft.rfft((across - across.mean()) * window)) ** 2
     bins = class_bins(tones, n, period)
-    return {k: _mean(spectrum, bins[k]) for k in ("excited", "odd", "even")} | {"cross_axis": _mean(cross, bins["excited"])}
+    return {k: _mean(spectrum, bins[k]) for k in ("excited", "odd", "even")} | {
+        "cross_axis": _mean(cross, bins["excited"])
+    }
 
 
 def class_bins(tones: Sequence[float], samples: int, period_s: float) -> dict[str, NDArray[np.int64]]:

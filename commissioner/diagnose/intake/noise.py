@@ -286,7 +286,11 @@ def _noise(
         spectra.append((np.asarray(np.fft.rfftfreq(n, period)[2:], dtype=np.float64), spectrum[:, 2:]))
     hum = [hz for hz in MAINS_HZ if _stands_out(spectra, hz)]
     for here, spectrum in spectra:
-        kept = ~np.any([np.abs(here - hz) < LOBE_BINS * here[0] / 2.0 for hz in hum], axis=0) if hum else np.ones(here.size, dtype=bool)
+        kept = (
+            ~np.any([np.abs(here - hz) < LOBE_BINS * here[0] / 2.0 for hz in hum], axis=0)
+            if hum
+            else np.ones(here.size, dtype=bool)
+        )
         frequency.append(here[kept])
         power.append(spectrum[:, kept])
     f, p = np.concatenate(frequency), np.concatenate(power, axis=1)
@@ -304,7 +308,9 @@ def _noise(
     white = np.array([_level(p[c], quantile) if p[c].max() > least else 0.0 for c in range(phase_count)])
     if white.max() < least:
         flat = np.ones((phase_count, 2))
-        return Noise(np.full(phase_count, np.sqrt(least)), np.array([1.0, top]), flat, source, is_known, 0.0, True, listed)
+        return Noise(
+            np.full(phase_count, np.sqrt(least)), np.array([1.0, top]), flat, source, is_known, 0.0, True, listed
+        )
     white = np.maximum(white, least)
     relative = level / white[:, None]
     at = np.array(centres)
@@ -331,8 +337,14 @@ def _noise(
         relative = np.tile(np.exp(np.mean(np.log(relative), axis=0)), (phase_count, 1))
     total = f.shape[0]
     return Noise(
-        np.sqrt(white), at, relative, source, is_known, float(1.5 * np.sqrt(1.0 / max(total, 1))),
-        is_white, listed,
+        np.sqrt(white),
+        at,
+        relative,
+        source,
+        is_known,
+        float(1.5 * np.sqrt(1.0 / max(total, 1))),
+        is_white,
+        listed,
     )
 
 

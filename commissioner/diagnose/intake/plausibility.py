@@ -35,12 +35,17 @@ def _unlikely_units(record: Record) -> DataRefused | None:
     facts = record.facts
     volts, amps = (
         float(np.sqrt(np.mean(np.concatenate(rows) ** 2)))
-        for rows in ([s.voltage_axis_v for s in record.segments], [s.axis_current_a[s.is_good] for s in record.segments])
+        for rows in (
+            [s.voltage_axis_v for s in record.segments],
+            [s.axis_current_a[s.is_good] for s in record.segments],
+        )
     )
     over = facts.current_peak_a / facts.rated_current_peak_a
     if over > MOST_CURRENT:
         return refused(
-            f"the currents reach {facts.current_peak_a:.4g} A, {over:.3g} times the rated peak", over, f"at most {MOST_CURRENT:g} times",
+            f"the currents reach {facts.current_peak_a:.4g} A, {over:.3g} times the rated peak",
+            over,
+            f"at most {MOST_CURRENT:g} times",
             "check the unit (amperes, not milliamperes) and the rated current of the nameplate",
         )
     voltage = facts.metadata.get("rated_voltage_v")
@@ -49,8 +54,10 @@ def _unlikely_units(record: Record) -> DataRefused | None:
         share = volts / amps / rated
         if not LEAST_IMPEDANCE < share < MOST_IMPEDANCE:
             return refused(
-                f"{volts:.3g} V drive {amps:.3g} A: {share:.2g} of the motor's rated impedance of {rated:.3g} ohm", share,
-                f"{LEAST_IMPEDANCE:g} to {MOST_IMPEDANCE:g} of it", "check the units (volts, amperes) and the nameplate",
+                f"{volts:.3g} V drive {amps:.3g} A: {share:.2g} of the motor's rated impedance of {rated:.3g} ohm",
+                share,
+                f"{LEAST_IMPEDANCE:g} to {MOST_IMPEDANCE:g} of it",
+                "check the units (volts, amperes) and the nameplate",
             )
     return None
 
@@ -62,7 +69,9 @@ def _silent_phase(record: Record) -> DataRefused | None:
         if share > LEAST_PROJECTION:
             return refused(
                 f"the current of phase {PHASES[phase]} stands still while the others flow: its sensor or lead is not connected",
-                float(swing[phase]), f"about {share:.0%} of the others' {swing.max():.3g} A", "connect it and record again",
+                float(swing[phase]),
+                f"about {share:.0%} of the others' {swing.max():.3g} A",
+                "connect it and record again",
             )
     return None
 
@@ -91,8 +100,10 @@ def _wrong_sign(record: Record) -> DataRefused | None:
         scale += float(np.linalg.norm(volts) * np.linalg.norm(below))
     if taken < LEAST_LAG_FACTOR * scale:
         return refused(
-            "the currents flow against the voltage, as if a motor at rest gave power", taken / scale,
-            f"at least {LEAST_LAG_FACTOR}", "turn the sign of one of them",
+            "the currents flow against the voltage, as if a motor at rest gave power",
+            taken / scale,
+            f"at least {LEAST_LAG_FACTOR}",
+            "turn the sign of one of them",
         )
     return None
 
@@ -110,7 +121,9 @@ def _wrong_direction(record: Record) -> DataRefused | None:
         share = float(np.sqrt(across / max(along, 1e-300)))
         return refused(
             f"the current does not follow the excited axis (across it flows {share:.0%} of what flows along it): a shaft that "
-            "turns, phases in another order, or a wrong axis column", share, f"at most {MOST_ACROSS:.0%}",
+            "turns, phases in another order, or a wrong axis column",
+            share,
+            f"at most {MOST_ACROSS:.0%}",
             "check phases and axis; `commissioner monitor` reads a running motor",
         )
     return None

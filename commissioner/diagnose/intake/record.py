@@ -106,8 +106,12 @@ class Segment:
         """Its samples from `begin` on, before `end`."""
         here = slice(begin, end)
         return replace(
-            self, time_s=self.time_s[here], voltage_axis_v=self.voltage_axis_v[here], currents_a=self.currents_a[:, here],
-            is_good=self.is_good[here], link_ratio=self.link_ratio[here],
+            self,
+            time_s=self.time_s[here],
+            voltage_axis_v=self.voltage_axis_v[here],
+            currents_a=self.currents_a[:, here],
+            is_good=self.is_good[here],
+            link_ratio=self.link_ratio[here],
             link_swing=None if self.link_swing is None else self.link_swing[here],
         )
 

@@ -11,7 +11,15 @@ from commissioner.diagnose.kernels.memory import loop_width
 from commissioner.diagnose.kernels.spline import curve
 from commissioner.diagnose.kernels.trajectory import SQRT3
 
-INTO_FLUX = (kinds.R_S, kinds.PHASE_RESISTANCE, kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE, kinds.VOLTAGE_MOD, kinds.OMEGA)
+INTO_FLUX = (
+    kinds.R_S,
+    kinds.PHASE_RESISTANCE,
+    kinds.LEGS,
+    kinds.LEGS_LINK,
+    kinds.LEG_SHARE,
+    kinds.VOLTAGE_MOD,
+    kinds.OMEGA,
+)
 
 
 @kernel
@@ -22,8 +30,33 @@ def tilted(cosine, sine, a, b):
 
 @kernel
 def pushes(
-    kind, n, start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels, base, branch_time,
-    stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost, magnetizing, current, terminal, flux, rotor,
+    kind,
+    n,
+    start,
+    stop,
+    states,
+    stop_states,
+    voltage_a,
+    voltage_b,
+    link_factor,
+    phase_factor,
+    channels,
+    base,
+    branch_time,
+    stop_radius,
+    legs_vectors,
+    iron_vectors,
+    leak_vectors,
+    at,
+    before,
+    now,
+    leg_mean,
+    lost,
+    magnetizing,
+    current,
+    terminal,
+    flux,
+    rotor,
 ):
     """What one parameter pushes at each sample: into the `magnetizing` and the stator `current`, straight into the `terminal`
 
@@ -60,7 +93,11 @@ def pushes(
             rotor[0, m], rotor[1, m] = waa * qa + wab * qb, wab * qa + wbb * qb
         elif kind == kinds.NU:
             sa, sb = at[row.LEAK_A, m], at[row.LEAK_B, m]
-            jaa, jab, jbb = at[row.MAG_AA, m] + at[row.WIDE_AA, m], at[row.MAG_AB, m] + at[row.WIDE_AB, m], at[row.MAG_BB, m] + at[row.WIDE_BB, m]
+            jaa, jab, jbb = (
+                at[row.MAG_AA, m] + at[row.WIDE_AA, m],
+                at[row.MAG_AB, m] + at[row.WIDE_AB, m],
+                at[row.MAG_BB, m] + at[row.WIDE_BB, m],
+            )
             magnetizing[0, m], magnetizing[1, m] = jaa * sa + jab * sb, jab * sa + jbb * sb
             current[0, m], current[1, m] = at[row.MAG_A, m], at[row.MAG_B, m]
         elif kind in (kinds.LEGS, kinds.LEGS_LINK):

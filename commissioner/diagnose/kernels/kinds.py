@@ -9,7 +9,9 @@ VOLTAGE_MOD, OMEGA, PHASE_RESISTANCE, ROTOR_MOD = 11, 12, 13, 14
 ROTOR_ANISOTROPY, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY, INITIAL_FLUX = 15, 16, 17, 18
 LEGS_LINK = 19  # as LEGS, scaled with the link voltage and switching frequency (dead time, not device threshold)
 LEAK_SPLIT = 21  # share of the saturating leakage on the rotor side
-LEG_SHARE = 23  # of a leg, what its loss is above the mean of the three, over that mean (1: V, 2: W; U has what is missing)
+LEG_SHARE = (
+    23  # of a leg, what its loss is above the mean of the three, over that mean (1: V, 2: W; U has what is missing)
+)
 ANISOTROPY_SPLIT = 22  # share of the leakage on the rotor side where inductances differ between directions
 MEMORY = 24  # 1: what the iron remembers outlives the pause between two segments
 CARRY = 20  # share of the flux at the end of the segment before that is left at the start: along it (0), across (1)

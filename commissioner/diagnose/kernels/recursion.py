@@ -11,7 +11,9 @@ def forced(last, jump, has_flux, has_more, push, at, terminal, flux, rotor, both
     """What the pushes before and after each period do to the states at its end, (4, B+1); `both` (4, B+1) is room to work in."""
     for c in range(2):
         for m in range(1, last):
-            both[c, m] = terminal[c, m - 1] + terminal[c, m] + jump * (at[row.VOLT_A + c, m] - at[row.VOLT_A + c, m - 1])
+            both[c, m] = (
+                terminal[c, m - 1] + terminal[c, m] + jump * (at[row.VOLT_A + c, m] - at[row.VOLT_A + c, m - 1])
+            )
             both[2 + c, m] = rotor[c, m - 1] + rotor[c, m]
     for r in range(4):
         force[r] = 0.0
@@ -45,8 +47,30 @@ def marched(first, last, x, step, amp, force, terminal, out):
 
 @kernel
 def marched_with_memory(
-    first, last, own, nu, shrink, beta, branch, x, z, q, flux, rate, fed, step, push, amp, cage, cage_push, at, memory,
-    force, terminal, rotor, out,
+    first,
+    last,
+    own,
+    nu,
+    shrink,
+    beta,
+    branch,
+    x,
+    z,
+    q,
+    flux,
+    rate,
+    fed,
+    step,
+    push,
+    amp,
+    cage,
+    cage_push,
+    at,
+    memory,
+    force,
+    terminal,
+    rotor,
+    out,
 ):
     """As `marched`, a few parameters side by side (a processor overlaps them), where memory operators (derivatives `z`
 

@@ -69,7 +69,9 @@ def initial_state(model: Model, segment: Segment, machine: tuple[Any, ...]) -> t
     return state, memory
 
 
-def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], layout: Layout, asked: Sequence[Term]) -> Array:
+def slopes_of_start(
+    model: Model, segment: Segment, machine: tuple[Any, ...], layout: Layout, asked: Sequence[Term]
+) -> Array:
     """(4 + asked, 4) derivatives of the initial state by the kernels' four (R_s, R_R, 1/L_sigma, 1/L_M) and by `asked`."""
     coupled, splits = machine[0][14], machine[0][15:17]
     bends = any(t.kind == kinds.IRON_CURVE for t in asked)
@@ -77,7 +79,11 @@ def slopes_of_start(model: Model, segment: Segment, machine: tuple[Any, ...], la
     per_tilt = left.rates_spent * left.even
     per_memory = _per_memory_current(machine)
     of_all = per_ampere(layout.stop_radius_wb)[:, None] * _memory(model, segment, layout.stop_radius_wb)
-    tilts = {kinds.ROTOR_ANISOTROPY: 1.0, kinds.LEAKAGE_ANISOTROPY: coupled, kinds.MAGNETIZING_ANISOTROPY: 1.0 - coupled}
+    tilts = {
+        kinds.ROTOR_ANISOTROPY: 1.0,
+        kinds.LEAKAGE_ANISOTROPY: coupled,
+        kinds.MAGNETIZING_ANISOTROPY: 1.0 - coupled,
+    }
     out = np.zeros((4 + len(asked), 4))
     out[kinds.GAMMA_M] = np.tile(left.derivatives[0] * left.flux, 2)
     out[kinds.GAMMA_M] -= model.nominal[3] * np.tile(_magnetized(machine, _memory(model, segment, machine[10]))[2:], 2)

@@ -41,7 +41,11 @@ class Prediction:
 
 
 def predict(
-    model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term] | None = None,
+    model: Model,
+    record: Record,
+    position: int,
+    layout: Layout,
+    wanted: Sequence[Term] | None = None,
     path: Path | None = None,
 ) -> Prediction:
     """Segment `position` as the model sees it. `wanted` None: no jacobian; else derivatives for the four and `wanted`.
@@ -57,11 +61,21 @@ def predict(
     jacobian = np.zeros((0, record.facts.phases, segment.count))
     if wanted is not None:
         jacobian = np.zeros((4 + len(listed), record.facts.phases, segment.count))
-        scale = np.array([
-            model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3],
-            *(t.step for t in asked),
-        ])
-        _to_phases(_tangent(path, model, segment, channels, layout, asked), scale, jacobian, [0, 1, 2, 3, *(4 + k for k in inside)])
+        scale = np.array(
+            [
+                model.nominal[0],
+                model.nominal[1],
+                -1.0 / model.nominal[2],
+                -1.0 / model.nominal[3],
+                *(t.step for t in asked),
+            ]
+        )
+        _to_phases(
+            _tangent(path, model, segment, channels, layout, asked),
+            scale,
+            jacobian,
+            [0, 1, 2, 3, *(4 + k for k in inside)],
+        )
     held_v = segment.voltage_ab_v * path.drive[2]
     terminal = (path.current, path.after, path.before)
     measured = sense(model, record, segment, channels, layout, terminal, held_v, jacobian, listed)
@@ -69,7 +83,9 @@ def predict(
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
     leakage = (path.states[:-1, 0:2] - path.machine[0][12] * path.states[:-1, 2:4]).T
     last = path.states[-1, 2:4]
-    return Prediction(measured, jacobian, path.rotor_current, iron, leakage, path.before, (float(last[0]), float(last[1])))
+    return Prediction(
+        measured, jacobian, path.rotor_current, iron, leakage, path.before, (float(last[0]), float(last[1]))
+    )
 
 
 def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -> None:
@@ -131,7 +147,15 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
         )
         return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
     states, stops, current, after, before, rotor = propagate(
-        va, vb, *drive, period, _substeps(model, layout, segment, asked), layout.crossing_substeps, *machine, start, memory
+        va,
+        vb,
+        *drive,
+        period,
+        _substeps(model, layout, segment, asked),
+        layout.crossing_substeps,
+        *machine,
+        start,
+        memory,
     )
     return Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
 
@@ -156,14 +180,24 @@ def _tangent(
     wanted = {t.kind for t in asked}
     place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}
     at_work = np.array([*kinds.NOMINAL, *(t.kind for t in asked)], dtype=np.int64)
-    indices = np.array([0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64)
+    indices = np.array(
+        [0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64
+    )
     out = np.empty((2, at_work.shape[0], segment.count))
     sensitivities(
-        path.states, path.stops, *path.drive, channels, segment.period_s, *path.machine, at_work, indices,
+        path.states,
+        path.stops,
+        *path.drive,
+        channels,
+        segment.period_s,
+        *path.machine,
+        at_work,
+        indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE}), layout.legs_vectors),
         cells_of(_if(kinds.IRON_CURVE in wanted, layout.iron_vectors)),
         cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)),
-        slopes_of_start(model, segment, path.machine, layout, asked), out,
+        slopes_of_start(model, segment, path.machine, layout, asked),
+        out,
     )
     return out
 
@@ -194,8 +228,9 @@ def _at_work(kind: int, model: Model, asked: Sequence[Term]) -> list[int]:
 
 
 def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, ...]:
-    aniso = [model.sum_kind(k, 2) for k in (
-        kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)]
+    aniso = [
+        model.sum_kind(k, 2) for k in (kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)
+    ]
     r_s, r_r, l_sigma, l_m = model.nominal
     nu = float(np.clip(0.5 + model.total(kinds.NU), 0.0, 1.0))
     kappa = 1.0 + (0.5 + model.total(kinds.LEAK_SPLIT)) * layout.leak_ratio
@@ -204,11 +239,25 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, 
     rotor, leakage, magnetizing = aniso
     coupled = per_share * (0.5 + model.total(kinds.ANISOTROPY_SPLIT))
     shares = model.sum_kind(kinds.LEG_SHARE, 3)[1:]
-    base = np.array([
-        r_s, r_r, 1.0 / l_sigma, 1.0 / l_m, nu, model.total(kinds.IRON_LOSS),
-        *(rotor + coupled * (leakage - magnetizing)), *leakage, *magnetizing, kappa, layout.leak_ratio, coupled,
-        *(per_share * (leakage - magnetizing)), 1.0 - shares.sum(), *(1.0 + shares),
-    ])
+    base = np.array(
+        [
+            r_s,
+            r_r,
+            1.0 / l_sigma,
+            1.0 / l_m,
+            nu,
+            model.total(kinds.IRON_LOSS),
+            *(rotor + coupled * (leakage - magnetizing)),
+            *leakage,
+            *magnetizing,
+            kappa,
+            layout.leak_ratio,
+            coupled,
+            *(per_share * (leakage - magnetizing)),
+            1.0 - shares.sum(),
+            *(1.0 + shares),
+        ]
+    )
     stops, branches = _at_work(kinds.STOP, model, asked), _at_work(kinds.BRANCH, model, asked)
     wanted = {t.kind for t in asked}
 
@@ -218,11 +267,18 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, 
 
     return (
         base,
-        shape(kinds.LEGS, layout.legs_vectors), shape(kinds.LEGS_LINK, layout.legs_vectors),
-        shape(kinds.IRON_CURVE, layout.iron_vectors), shape(kinds.LEAKAGE_CURVE, layout.leak_vectors),
-        layout.legs_top, layout.legs_knee_a, layout.iron_top_wb, layout.leak_top_wb,
-        model.sum_kind(kinds.STOP, layout.stop_radius_wb.shape[0])[stops], layout.stop_radius_wb[stops],
-        model.sum_kind(kinds.BRANCH, layout.branch_time_s.size)[branches], layout.branch_time_s[branches],
+        shape(kinds.LEGS, layout.legs_vectors),
+        shape(kinds.LEGS_LINK, layout.legs_vectors),
+        shape(kinds.IRON_CURVE, layout.iron_vectors),
+        shape(kinds.LEAKAGE_CURVE, layout.leak_vectors),
+        layout.legs_top,
+        layout.legs_knee_a,
+        layout.iron_top_wb,
+        layout.leak_top_wb,
+        model.sum_kind(kinds.STOP, layout.stop_radius_wb.shape[0])[stops],
+        layout.stop_radius_wb[stops],
+        model.sum_kind(kinds.BRANCH, layout.branch_time_s.size)[branches],
+        layout.branch_time_s[branches],
     )
 
 

@@ -81,5 +81,8 @@ def _behind(legs_v, link_v, carriers, lag, shape, out):
             added = lag * (rise[0] - fall[0]) - (rise[1] - fall[1]) - duty * (lag * (whole[0] - 1.0) - whole[1])
             added_slope = lag * (rise[2] - fall[2]) - (rise[3] - fall[3]) - duty * (lag * whole[2] - whole[3] + 1.0)
             for _ in range(carriers):
-                value, slope = whole[0] * value + whole[1] * slope + added, whole[2] * value + whole[3] * slope + added_slope
+                value, slope = (
+                    whole[0] * value + whole[1] * slope + added,
+                    whole[2] * value + whole[3] * slope + added_slope,
+                )
             out[leg, k] = link_v * value

@@ -21,8 +21,15 @@ CURVES = {EVEN: sensor_curve.even, ODD: sensor_curve.odd}
 
 
 def sense(
-    model: Model, record: Record, segment: Segment, channels: Array, layout: Layout,
-    trajectory: tuple[Array, Array, Array], held_v: Array, jacobian: Array, listed: Sequence[Term],
+    model: Model,
+    record: Record,
+    segment: Segment,
+    channels: Array,
+    layout: Layout,
+    trajectory: tuple[Array, Array, Array],
+    held_v: Array,
+    jacobian: Array,
+    listed: Sequence[Term],
 ) -> Array:
     """From terminal currents to what the sensors report: cable, delay, lag, nonlinearity, gain, offset, pickup."""
     phases = record.facts.phases
@@ -43,7 +50,9 @@ def sense(
     if reader.lag or reader.late.any():
         for row in rows:
             is_conductance = row > 3 and listed[row - 4].kind == kinds.IRON_LOSS
-            jacobian[row] = reader.of_row(jacobian[row], grows * listed[row - 4].step * held if is_conductance else None)
+            jacobian[row] = reader.of_row(
+                jacobian[row], grows * listed[row - 4].step * held if is_conductance else None
+            )
     if reader.pulses is not None:
         ripple = reader.ripple_a[:phases]
         current = current + ripple
@@ -52,7 +61,9 @@ def sense(
     scale = layout.nonlinearity_scale_a
     gain = model.sum_kind(GAIN, 3)[:phases, None]
     sensed = current + model.sum_kind(OFFSET, 3)[:phases, None]
-    curves = {kind: of(current / scale) for kind, of in CURVES.items() if any(t.kind == kind for t in (*model.terms, *listed))}
+    curves = {
+        kind: of(current / scale) for kind, of in CURVES.items() if any(t.kind == kind for t in (*model.terms, *listed))
+    }
     shares = {kind: model.sum_kind(kind, 3 * sensor_curve.COUNT).reshape(-1, 3)[:, :phases, None] for kind in curves}
     if gain.any() or any(share.any() for share in shares.values()):
         error, slope_of_sensor = gain, 1.0 + gain

@@ -44,7 +44,9 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     size = points.phase_voltage_v / points.current_line_a
     reactance = np.sqrt(np.maximum(size**2 - resistance**2, 1e-6 * size**2))
     known = 0.0 if points.resistance_ohm is None else points.resistance_ohm
-    first = np.median(np.maximum(resistance - known, 0.05 * resistance)) if points.is_locked else np.median(points.power_w)
+    first = (
+        np.median(np.maximum(resistance - known, 0.05 * resistance)) if points.is_locked else np.median(points.power_w)
+    )
     start = [float(np.log(first)), float(np.log(np.median(reactance / points.omega)))]
     low, high = [x - FARTHEST for x in start], [x + FARTHEST for x in start]
     for extension in extensions:
@@ -63,7 +65,9 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     return np.array(start), np.array(low), np.array(high)
 
 
-def _predicted(x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]) -> tuple[Array, Array]:
+def _predicted(
+    x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]
+) -> tuple[Array, Array]:
     """Current (A rms) and power (W) at the points' voltage and frequency."""
     numbers: dict[str, Array] = {}
     at = 2
@@ -122,9 +126,11 @@ def scales(points: Points) -> dict[str, float]:
     The two channels scatter differently (a wattmeter at low power factor), so each is weighed by its own.
     """
     scale = {
-        "frequency_hz": float(points.frequency_hz.min()), "current_a": float(np.median(points.current_line_a)),
+        "frequency_hz": float(points.frequency_hz.min()),
+        "current_a": float(np.median(points.current_line_a)),
         "flux_wb": float(np.max(points.phase_voltage_v / points.omega)),
-        "current_scatter": 1.0, "power_scatter": 1.0,
+        "current_scatter": 1.0,
+        "power_scatter": 1.0,
     }
     left = fit_points(points, candidates_for(points), scale)[2]
     n = points.count
@@ -142,10 +148,12 @@ def fit_points(
 
     def errors(x: Array) -> Array:
         current, power = _predicted(x, points, extensions, scale)
-        return np.concatenate([
-            (current / points.current_line_a - 1.0) / scale["current_scatter"],
-            (power / points.power_w - 1.0) / scale["power_scatter"],
-        ])
+        return np.concatenate(
+            [
+                (current / points.current_line_a - 1.0) / scale["current_scatter"],
+                (power / points.power_w - 1.0) / scale["power_scatter"],
+            ]
+        )
 
     solution = least_squares(errors, start, bounds=(low, high), x_scale="jac", max_nfev=100)
     freedom = max(2 * points.count - start.shape[0], 1)

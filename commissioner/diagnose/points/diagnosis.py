@@ -107,7 +107,10 @@ def _has_right_sign(x: Array, candidate: Extension) -> bool:
 
 
 def _conclude(
-    points: Points, accepted: Sequence[Extension], p_values: Mapping[str, float], tested: Mapping[str, float],
+    points: Points,
+    accepted: Sequence[Extension],
+    p_values: Mapping[str, float],
+    tested: Mapping[str, float],
     scale: Mapping[str, float],
 ) -> PointsDiagnosis:
     held_before, held_after = held_out(points, [], scale), held_out(points, accepted, scale)
@@ -116,7 +119,9 @@ def _conclude(
     x, covariance, left = fit_points(points, accepted, scale)
     unit = np.array([scale["current_scatter"], scale["power_scatter"]])
     freedom = max(1.0 - x.size / (2.0 * points.count), 0.25)
-    missed = dict(zip(MOST_SCATTER, np.sqrt(np.mean((left.reshape(2, -1).T * unit) ** 2, axis=0) / freedom).tolist(), strict=True))
+    missed = dict(
+        zip(MOST_SCATTER, np.sqrt(np.mean((left.reshape(2, -1).T * unit) ** 2, axis=0) / freedom).tolist(), strict=True)
+    )
     at = 2
     for extension in accepted:
         others = [e for e in accepted if e.name != extension.name]
@@ -128,15 +133,28 @@ def _conclude(
     verdict, reason = _verdict(points, causes, tested, missed)
     plain = fit_points(points, [], scale)
     before, after = (
-        PointErrors(held * unit, fitted.reshape(2, -1).T * unit) for held, fitted in ((held_before, plain[2]), (held_after, left))
+        PointErrors(held * unit, fitted.reshape(2, -1).T * unit)
+        for held, fitted in ((held_before, plain[2]), (held_after, left))
     )
     rms = [float(np.sqrt(np.mean((e.left_out[:, 0] * points.current_line_a) ** 2))) for e in (before, after)]
     relative = [float(np.sqrt(np.mean(e.left_out**2))) for e in (before, after)]
     gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0
     return PointsDiagnosis(
-        "locked rotor" if points.is_locked else "no load", verdict, reason, () if verdict == "unexplained" else tuple(causes), rms[0], rms[1], relative[0], relative[1],
+        "locked rotor" if points.is_locked else "no load",
+        verdict,
+        reason,
+        () if verdict == "unexplained" else tuple(causes),
+        rms[0],
+        rms[1],
+        relative[0],
+        relative[1],
         gain,
-        _parameters(points, plain[0], plain[1]), _parameters(points, x, covariance), dict(tested), points, before, after,
+        _parameters(points, plain[0], plain[1]),
+        _parameters(points, x, covariance),
+        dict(tested),
+        points,
+        before,
+        after,
     )
 
 
@@ -145,14 +163,22 @@ def _verdict(
 ) -> tuple[str, str]:
     where = f"the {'locked-rotor' if points.is_locked else 'no-load'} points"
     if any(missed[what] > most for what, most in MOST_SCATTER.items()):
-        errors = " and ".join(f"{missed[what]:.1%} in {what} (instruments: up to {most:.0%})" for what, most in MOST_SCATTER.items())
+        errors = " and ".join(
+            f"{missed[what]:.1%} in {what} (instruments: up to {most:.0%})" for what, most in MOST_SCATTER.items()
+        )
         return "unexplained", (
             f"Read as {where.removeprefix('the ')}, the best circuit misses them by {errors}: points of more than one motor or "
             "test, of a motor under load, in other units than the column says, or with a cause that no circuit here has."
         )
     if causes:
-        return "explained", f"The named causes predict {where} left out of the fit clearly better than constant parameters."
-    return "nothing_significant", f"Constant parameters describe {where} as well as their scatter allows ({len(tested)} causes tested)."
+        return (
+            "explained",
+            f"The named causes predict {where} left out of the fit clearly better than constant parameters.",
+        )
+    return (
+        "nothing_significant",
+        f"Constant parameters describe {where} as well as their scatter allows ({len(tested)} causes tested).",
+    )
 
 
 def _sizes(
@@ -176,7 +202,10 @@ def _values(name: str, x: Array, points: Points, scale: Mapping[str, float]) -> 
         low, high = (float(end) / scale["current_a"] for end in np.quantile(points.current_line_a, (0.0, 1.0)))
         return {"inductance_drop_over_range": float(1.0 - (1.0 + x[0] * low) / (1.0 + x[0] * high))}
     if name == "rotor_skin_effect":
-        return {"resistance_rise_over_range": float(x[0]) * ((float(points.frequency_hz.max()) / scale["frequency_hz"]) ** 2 - 1.0)}
+        return {
+            "resistance_rise_over_range": float(x[0])
+            * ((float(points.frequency_hz.max()) / scale["frequency_hz"]) ** 2 - 1.0)
+        }
     if name == "magnetizing_saturation":
         lowest = float(np.min(points.phase_voltage_v / points.omega)) / scale["flux_wb"]
         extra = (1.0 + x[0]) / (1.0 + x[0] * lowest ** x[1]) - 1.0

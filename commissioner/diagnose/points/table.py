@@ -59,8 +59,11 @@ class Points:
 
     def _at(self, keep: NDArray[np.bool_]) -> Points:
         return replace(
-            self, frequency_hz=self.frequency_hz[keep], voltage_line_v=self.voltage_line_v[keep],
-            current_line_a=self.current_line_a[keep], power_w=self.power_w[keep],
+            self,
+            frequency_hz=self.frequency_hz[keep],
+            voltage_line_v=self.voltage_line_v[keep],
+            current_line_a=self.current_line_a[keep],
+            power_w=self.power_w[keep],
             resistance_ohm=None if self.resistance_ohm is None else self.resistance_ohm[keep],
         )
 
@@ -74,7 +77,9 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
     """The points of a table, rows that are copies taken once, or why they cannot be used."""
     if missing := [c for c in POINT_COLUMNS if c not in columns]:
         return refused(
-            f"a table of test points needs the column {missing[0]}", ", ".join(columns), ", ".join(POINT_COLUMNS),
+            f"a table of test points needs the column {missing[0]}",
+            ", ".join(columns),
+            ", ".join(POINT_COLUMNS),
             f"add or rename: {', '.join(missing)}",
         )
     between = next((c for c in POINT_RESISTANCES if c in columns), None)
@@ -84,7 +89,9 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
         wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
         if wrong.size:
             return refused(
-                f"{column} is {values[wrong[0]]:g} in row {wrong[0] + 1}", float(values[wrong[0]]), "positive numbers in every row",
+                f"{column} is {values[wrong[0]]:g} in row {wrong[0] + 1}",
+                float(values[wrong[0]]),
+                "positive numbers in every row",
                 "correct the cell or leave the row out",
             )
     rows = np.stack([np.asarray(columns[c], dtype=float) for c in names], axis=1)
@@ -106,11 +113,16 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
 def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> DataRefused | None:
     if f.size < LEAST_POINTS:
         return refused(
-            f"{f.size} different points cannot carry an answer", f.size, f"at least {LEAST_POINTS}", "measure at more voltages",
+            f"{f.size} different points cannot carry an answer",
+            f.size,
+            f"at least {LEAST_POINTS}",
+            "measure at more voltages",
         )
     if f.size > MOST_POINTS:
         return refused(
-            f"{f.size} points are no test by hand", f.size, f"at most {MOST_POINTS}",
+            f"{f.size} points are no test by hand",
+            f.size,
+            f"at most {MOST_POINTS}",
             "give the steady points, each once; a recording over time needs the column time_s",
         )
     factor = p / (np.sqrt(3.0) * v * i)
@@ -118,24 +130,32 @@ def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> D
         row = int(np.argmax(factor))
         return refused(
             f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A exceeds the apparent power {p[row] / factor[row]:.6g} VA",
-            float(factor[row]), "a power factor of at most 1", "give line-to-line volts, line amperes and the watts of all three phases",
+            float(factor[row]),
+            "a power factor of at most 1",
+            "give line-to-line volts, line amperes and the watts of all three phases",
         )
     if factor.min() < LEAST_POWER_FACTOR:
         row = int(np.argmin(factor))
         return refused(
-            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A is a power factor of {factor[row]:.2g}", float(factor[row]),
-            f"at least {LEAST_POWER_FACTOR}", "check the units: volts, amperes and watts, with a decimal point",
+            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A is a power factor of {factor[row]:.2g}",
+            float(factor[row]),
+            f"at least {LEAST_POWER_FACTOR}",
+            "check the units: volts, amperes and watts, with a decimal point",
         )
     if _loaded(f, v, i):
         return refused(
             "the current changes at constant voltage and frequency: points of a loaded motor, not of a locked or idle one",
-            float(np.ptp(i)), "currents that follow the voltage", "give the points of a locked-rotor or a no-load test",
+            float(np.ptp(i)),
+            "currents that follow the voltage",
+            "give the points of a locked-rotor or a no-load test",
         )
     what, values, least = ("current", i, LEAST_SPREAD) if is_locked else ("flux", v / f, LEAST_FLUX_SPREAD)
     spread = float(values.max() / values.min())
     if spread < least and not (is_locked and np.unique(f).size > 1):
         return refused(
-            f"the largest {what} is only {spread:.3g} times the smallest: nothing can be seen to bend", spread, f"at least {least}",
+            f"the largest {what} is only {spread:.3g} times the smallest: nothing can be seen to bend",
+            spread,
+            f"at least {least}",
             "measure over a wider range of voltage",
         )
     return None

@@ -24,10 +24,14 @@ CLASS_GUARD = 1e-2
 """Beside an accepted cause of rigid form that it is mistaken for, a later cause must gain this share of its gain."""
 SAME_ORDER = frozenset({"rotor_skin_effect", "iron_loss"})
 PAIR_GUARDS = {
-    SAME_ORDER: 0.1, frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 2e-3,
-    frozenset({"shaft_motion", "remanence"}): 0.02, frozenset({"sensor_offset", "remanence"}): 1e-4, frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
+    SAME_ORDER: 0.1,
+    frozenset({"inductance_anisotropy", "resistance_anisotropy"}): 2e-3,
+    frozenset({"shaft_motion", "remanence"}): 0.02,
+    frozenset({"sensor_offset", "remanence"}): 1e-4,
+    frozenset({"sensor_offset", "sensor_drift"}): 3e-3,
     frozenset({"shaft_motion", "sensor_drift"}): 3e-3,
-    frozenset({"iron_loss", "sensor_lag"}): 5e-4, frozenset({"iron_loss", "sampling_delay"}): 5e-4,
+    frozenset({"iron_loss", "sensor_lag"}): 5e-4,
+    frozenset({"iron_loss", "sampling_delay"}): 5e-4,
 }
 """Pairs of which the weaker is only named beside the other where it is no trifle: networks that terminals hardly tell apart;
 flux left from the segment before, which a shaft that turns in the pause carries elsewhere. (A flux decays and an offset stays. Offset and drift differ plainly, and so does a
@@ -48,9 +52,16 @@ EXACT_GUARD = 2e-3
 APART = 0.1
 """Factor on a guard where what the one may leave and what the other makes lie at other frequencies, or axes; or where the one leaves what is
 in proportion to the command, and the other is a curve."""
-EXACT = frozenset({
-    "sensor_offset", "sensor_gain_mismatch", "sampling_delay", "mains_pickup", "dc_link_ripple", "remanence",
-})
+EXACT = frozenset(
+    {
+        "sensor_offset",
+        "sensor_gain_mismatch",
+        "sampling_delay",
+        "mains_pickup",
+        "dc_link_ripple",
+        "remanence",
+    }
+)
 """Causes whose form is not a matter of opinion: they leave nothing behind."""
 SHAPED = frozenset({"dead_time", "device_drop", "magnetizing_saturation", "leakage_saturation"})
 """Causes whose curve is free: what they leave is small. No two hysteresis models agree, so it is not among them."""
@@ -101,7 +112,9 @@ def _share_left(accepted: str, name: str) -> float:
         return 0.0
     families = {mine.family, other.family}
     is_curve_beside_linear = mine.family == "linear" and name in SHAPED
-    is_apart = len(families) == 2 and (families & LINES_OF_THEIR_OWN or families == ALIKE_ON_ALL_AXES or is_curve_beside_linear)
+    is_apart = len(families) == 2 and (
+        families & LINES_OF_THEIR_OWN or families == ALIKE_ON_ALL_AXES or is_curve_beside_linear
+    )
     return APART * RIGID_GUARD if is_apart else RIGID_GUARD
 
 
@@ -126,7 +139,11 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
     has_own_sign = any(t.lower < 0.0 for t in CATALOGUE[name].exchanged_in(model.of(name)))
     if sign and sizes and not has_own_sign and next(iter(sizes.values()))[0] * sign <= 0:
         return False
-    if "sag_at_rated_power" in sizes and sizes["sag_at_rated_power"][0] > MOST_SAG and not _link_shows(model, name, setting.record):
+    if (
+        "sag_at_rated_power" in sizes
+        and sizes["sag_at_rated_power"][0] > MOST_SAG
+        and not _link_shows(model, name, setting.record)
+    ):
         return False
     if "slope_lost" in sizes and sizes["slope_lost"][0] < LEAST_SLOPE_LOST:
         return False
@@ -137,7 +154,9 @@ def is_plausible(model: Model, name: str, setting: Setting) -> bool:
 
 def is_ruled_out(model: Model, name: str, record: Record) -> bool:
     """Whether what was measured says surely that it is not this cause: a link that was recorded, and stands still."""
-    return any(t.kind == kinds.VOLTAGE_MOD for t in model.terms if t.effect == name) and _link_stands_still(model, name, record)
+    return any(t.kind == kinds.VOLTAGE_MOD for t in model.terms if t.effect == name) and _link_stands_still(
+        model, name, record
+    )
 
 
 def _link_stands_still(model: Model, name: str, record: Record) -> bool:

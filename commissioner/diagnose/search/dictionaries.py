@@ -25,12 +25,12 @@ from commissioner.diagnose.search.screening import required_chi2
 
 Array = NDArray[np.float64]
 CURVES = {
-    kinds.IRON_CURVE: ("iron_vectors", even_vectors), kinds.LEAKAGE_CURVE: ("leak_vectors", even_vectors),
-    kinds.LEGS_LINK: ("legs_vectors", odd_vectors), kinds.LEGS: ("legs_vectors", odd_vectors),
+    kinds.IRON_CURVE: ("iron_vectors", even_vectors),
+    kinds.LEAKAGE_CURVE: ("leak_vectors", even_vectors),
+    kinds.LEGS_LINK: ("legs_vectors", odd_vectors),
+    kinds.LEGS: ("legs_vectors", odd_vectors),
 }
-RANGES = {
-    kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")
-}
+RANGES = {kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")}
 CLOSER_SHARE = 0.5
 """Loops of closer radii must make so much of what is left."""
 ACTING_SHARE = 1e-3
@@ -94,7 +94,9 @@ def with_closer_branches(model: Model, setting: Setting) -> tuple[Model, Setting
     times = setting.layout.branch_time_s
     weights = model.sum_kind(kinds.BRANCH, times.size)
     closer = list(times)
-    for time in np.outer(times[weights > ACTING_SHARE * weights.max(initial=0.0)], 2.0 ** (np.array([-1.0, 1.0]) / 3.0)).ravel():
+    for time in np.outer(
+        times[weights > ACTING_SHARE * weights.max(initial=0.0)], 2.0 ** (np.array([-1.0, 1.0]) / 3.0)
+    ).ravel():
         is_near = any(x / time > 0.0 and abs(np.log2(x / time)) <= 1.0 / 6.0 for x in closer)
         if not is_near and SHORTEST_BRANCH_S < abs(time) < LONGEST_BRANCH_S:
             closer.append(float(time))
@@ -126,7 +128,9 @@ def carried_over(model: Model, layout: Layout, reached: tuple[float, float], fre
     for (kind, names), flux in zip(RANGES.items(), reached, strict=True):
         rows = [k for k, t in enumerate(model.terms) if t.kind == kind]
         if values[rows].any():
-            (old, top), (new, fresh_top) = (_splines(*(getattr(one, name) for name in names)) for one in (layout, fresh))
+            (old, top), (new, fresh_top) = (
+                _splines(*(getattr(one, name) for name in names)) for one in (layout, fresh)
+            )
             end, grid = min(flux, top), np.linspace(0.0, fresh_top, GRID)
             curve = (old(np.minimum(grid, end)) + np.maximum(grid - end, 0.0)[:, None] * old(end, 1)) @ values[rows]
             bounds = np.array([(model.terms[k].lower, model.terms[k].upper) for k in rows]).T
@@ -140,7 +144,9 @@ def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
     return BSpline(top / intervals * np.arange(-3, intervals + 4), vectors.T, 3), top
 
 
-def with_faster_speed(current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]) -> tuple[Fit, Record, Setting]:
+def with_faster_speed(
+    current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]
+) -> tuple[Fit, Record, Setting]:
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz. Not tried where less than that
 
     is left across the axes, along which no speed moves anything to first order.
@@ -149,7 +155,9 @@ def with_faster_speed(current: Fit, full: Record, setting: Setting, noise: Noise
     there = replace(setting, record=record.first(setting.record.commanded))
     speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
-    wanted = current.chi2 - max(required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained)
+    wanted = current.chi2 - max(
+        required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained
+    )
     if left_across(current.model, setting, noise) < current.chi2 - wanted:
         return current, full, setting
     faster = fit(model, there.record, there.layout, noise, wanted_chi2=wanted)
@@ -219,10 +227,13 @@ def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Se
     for effect in sorted({t.effect for t in model.terms if t.kind == kind}):
         known = model.of(effect)
         pairs = zip(model.terms, model.values, strict=True)
-        halved = with_halved_intervals(vectors, np.array([v for t, v in pairs if (t.effect, t.kind) == (effect, kind)]), finer)
+        halved = with_halved_intervals(
+            vectors, np.array([v for t, v in pairs if (t.effect, t.kind) == (effect, kind)]), finer
+        )
         fresh = [
             replace(t, start=float(np.clip(halved[t.index], t.lower, t.upper)) if t.kind == kind else known[t.symbol])
-            for t in CATALOGUE[effect].terms(setting) if t.kind == kind or t.symbol in known
+            for t in CATALOGUE[effect].terms(setting)
+            if t.kind == kind or t.symbol in known
         ]
         model = model.without(effect).with_terms(fresh)
     return model

@@ -78,7 +78,9 @@ def as_a_lag(
             continue
         terms = [t for n in group for t in CATALOGUE[n].forms(CATALOGUE[n].terms(setting))[0]]
         share = {"lag": 0.7 if len(group) > 1 else 1.0, "delay": 0.3}
-        started = model.with_terms([replace(t, start=share[t.symbol] * late) if t.symbol in share else t for t in terms])
+        started = model.with_terms(
+            [replace(t, start=share[t.symbol] * late) if t.symbol in share else t for t in terms]
+        )
         wanted = current.chi2 + cost - sum(required_chi2(sum(t.effect == n for t in terms)) for n in group)
         wanted -= STATISTICAL_FLOOR if len(group) == len(mine) else 0.0
         trial = fit(started, setting.record, setting.layout, noise, wanted_chi2=wanted)
@@ -89,7 +91,13 @@ def as_a_lag(
 
 
 def as_rippled(
-    current: Fit, name: str, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report
+    current: Fit,
+    name: str,
+    accepted: tuple[str, ...],
+    setting: Setting,
+    noise: Noise,
+    names: Sequence[str],
+    report: Report,
 ) -> Exchanged | None:
     """A lag that sees the switching's ripple in place of the delay or the smooth lag that imitates it: at zero nothing promises one."""
     if name not in LATE or "sensor_lag" not in names or (name != "sensor_lag" and "sensor_lag" in accepted):
@@ -114,7 +122,13 @@ def as_a_delay(
         return None
     delay = replace(CATALOGUE["sampling_delay"].terms(setting)[0], start=lag["lag"])
     wanted = current.chi2 + float(np.log(current.normal.count.sum()))
-    trial = fit(current.model.without("sensor_lag").with_terms([delay]), setting.record, setting.layout, noise, wanted_chi2=wanted)
+    trial = fit(
+        current.model.without("sensor_lag").with_terms([delay]),
+        setting.record,
+        setting.layout,
+        noise,
+        wanted_chi2=wanted,
+    )
     report(f"  instead of sensor_lag and its shape sampling_delay: gained {current.chi2 - trial.chi2:.4g} more")
     if trial.chi2 > wanted:
         return None
@@ -156,12 +170,16 @@ def _read_late_without(
         period = setting.facts.sample_period_s
         shown = bare.with_terms([replace(EDGE, start=bare.total(kinds.IRON_LOSS) * period)])
         trial = fit(shown, record, layout, noise, wanted_chi2=wanted)
-        report(f"  iron_loss that shows its instant's voltage in place of {'+'.join(gone)}: gained {current.chi2 - trial.chi2:.4g} more")
+        report(
+            f"  iron_loss that shows its instant's voltage in place of {'+'.join(gone)}: gained {current.chi2 - trial.chi2:.4g} more"
+        )
         best = trial if trial.chi2 < wanted and _is_its_own(trial, period) else None
     if may_be_late:
         to_beat = wanted if best is None else best.chi2 - STATISTICAL_FLOOR
         late = fit(read_late(bare, bare.nominal[2]), record, layout, noise, wanted_chi2=to_beat)
-        report(f"  a current that is read late in place of {'+'.join(('iron_loss', *gone))}: gained {current.chi2 - late.chi2:.4g} more")
+        report(
+            f"  a current that is read late in place of {'+'.join(('iron_loss', *gone))}: gained {current.chi2 - late.chi2:.4g} more"
+        )
         if late.chi2 < to_beat and late.model.of("sampling_delay")[EARLY.symbol] < 0.0:
             return late
     return best
@@ -189,7 +207,9 @@ def in_other_forms(current: Fit, accepted: Sequence[str], setting: Setting, nois
         symbols = current.model.of(name)
         for form in CATALOGUE[name].other_forms(symbols, CATALOGUE[name].terms(setting)):
             wanted = best.chi2 - STATISTICAL_FLOOR - price(len(form)) + price(len(best.model.of(name)))
-            trial = fit(best.model.without(name).with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted)
+            trial = fit(
+                best.model.without(name).with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted
+            )
             report(f"  {name} in another form: gained {best.chi2 - trial.chi2:.4g}")
             if trial.chi2 <= wanted and is_plausible(trial.model, name, setting):
                 best = trial
@@ -197,7 +217,12 @@ def in_other_forms(current: Fit, accepted: Sequence[str], setting: Setting, nois
 
 
 def regrouped(
-    current: Fit, accepted: tuple[str, ...], setting: Setting, noise: Noise, names: Sequence[str], report: Report,
+    current: Fit,
+    accepted: tuple[str, ...],
+    setting: Setting,
+    noise: Noise,
+    names: Sequence[str],
+    report: Report,
     threshold: Callable[[int], float],
 ) -> Exchanged | None:
     """The accepted linear causes exchanged for another one or two of them, where that fits clearly better: one by one they
@@ -213,11 +238,17 @@ def regrouped(
     screening = screen(without.model, record, layout, noise, setting, [n for n in LINEAR if n in names])
     # what merely joins the accepted ones has been tried, and guarded, on the way forward
     groups = [
-        g for size in (1, 2) for g in itertools.combinations(screening.scores, size)
+        g
+        for size in (1, 2)
+        for g in itertools.combinations(screening.scores, size)
         if not set(mine) <= set(g) and set(g) != SAME_ORDER
     ]
     promised = sorted(((joint_net(screening, g), g) for g in groups), key=lambda x: -x[0])
-    wanted = current.chi2 + sum(price(screening.scores[n].numbers) for n in mine if n in screening.scores) - STATISTICAL_FLOOR
+    wanted = (
+        current.chi2
+        + sum(price(screening.scores[n].numbers) for n in mine if n in screening.scores)
+        - STATISTICAL_FLOOR
+    )
     for net, group in promised[:REGROUPED]:
         # one cause more has to gain what it would have to beside the others
         least = RIGID_GUARD * (without.chi2 - current.chi2) if len(group) > len(mine) else 0.0

@@ -54,10 +54,14 @@ def layout_for(record: Record, model: Model) -> tuple[Layout, float]:
     knee = 0.004 * peak
     layout = replace(
         with_ranges(bare, flux, peak * model.nominal[2]),
-        legs_top=float(np.arcsinh(0.6 * peak / knee)), legs_knee_a=knee, legs_vectors=odd_vectors(16),
-        iron_vectors=even_vectors(10), leak_vectors=even_vectors(12),
+        legs_top=float(np.arcsinh(0.6 * peak / knee)),
+        legs_knee_a=knee,
+        legs_vectors=odd_vectors(16),
+        iron_vectors=even_vectors(10),
+        leak_vectors=even_vectors(12),
         branch_time_s=BRANCH_TIME_S,
-        nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a, channel_ends_a=channel_ends(record),
+        nonlinearity_scale_a=2.0 * record.facts.rated_current_peak_a,
+        channel_ends_a=channel_ends(record),
         leak_ratio=leak_ratio(model),
     )
     return replace(layout, legs_slack_v=legs_slack_v(model, layout, peak)), flux
@@ -92,12 +96,16 @@ def largest_fluxes(record: Record, model: Model, layout: Layout) -> tuple[float,
 def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> Layout:
     """The dictionaries of iron and leakage spread over the largest fluxes reached, with a margin."""
     return replace(
-        layout, iron_top_wb=1.08 * iron_flux_wb, leak_top_wb=1.2 * leakage_flux_wb,
-        stop_radius_wb=np.array([
-            *((share * iron_flux_wb, 0.0) for share in STOP_SHARES),
-            *((share * iron_flux_wb, iron_flux_wb**-2.0) for share in WIDENING),
-            *((share * iron_flux_wb, -(iron_flux_wb**-2.0)) for share in NARROWING),
-        ]),
+        layout,
+        iron_top_wb=1.08 * iron_flux_wb,
+        leak_top_wb=1.2 * leakage_flux_wb,
+        stop_radius_wb=np.array(
+            [
+                *((share * iron_flux_wb, 0.0) for share in STOP_SHARES),
+                *((share * iron_flux_wb, iron_flux_wb**-2.0) for share in WIDENING),
+                *((share * iron_flux_wb, -(iron_flux_wb**-2.0)) for share in NARROWING),
+            ]
+        ),
     )
 
 
@@ -108,9 +116,15 @@ def bare_layout(record: Record) -> Layout:
     """
     stator, rotor, leakage, _ = impedance_starts(record)[0]
     total = stator + rotor
-    return replace(NO_DICTIONARY, nominal_box=(
-        (0.01 * total, 4.0 * total), (0.01 * total, 6.0 * total), (0.02 * leakage, 4.0 * leakage), (0.3 * leakage, 1e3 * leakage)
-    ))
+    return replace(
+        NO_DICTIONARY,
+        nominal_box=(
+            (0.01 * total, 4.0 * total),
+            (0.01 * total, 6.0 * total),
+            (0.02 * leakage, 4.0 * leakage),
+            (0.3 * leakage, 1e3 * leakage),
+        ),
+    )
 
 
 def nominal_fit(record: Record, noise: Noise) -> Fit:
@@ -179,14 +193,20 @@ that turns meanwhile makes of its direction."""
 def is_astray(model: Model, layout: Layout) -> bool:
     """Whether the four numbers are no motor's: one at an end of where it may be, or less magnetizing inductance than leakage."""
     box, four = np.array(layout.nominal_box), np.array(model.nominal)
-    return bool((four <= (1.0 + AT_AN_END) * box[:, 0]).any() or (four >= (1.0 - AT_AN_END) * box[:, 1]).any() or four[3] < four[2])
+    return bool(
+        (four <= (1.0 + AT_AN_END) * box[:, 0]).any()
+        or (four >= (1.0 - AT_AN_END) * box[:, 1]).any()
+        or four[3] < four[2]
+    )
 
 
 def starts_of(record: Record) -> list[Term]:
     """Nuisances of the nominal model: stator and rotor flux at the start of every stretch that follows a hole."""
     return [
         Term("", f"start_{c}_{s.uid}", "Wb", kinds.INITIAL_FLUX, 2 + c, 0.01, segment=s.uid)
-        for s in record.segments if not s.starts_at_rest for c in range(4)
+        for s in record.segments
+        if not s.starts_at_rest
+        for c in range(4)
     ]
 
 
@@ -200,7 +220,9 @@ def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
         inherits = segment.file == file and segment.starts_at_rest
         if not inherits:
             before, path = np.zeros(2), np.zeros((2, 1))
-        told = replace(segment, flux_before_wb=(float(before[0]), float(before[1])), iron_before_wb=path if inherits else None)
+        told = replace(
+            segment, flux_before_wb=(float(before[0]), float(before[1])), iron_before_wb=path if inherits else None
+        )
         record = replace(record, segments=(*record.segments[:k], told, *record.segments[k + 1 :]))
         seen = predict(model, record, k, layout)
         steps = np.r_[0 : segment.count : max(segment.count // PATH_STEPS, 1), segment.count - 1]
@@ -223,4 +245,10 @@ def _kept_flux(model: Model, layout: Layout, path: Array) -> Array:
 def set_up(record: Record, noise: Noise, nominal: Fit) -> tuple[Record, Layout, Setting]:
     layout, flux = layout_for(record, nominal.model)
     record, lines = add_channels(record, nominal.model, layout, noise)
-    return record, layout, Setting(record, layout, flux, record.facts.current_peak_a * nominal.model.nominal[2], nominal.model.nominal, lines)
+    return (
+        record,
+        layout,
+        Setting(
+            record, layout, flux, record.facts.current_peak_a * nominal.model.nominal[2], nominal.model.nominal, lines
+        ),
+    )

@@ -68,7 +68,9 @@ def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model
     radii = [layout.stop_radius_wb[t.index] for t, _ in loops]
     for radius, rate in [layout.stop_radius_wb[t.index] for t, v in loops if v]:
         for wanted in (radius / ratio, radius * ratio):
-            is_new = all(r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii)
+            is_new = all(
+                r != rate or wanted / x < 0.0 or abs(np.log(wanted / x)) > 0.5 * np.log(ratio) for x, r in radii
+            )
             if is_new and abs(wanted) < widest_loop(layout.iron_top_wb):
                 radii.append(np.array([wanted, rate]))
     values = [v for _, v in loops] + [0.0] * (len(radii) - len(loops))
@@ -91,7 +93,9 @@ def without_springs(model: Model, layout: Layout, iron_flux_wb: float) -> tuple[
         if term.kind == kinds.STOP and term.index not in at:
             stiffness += value / abs(float(radii[term.index, 0]))
             continue
-        terms.append(replace(term, symbol=f"loop_{at[term.index]}", index=at[term.index]) if term.kind == kinds.STOP else term)
+        terms.append(
+            replace(term, symbol=f"loop_{at[term.index]}", index=at[term.index]) if term.kind == kinds.STOP else term
+        )
         values.append(value)
     nominal = (*model.nominal[:3], 1.0 / stiffness)
     return Model(nominal, tuple(terms), tuple(values)), replace(layout, stop_radius_wb=radii[kept])
@@ -116,7 +120,9 @@ def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
         if abs(_side(best.model) - side) > NEAR:
-            trial = fit(_on(without_curves(best.model), side), part, layout, noise, wanted_chi2=best.chi2 - _price(best))
+            trial = fit(
+                _on(without_curves(best.model), side), part, layout, noise, wanted_chi2=best.chi2 - _price(best)
+            )
             if trial.chi2 < best.chi2:
                 best = trial
     if part is record:
@@ -179,7 +185,9 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
         # of several that stand for one another the many go first
         _, least, weakest = min(
             (left - price * len(group), left, group)
-            for group in spare if group not in idle for left in [loss_without([*idle, group])]
+            for group in spare
+            if group not in idle
+            for left in [loss_without([*idle, group])]
         )
         if least - loss > price * len(weakest):
             break

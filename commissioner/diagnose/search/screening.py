@@ -142,8 +142,10 @@ def joint_net(screening: Screening, names: Sequence[str]) -> float:
     """What several effects together promise to first order, less their price."""
     kept = [k for n in names for k in screening.columns[n]]
     terms = [t for n in names for t in screening.scores[n].terms]
-    lower, upper = (np.array([(x - t.start) / t.step for t, x in zip(terms, bounds, strict=True)])
-                    for bounds in ([t.lower for t in terms], [t.upper for t in terms]))
+    lower, upper = (
+        np.array([(x - t.start) / t.step for t, x in zip(terms, bounds, strict=True)])
+        for bounds in ([t.lower for t in terms], [t.upper for t in terms])
+    )
     gram, slope = screening.projected[np.ix_(kept, kept)], screening.slope[kept]
     step = bounded_step(gram, slope, lower, upper, 1e-9)
     gain = float(2.0 * step @ slope - step @ gram @ step)

@@ -68,8 +68,13 @@ class Found:
 
 
 def search(
-    record: Record, noise: Noise, *, excluded: Sequence[str] = (), report: Report = lambda _: None,
-    check: Callable[[Fit, Record], None] | None = None, go_on: Callable[[], bool] = lambda: True,
+    record: Record,
+    noise: Noise,
+    *,
+    excluded: Sequence[str] = (),
+    report: Report = lambda _: None,
+    check: Callable[[Fit, Record], None] | None = None,
+    go_on: Callable[[], bool] = lambda: True,
 ) -> Found:
     """Accepted causes of the whole record. Where lost samples were put right first and much is left, another cause may have looked
 
@@ -86,7 +91,11 @@ def search(
 
 
 def _searched(
-    record: Record, noise: Noise, excluded: Sequence[str], report: Report, check: Callable[[Fit, Record], None] | None,
+    record: Record,
+    noise: Noise,
+    excluded: Sequence[str],
+    report: Report,
+    check: Callable[[Fit, Record], None] | None,
     go_on: Callable[[], bool],
 ) -> Found:
     """Explored on a part, confirmed and completed on all of the record."""
@@ -179,9 +188,7 @@ def _losses_completed(reached: _Reached, losses: tuple[Loss, ...]) -> tuple[_Rea
     return (reached.again_on(mended, better), losses + more) if more else (reached, losses)
 
 
-def _settled(
-    reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, is_placed: bool
-) -> Found:
+def _settled(reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, is_placed: bool) -> Found:
     """The last fit's sides and loops settled, unless too much is left; with all that was seen on the way."""
     steps, fitted, noise, layout = reached.steps, reached.fit, reached.steps.noise, reached.steps.layout
     alien = steps.alien
@@ -198,16 +205,30 @@ def _settled(
     # what settling gained may be the same
     alien = replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0)) if alien.chi2 else alien
     return Found(
-        nominal, fitted, reached.accepted, steps.record, layout, setting, reached.screening, first,
-        steps.below, gains, tuple(x for x in losses if not x.is_spike),
-        tuple(x for x in losses if x.is_spike), steps.material_chi2, alien, steps.go_on(),
+        nominal,
+        fitted,
+        reached.accepted,
+        steps.record,
+        layout,
+        setting,
+        reached.screening,
+        first,
+        steps.below,
+        gains,
+        tuple(x for x in losses if not x.is_spike),
+        tuple(x for x in losses if x.is_spike),
+        steps.material_chi2,
+        alien,
+        steps.go_on(),
     )
 
 
 def _is_placed(placed: frozenset[str], accepted: Sequence[str]) -> bool:
     """Whether the iron's side was sought beside these causes already, but for some that act at lines of their own."""
-    return bool(placed) and placed <= set(accepted) and all(
-        CATALOGUE[n].family in LINES_OF_THEIR_OWN for n in set(accepted) - placed
+    return (
+        bool(placed)
+        and placed <= set(accepted)
+        and all(CATALOGUE[n].family in LINES_OF_THEIR_OWN for n in set(accepted) - placed)
     )
 
 
@@ -252,9 +273,7 @@ def _with_the_losses(
     mended: Record, raw: Sequence[Segment], fitted: Fit, layout: Layout, noise: Noise
 ) -> tuple[Record, Fit] | None:
     """The data as they came and the fit of all accepted causes to them, where that is hardly worse: then nothing was lost."""
-    segments = tuple(
-        replace(r, flux_before_wb=m.flux_before_wb) for r, m in zip(raw, mended.segments, strict=True)
-    )
+    segments = tuple(replace(r, flux_before_wb=m.flux_before_wb) for r, m in zip(raw, mended.segments, strict=True))
     record = replace(mended, segments=segments)
     trial = fit(fitted.model, record, layout, noise)
     masked = float(trial.normal.count.sum() - fitted.normal.count.sum())
@@ -281,7 +300,10 @@ def _without_unseen_speed(model: Model, part: Record, record: Record) -> Model:
 
     def is_seen(term: Term) -> bool:
         at = uids.index(term.segment)
-        seen, whole = (float(np.square(r.channels[at][: r.segments[at].count, r.channel(term.channel)]).sum()) for r in (part, record))
+        seen, whole = (
+            float(np.square(r.channels[at][: r.segments[at].count, r.channel(term.channel)]).sum())
+            for r in (part, record)
+        )
         return seen > 0.5 * whole
 
     values = tuple(

@@ -92,7 +92,13 @@ class Steps:
     """One record (the first part of every segment of `full`, or all of it), one dictionary; remembers what was tried."""
 
     def __init__(
-        self, setting: Setting, noise: Noise, names: Sequence[str], report: Report, full: Record, go_on: Callable[[], bool],
+        self,
+        setting: Setting,
+        noise: Noise,
+        names: Sequence[str],
+        report: Report,
+        full: Record,
+        go_on: Callable[[], bool],
     ) -> None:
         self.setting, self.noise = setting, noise
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
@@ -157,7 +163,9 @@ class Steps:
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)
 
-    def run(self, start: Fit, accepted: tuple[str, ...], *, adds: bool = True) -> tuple[Fit, tuple[str, ...], Screening]:
+    def run(
+        self, start: Fit, accepted: tuple[str, ...], *, adds: bool = True
+    ) -> tuple[Fit, tuple[str, ...], Screening]:
         """The fit, the accepted causes and the last screening from a start that has some; `adds` False: none is added."""
         current, self.setting = with_finer_curves(start, self.setting, self.noise, self.report)
         refused: set[str] = set()
@@ -187,7 +195,9 @@ class Steps:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
-            if (len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count) or is_astray(current.model, self.layout):
+            if (len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count) or is_astray(
+                current.model, self.layout
+            ):
                 current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
                 current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
@@ -234,7 +244,11 @@ class Steps:
     def _with_faster_speed(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit in which a shaft swings faster, where it does; tried once something is left beside all other causes."""
         is_left = self._rest(current) > self.threshold(1)
-        if "shaft_motion" not in accepted or not is_left or any(n.startswith(FINE_HAT) for n in self.record.channel_names):
+        if (
+            "shaft_motion" not in accepted
+            or not is_left
+            or any(n.startswith(FINE_HAT) for n in self.record.channel_names)
+        ):
             return None
         again, self.full, self.setting = with_faster_speed(current, self.full, self.setting, self.noise, self.report)
         return again if again is not current else None
@@ -319,7 +333,10 @@ class Steps:
         known = self._known(current)
         if f"without {name}" not in known:
             less = current.model.without(name)
-            known[f"without {name}"] = fit(less, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2), wanted_chi2
+            known[f"without {name}"] = (
+                fit(less, self.record, self.layout, self.noise, wanted_chi2=wanted_chi2),
+                wanted_chi2,
+            )
         return known[f"without {name}"][0]
 
     def _known(self, current: Fit) -> dict[str, tuple[Fit, float]]:
@@ -332,7 +349,8 @@ class Steps:
         """What of the causes that were ruled out would take most, and more than the `least` that it must gain."""
         promised = (
             Alien(name, kept * screening.scores[name].delta_chi2)
-            for name, kept in self.ruled_out.items() if name in screening.scores
+            for name, kept in self.ruled_out.items()
+            if name in screening.scores
         )
         beyond = (a for a in promised if a.chi2 > least[a.name])
         return max(beyond, key=lambda a: a.chi2, default=Alien())
@@ -426,7 +444,9 @@ class Steps:
         for _ in range(CARRIED_ROUNDS):
             model = best.model if best is not current else current.model.with_terms([CARRIED])
             told = with_flux_before(full, model, self.layout)
-            trial = fit(model, self._part_of(told), self.layout, self.noise, wanted_chi2=current.chi2 - required_chi2(1))
+            trial = fit(
+                model, self._part_of(told), self.layout, self.noise, wanted_chi2=current.chi2 - required_chi2(1)
+            )
             if trial.chi2 >= best.chi2:
                 break
             best, full = trial, told

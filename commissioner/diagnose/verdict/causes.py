@@ -74,14 +74,17 @@ def causes_of(
 
     `trust`: factor on every confidence (see `doubt`).
     """
-    refitted = _refitted_without(found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest, trust)])
+    refitted = _refitted_without(
+        found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest, trust)]
+    )
     without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
     causes = [_cause(found, name, rest, without[name], noise, excluded, trust) for name in found.accepted]
     causes = _without_truncation(_with_open_ties(causes, without), audit)
     losses = () if rest.from_bursts_sigma > 0.0 and not found.accepted else found.losses
     causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
-        c for c in causes
+        c
+        for c in causes
         if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest))
     )
     return [c for c in causes if c not in unsure], unsure
@@ -135,7 +138,13 @@ def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked
 
 
 def _cause(
-    found: Found, name: str, rest: Leftover, without: Dropped, noise: Noise, excluded: Sequence[str], trust: float,
+    found: Found,
+    name: str,
+    rest: Leftover,
+    without: Dropped,
+    noise: Noise,
+    excluded: Sequence[str],
+    trust: float,
 ) -> Cause:
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
@@ -144,7 +153,9 @@ def _cause(
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
     unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
     close = tuple(
-        n for n, r in without.rivals.items() if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
+        n
+        for n, r in without.rivals.items()
+        if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
     )
     features = claim_features(found.fit, found.accepted, name, rest, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
@@ -156,9 +167,16 @@ def _cause(
     if strength < calibration.TRACE_SIGMA:
         sure *= calibration.TRACE_FACTOR
     return Cause(
-        name, CATALOGUE[name].title, sizes_with_spread(found.fit, name, found.setting), min(gain / total, 1.0),
-        strength, gain, sure, tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
-        {n: r.loss for n, r in without.rivals.items()}, tuple(features),
+        name,
+        CATALOGUE[name].title,
+        sizes_with_spread(found.fit, name, found.setting),
+        min(gain / total, 1.0),
+        strength,
+        gain,
+        sure,
+        tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
+        {n: r.loss for n, r in without.rivals.items()},
+        tuple(features),
     )
 
 
@@ -169,7 +187,13 @@ def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> 
     """
     out = []
     for cause in causes:
-        tied = [without[c.name].rivals[n] for c in causes if c is not cause for n in c.equivalent if n in without[c.name].rivals]
+        tied = [
+            without[c.name].rivals[n]
+            for c in causes
+            if c is not cause
+            for n in c.equivalent
+            if n in without[c.name].rivals
+        ]
         tied += without[cause.name].forms
         sizes = {}
         for key, (value, spread, unit) in cause.sizes.items():
@@ -209,13 +233,19 @@ def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
             ratio = np.array(offsets) / halves
             if np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0):
                 step = {"step_a": (float(halves.max()) * 2.0, 0.0, "A")}
-                out.append(replace(cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()))
+                out.append(
+                    replace(
+                        cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()
+                    )
+                )
                 continue
         out.append(cause)
     return out
 
 
-def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[str], losses: Sequence[Loss]) -> list[Cause]:
+def _audit_causes(
+    audit: Audit, found: Found, noise: Noise, named: Collection[str], losses: Sequence[Loss]
+) -> list[Cause]:
     """Causes that leave no waveform: coarse converter steps, clipped and missing samples. `losses` without a gap in time: none where
 
     errors come and go that samples put right do not take away.
@@ -226,13 +256,23 @@ def _audit_causes(audit: Audit, found: Found, noise: Noise, named: Collection[st
     if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
         out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
     if audit.clipped and "clipping" not in named:
-        out.append(_plain("clipping", {"limit_a": (audit.clipped["limit_a"], 0.0, "A"),
-                                       "samples": (audit.clipped["samples"], 0.0, "1")}))
+        out.append(
+            _plain(
+                "clipping",
+                {"limit_a": (audit.clipped["limit_a"], 0.0, "A"), "samples": (audit.clipped["samples"], 0.0, "1")},
+            )
+        )
     if audit.holes or losses:
         marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in losses)
-        out.append(_plain("lost_samples", {
-            "samples": (float(marked + unmarked), 0.0, "1"), "without_gap_in_time": (float(unmarked), 0.0, "1"),
-        }))
+        out.append(
+            _plain(
+                "lost_samples",
+                {
+                    "samples": (float(marked + unmarked), 0.0, "1"),
+                    "without_gap_in_time": (float(unmarked), 0.0, "1"),
+                },
+            )
+        )
     return out
 
 
@@ -241,7 +281,10 @@ def doubt(rest: Leftover, share: float) -> float:
 
     larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
     """
-    is_trace = max(rest.from_tones_sigma, rest.from_states_sigma, rest.from_alien_sigma) > 0.0 and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    is_trace = (
+        max(rest.from_tones_sigma, rest.from_states_sigma, rest.from_alien_sigma) > 0.0
+        and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    )
     return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
 
 

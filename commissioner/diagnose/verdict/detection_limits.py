@@ -16,7 +16,11 @@ Limit = tuple[str, tuple[float, str]]
 def detection_limits(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
     """Smallest size of each effect that these data would have shown beside the named causes: the first of its sizes."""
     screened = {name: one for one in (found.first_screening, found.screening) for name in one.scores}
-    limits = {name: _limit_of_absent(found, name, screening) for name, screening in screened.items() if name not in found.accepted}
+    limits = {
+        name: _limit_of_absent(found, name, screening)
+        for name, screening in screened.items()
+        if name not in found.accepted
+    }
     limits |= {name: _limit_of_named(found, name) for name in found.accepted}
     return {
         name: {key: {"value": abs(value), "unit": unit}}

@@ -66,8 +66,11 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     structured = np.maximum(table[:, 0] - floor, 1e-12 * floor)
     mean = table.sum(axis=0)
     return HeldOut(
-        float(np.sqrt(mean[0] / mean[2])), float(np.sqrt(mean[1] / mean[2])), float(np.sqrt(floor.sum() / mean[2])),
-        float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)), many,
+        float(np.sqrt(mean[0] / mean[2])),
+        float(np.sqrt(mean[1] / mean[2])),
+        float(np.sqrt(floor.sum() / mean[2])),
+        float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)),
+        many,
         float(np.clip((removed / structured).min(), -1.0, 1.0)),
     )
 
@@ -107,8 +110,15 @@ class Dropped:
 
 
 def alternatives(
-    found: Fit, accepted: Sequence[str], record: Record, layout: Layout, setting: Setting, noise: Noise, whole: int,
-    excluded: Sequence[str], asked: Sequence[str],
+    found: Fit,
+    accepted: Sequence[str],
+    record: Record,
+    layout: Layout,
+    setting: Setting,
+    noise: Noise,
+    whole: int,
+    excluded: Sequence[str],
+    asked: Sequence[str],
 ) -> dict[str, Dropped]:
     """For every accepted cause that is `asked` about: the fit without it, and with one of the rest (but for `excluded`) in its place."""
     scale = whole / record.samples
@@ -131,7 +141,10 @@ def alternatives(
             if trial.chi2 - found.chi2 > TIE_CHI2:
                 trial, there = with_closer_paths(trial, there, noise, wanted)
             if is_plausible(trial.model, score.name, there):
-                rivals[score.name] = Rival((trial.chi2 - found.chi2) * scale, _moved(found.model, trial.model, [n for n in accepted if n != name], there))
+                rivals[score.name] = Rival(
+                    (trial.chi2 - found.chi2) * scale,
+                    _moved(found.model, trial.model, [n for n in accepted if n != name], there),
+                )
         if EDGE.symbol in found.model.of(name) and "sampling_delay" in absent:
             late = fit(read_late(found.model, found.model.nominal[2]), record, layout, noise, wanted_chi2=wanted)
             moved = _moved(found.model, late.model, [n for n in accepted if n != name], setting)
@@ -140,7 +153,9 @@ def alternatives(
     return out
 
 
-def _other_forms(found: Fit, without: Fit, name: str, setting: Setting, noise: Noise, scale: float) -> tuple[Rival, ...]:
+def _other_forms(
+    found: Fit, without: Fit, name: str, setting: Setting, noise: Noise, scale: float
+) -> tuple[Rival, ...]:
     """The other forms of a cause that lose no more than TIE_CHI2."""
     entry, out = CATALOGUE[name], []
     for form in entry.other_forms(found.model.of(name), entry.terms(setting)):
@@ -239,7 +254,9 @@ def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftove
     strength = float(np.sqrt(gain / count))
     left = max(rest.sigma, 0.03)
     return [
-        float(np.log10(strength)), float(np.log10(left)), float(np.log10(max(strength / left, 1e-3))),
+        float(np.log10(strength)),
+        float(np.log10(left)),
+        float(np.log10(max(strength / left, 1e-3))),
         float(np.log10(min(gain / max(others, 1.0), 1e4)) if others else 4.0),
         float(min(gain / max(total_gain, 1.0), 1.0)),
     ]

@@ -70,17 +70,26 @@ class Procedure:
 def next_experiment(verdict: str, causes: Sequence[Any], record: Record) -> Mapping[str, object] | None:
     """The most useful next test, or None where nothing is open."""
     if verdict == "unexplained":
-        how = Procedure((
-            "Repeat every test at half the level. " + SAME, "Block the shaft and repeat one test at the old level.",
-            "Read both recordings together:",
-        ), changes_values="Perhaps. Until the unknown is found, trust none of the values further than the error shown here.")
+        how = Procedure(
+            (
+                "Repeat every test at half the level. " + SAME,
+                "Block the shaft and repeat one test at the old level.",
+                "Read both recordings together:",
+            ),
+            changes_values="Perhaps. Until the unknown is found, trust none of the values further than the error shown here.",
+        )
         return _plan(["unknown"], "repeat every segment at half amplitude and one with the shaft blocked", how, None)
     tied = [c for c in causes if c.equivalent]
     if tied:
         cause = max(tied, key=lambda c: c.strength_sigma)
         names = [cause.name, *cause.equivalent]
         is_legs = {"dead_time", "device_drop"} <= set(names)
-        return _plan(names, CATALOGUE[cause.name].split_by, procedure(names, record.facts), _predicted(cause) if is_legs else None)
+        return _plan(
+            names,
+            CATALOGUE[cause.name].split_by,
+            procedure(names, record.facts),
+            _predicted(cause) if is_legs else None,
+        )
     axes = {round(s.axis_deg % 180.0, 3) for s in record.segments}
     if len(axes) < 3:
         names = ["inductance_anisotropy", "sensor_gain_mismatch"]
@@ -101,59 +110,83 @@ def _legs(facts: Facts) -> Procedure:
     now = facts.switching_frequency_hz
     half = f"from {now:g} to {HALF * now:g} Hz" if now else "to half"
     written = f"{HALF * now:g}" if now else "the new value in Hz"
-    return Procedure((
-        f"Set the drive's switching (carrier) frequency {half}. If it cannot be set, change the DC-link voltage by a fifth instead.",
-        "Record one of the tests again. " + SAME,
-        f"Each file must say its own at the top: the new one `# switching_frequency_hz: {written}` (or `# dc_link_v: ...`).",
-        "Set the drive back.", "Read both recordings together:",
-    ), changes_values="No. It only splits the voltage between dead time and device drop; worth it if you want to set "
-       "the drive's dead-time compensation by number.")
+    return Procedure(
+        (
+            f"Set the drive's switching (carrier) frequency {half}. If it cannot be set, change the DC-link voltage by a fifth instead.",
+            "Record one of the tests again. " + SAME,
+            f"Each file must say its own at the top: the new one `# switching_frequency_hz: {written}` (or `# dc_link_v: ...`).",
+            "Set the drive back.",
+            "Read both recordings together:",
+        ),
+        changes_values="No. It only splits the voltage between dead time and device drop; worth it if you want to set "
+        "the drive's dead-time compensation by number.",
+    )
 
 
 def _late(facts: Facts) -> Procedure:
-    return Procedure((
-        f"Add one tone near {HIGH / facts.sample_period_s:.0f} Hz (0.4 of the sampling rate) to the test signal.",
-        "Record one of the tests again. " + SAME, "Read both recordings together:",
-    ), changes_values="Hardly. The motor values follow from the delay in all, and that is known.")
+    return Procedure(
+        (
+            f"Add one tone near {HIGH / facts.sample_period_s:.0f} Hz (0.4 of the sampling rate) to the test signal.",
+            "Record one of the tests again. " + SAME,
+            "Read both recordings together:",
+        ),
+        changes_values="Hardly. The motor values follow from the delay in all, and that is known.",
+    )
 
 
 def _axes(facts: Facts) -> Procedure:
-    return Procedure((
-        "Record the same test on the axes 60 and 120 degrees too, then on the first axis once more. " + SAME,
-        "Read both recordings together:",
-    ), changes_values="Perhaps by the difference between the axes, mostly below 1 %.")
+    return Procedure(
+        (
+            "Record the same test on the axes 60 and 120 degrees too, then on the first axis once more. " + SAME,
+            "Read both recordings together:",
+        ),
+        changes_values="Perhaps by the difference between the axes, mostly below 1 %.",
+    )
 
 
 def _off(facts: Facts) -> Procedure:
-    return Procedure((
-        "Record the three currents for some seconds with the inverter off, before the test and after it.",
-        "What they show is the offset; what changes between the two is the drift. Take it off the currents.",
-        "Read the corrected recording:",
-    ), command="commissioner diagnose corrected.csv --out compared")
+    return Procedure(
+        (
+            "Record the three currents for some seconds with the inverter off, before the test and after it.",
+            "What they show is the offset; what changes between the two is the drift. Take it off the currents.",
+            "Read the corrected recording:",
+        ),
+        command="commissioner diagnose corrected.csv --out compared",
+    )
 
 
 def _skin(facts: Facts) -> Procedure:
-    return Procedure((
-        "Uncouple the motor and run it at no load, rated frequency, at five to eight voltages from 30 to 110 % of rated.",
-        "Note voltage, current and power of each in a table. What the core loses there is iron loss, not skin effect.",
-        "Read the table:",
-    ), command="commissioner diagnose no_load.csv --out no_load", changes_values="Hardly. R_R at the slip of a running "
-       "motor is the value at low frequency, and that stays.")
+    return Procedure(
+        (
+            "Uncouple the motor and run it at no load, rated frequency, at five to eight voltages from 30 to 110 % of rated.",
+            "Note voltage, current and power of each in a table. What the core loses there is iron loss, not skin effect.",
+            "Read the table:",
+        ),
+        command="commissioner diagnose no_load.csv --out no_load",
+        changes_values="Hardly. R_R at the slip of a running motor is the value at low frequency, and that stays.",
+    )
 
 
 RECIPES = {
-    frozenset({"dead_time", "device_drop"}): _legs, frozenset({"sampling_delay", "sensor_lag"}): _late,
+    frozenset({"dead_time", "device_drop"}): _legs,
+    frozenset({"sampling_delay", "sensor_lag"}): _late,
     frozenset({"inductance_anisotropy", "sensor_gain_mismatch"}): _axes,
     frozenset({"resistance_anisotropy", "sensor_gain_mismatch"}): _axes,
     frozenset({"inductance_anisotropy", "resistance_anisotropy"}): _axes,
-    frozenset({"sensor_offset", "sensor_drift"}): _off, frozenset({"iron_loss", "rotor_skin_effect"}): _skin,
+    frozenset({"sensor_offset", "sensor_drift"}): _off,
+    frozenset({"iron_loss", "rotor_skin_effect"}): _skin,
 }
 
 
 def _plan(names: Sequence[str], do: str, how: Procedure, sigma: float | None) -> Mapping[str, object]:
     return {
-        "splits": list(names), "do": do, "predicted_sigma": sigma, "steps": list(how.steps), "command": how.command,
-        "repeats": _repeats(sigma), "changes_values": how.changes_values,
+        "splits": list(names),
+        "do": do,
+        "predicted_sigma": sigma,
+        "steps": list(how.steps),
+        "command": how.command,
+        "repeats": _repeats(sigma),
+        "changes_values": how.changes_values,
     }
 
 

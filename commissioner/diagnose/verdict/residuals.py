@@ -97,14 +97,18 @@ def residuals(
     for k, segment in enumerate(record.segments):
         one, two = predict(nominal, record, k, layout), predict(extended, record, k, layout)
         errors.append(_Errors(segment, segment.currents_a - one.currents_a, segment.currents_a - two.currents_a, two))
-    parts: dict[str, list[Array]] = {k: [] for k in (*LABELS, *(f"{name}{of}" for name in ("before", "after") for of in ("", "_along", "_size")))}
+    parts: dict[str, list[Array]] = {
+        k: [] for k in (*LABELS, *(f"{name}{of}" for name in ("before", "after") for of in ("", "_along", "_size")))
+    }
     axes: dict[float, list[tuple[float, float, int]]] = {}
     blocks: list[tuple[float, float, float]] = []
     for error in errors:
         _collect(parts, error)
         good = error.segment.is_good
         before, after = error.before[:, good], error.after[:, good]
-        axes.setdefault(error.segment.axis_deg, []).append((float((before**2).sum()), float((after**2).sum()), before.size))
+        axes.setdefault(error.segment.axis_deg, []).append(
+            (float((before**2).sum()), float((after**2).sum()), before.size)
+        )
         blocks.extend(_blocks(error.segment.time_s[good] - record.segments[0].time_s[0], before, after))
     order = sorted(axes)
     power = np.array([np.sum(axes[a], axis=0) for a in order])
@@ -112,13 +116,22 @@ def residuals(
     period = record.facts.sample_period_s
     return Residuals(
         tuple(_curve(label, np.concatenate(parts[key]), parts) for key, label in LABELS.items()),
-        np.array(order), np.sqrt(power[:, 0] / power[:, 2]), np.sqrt(power[:, 1] / power[:, 2]),
-        table[:, 0], table[:, 1], table[:, 2], _spectrum(errors, noise, tones_hz, period), _correlation(errors, noise, period),
+        np.array(order),
+        np.sqrt(power[:, 0] / power[:, 2]),
+        np.sqrt(power[:, 1] / power[:, 2]),
+        table[:, 0],
+        table[:, 1],
+        table[:, 2],
+        _spectrum(errors, noise, tones_hz, period),
+        _correlation(errors, noise, period),
     )
 
 
 LABELS: Mapping[str, str] = {
-    "current": "phase current / A", "voltage": "axis voltage / V", "flux": "iron flux / Wb", "slope": "di/dt / (A/s)",
+    "current": "phase current / A",
+    "voltage": "axis voltage / V",
+    "flux": "iron flux / Wb",
+    "slope": "di/dt / (A/s)",
 }
 
 
@@ -163,8 +176,13 @@ def _curve(label: str, x: Array, parts: Mapping[str, list[Array]]) -> Curve:
 def _blocks(time: Array, before: Array, after: Array) -> list[tuple[float, float, float]]:
     edges = np.linspace(0, time.shape[0], 9).astype(int)
     return [
-        (float(time[a:b].mean()), float(np.sqrt(np.mean(before[:, a:b] ** 2))), float(np.sqrt(np.mean(after[:, a:b] ** 2))))
-        for a, b in itertools.pairwise(edges) if b > a
+        (
+            float(time[a:b].mean()),
+            float(np.sqrt(np.mean(before[:, a:b] ** 2))),
+            float(np.sqrt(np.mean(after[:, a:b] ** 2))),
+        )
+        for a, b in itertools.pairwise(edges)
+        if b > a
     ]
 
 

@@ -80,7 +80,8 @@ def _with_iron(segments: Sequence[Segment], period_s: float, start: InverseGamma
         return best
     model = replace(best.model, extra_powers=1, flux_scale_wb=best.peak_flux_wb)
     return next(
-        iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model), best.own)])), best
+        iter(_those_simulated([partial(_coarse, segments, period_s, start, model, extended(best, model), best.own)])),
+        best,
     )
 
 

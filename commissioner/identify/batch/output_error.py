@@ -47,7 +47,13 @@ def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
 
 @njit(cache=True, inline="always")
 def _mean_loss(
-    table: Array, integral: Array, per_a: float, i0: float, i1: float, at0: tuple[int, float, float], at1: tuple[int, float, float]
+    table: Array,
+    integral: Array,
+    per_a: float,
+    i0: float,
+    i1: float,
+    at0: tuple[int, float, float],
+    at1: tuple[int, float, float],
 ) -> tuple[float, float, float]:
     """(mean of F over the currents i0 ... i1, its derivatives by i0 and by i1), `at0` and `at1` where they lie in the table.
 
@@ -104,8 +110,20 @@ def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
 
 @njit(cache=True, inline="always")
 def _current_at_end(
-    theta: Array, exponents: Exponents, flux_scale: float, table: Array, integral: Array, per_a: float, free: float, c1: float,
-    beta: float, b1: float, i0: float, guess: float, within: float, power: Array,
+    theta: Array,
+    exponents: Exponents,
+    flux_scale: float,
+    table: Array,
+    integral: Array,
+    per_a: float,
+    free: float,
+    c1: float,
+    beta: float,
+    b1: float,
+    i0: float,
+    guess: float,
+    within: float,
+    power: Array,
 ) -> tuple[float, float, float, float, float, float]:
     """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
 
@@ -131,7 +149,9 @@ def _current_at_end(
 
 
 @njit(cache=True, inline="always")
-def _push_of_loss(basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array) -> None:
+def _push_of_loss(
+    basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array
+) -> None:
     """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on."""
     at0, at = _locate(basis.shape[0], per_a, i0), _locate(basis.shape[0], per_a, i)
     for c in range(basis.shape[1]):
@@ -265,7 +285,20 @@ def simulate(
             if k_f > 0:
                 free, within = h_s * c1 + h_r * c2, _SOLVED * (current_span + beta * furthest)
                 i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
-                    theta, exponents, flux_scale, table, integral, per_a, free, c1, beta, b11, i0, free - beta * mean + g, within, power
+                    theta,
+                    exponents,
+                    flux_scale,
+                    table,
+                    integral,
+                    per_a,
+                    free,
+                    c1,
+                    beta,
+                    b11,
+                    i0,
+                    free - beta * mean + g,
+                    within,
+                    power,
                 )
             if not np.isfinite(i):
                 return np.inf

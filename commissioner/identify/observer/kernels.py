@@ -224,8 +224,17 @@ def worth_of_white_noise(c0: float, c1: float, beta: float) -> float:
 
 @njit(cache=True, inline="always")
 def feed_back(
-    loop: Array, open_loop: float, seen: float, slope_now: float, slope_next: float,
-    t1: float, t2: float, t3: float, t4: float, f1: float, f2: float,
+    loop: Array,
+    open_loop: float,
+    seen: float,
+    slope_now: float,
+    slope_next: float,
+    t1: float,
+    t2: float,
+    t3: float,
+    t4: float,
+    f1: float,
+    f2: float,
 ) -> None:
     """The inverter's loss follows the predicted current: what that adds to the current's derivative by one number of theta.
 

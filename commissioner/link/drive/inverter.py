@@ -109,7 +109,9 @@ class Inverter:
     def set_limits(self, *, current_a: float, voltage_v: float, time_s: float) -> None:
         """Limits the drive enforces by itself: peak phase current (trips), axis voltage (clamps), energised time."""
         values: dict[str, Value] = {
-            "current_limit_a": current_a, "test_time_limit_s": time_s, "voltage_limit_v": voltage_v
+            "current_limit_a": current_a,
+            "test_time_limit_s": time_s,
+            "voltage_limit_v": voltage_v,
         }
         self._prepare(values, "set the drive's limits")
         self._supervision |= values
@@ -172,8 +174,11 @@ class Inverter:
         session = int(self._items.read_number("session_id"))
         if session == before.session:
             raise DriveFault(
-                "the drive enabled without opening a session", step="enable", value=session,
-                limit="a session number that differs from the one before", remedy="check the drive's firmware",
+                "the drive enabled without opening a session",
+                step="enable",
+                value=session,
+                limit="a session number that differs from the one before",
+                remedy="check the drive's firmware",
             )
         return StreamCursor(stream(session))
 
@@ -237,9 +242,7 @@ class Inverter:
         written = drive_values(self.profile, circuit, nameplate)
         return self.write_parameters(written.values, snapshot, store=store)
 
-    def restore(
-        self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None
-    ) -> WriteReport:
+    def restore(self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None) -> WriteReport:
         """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`."""
         self.profile.require("restore")
         return self._write_back().restore(snapshot, expected_present)
@@ -261,9 +264,7 @@ class Inverter:
             raise not_ready("the drive was not set up", None, "watchdog, limits and excitation set", "set them first")
 
     def _stream_format(self) -> Callable[[int], StreamFormat]:
-        scales = self._items.read(
-            ["control_period_s", "voltage_scale_v", "current_scale_a", "dc_link_scale_v"]
-        )
+        scales = self._items.read(["control_period_s", "voltage_scale_v", "current_scale_a", "dc_link_scale_v"])
         decimation, mask = int(number(self._signal["decimation"])), int(number(self._signal["channel_mask"]))
         return lambda session: StreamFormat(
             layout=self._window(),
@@ -287,13 +288,19 @@ class Inverter:
                 return
             if status.state == DriveState.FAULT.value:
                 raise DriveFault(
-                    f"the drive tripped: {status.trip_text}", step="enable", value=status.trip_value,
-                    limit=status.trip_limit, remedy=f"remove the cause of: {status.fault_text}",
+                    f"the drive tripped: {status.trip_text}",
+                    step="enable",
+                    value=status.trip_value,
+                    limit=status.trip_limit,
+                    remedy=f"remove the cause of: {status.fault_text}",
                 )
             if self._clock() > end:
                 raise DriveFault(
-                    f"the drive does not reach '{wanted.value}'", step="enable", value=status.state,
-                    limit=f"within {STATE_DEADLINE_S:g} s", remedy="check enable inputs and remote control",
+                    f"the drive does not reach '{wanted.value}'",
+                    step="enable",
+                    value=status.state,
+                    limit=f"within {STATE_DEADLINE_S:g} s",
+                    remedy="check enable inputs and remote control",
                 )
             self._sleep(POLL_S)
 
@@ -307,7 +314,10 @@ class Inverter:
         if isinstance(decoded, WindowRefusal):
             self.port.doubt()
             raise ReplyMismatch(
-                decoded.reason.value, step="fetch samples", value=decoded.seen, limit=decoded.expected,
+                decoded.reason.value,
+                step="fetch samples",
+                value=decoded.seen,
+                limit=decoded.expected,
                 remedy="check the link; a drive that restarted must be commissioned again",
             )
         return decoded
@@ -319,7 +329,10 @@ class Inverter:
 
     def _no_watchdog(self, limit: str, time_ms: float) -> CheckFailed:
         return CheckFailed(
-            "the drive's watchdog cannot be set", step="arm the watchdog", value=time_ms, limit=limit,
+            "the drive's watchdog cannot be set",
+            step="arm the watchdog",
+            value=time_ms,
+            limit=limit,
             remedy="nothing is energised without it; choose a time the drive allows or another drive",
         )
 
@@ -327,6 +340,9 @@ class Inverter:
 def _check_scale(scale: float) -> None:
     if not 0.0 <= scale <= 1.0:
         raise UsageError(
-            "the amplitude scale is not a fraction", step="steer the excitation", value=scale, limit="0 ... 1",
+            "the amplitude scale is not a fraction",
+            step="steer the excitation",
+            value=scale,
+            limit="0 ... 1",
             remedy="ask for a scale between 0 and 1",
         )

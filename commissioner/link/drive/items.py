@@ -65,8 +65,11 @@ class Items:
         read = decode_span(span, seen)
         name = next(i.name for i in span.items if not _same(i.address - span.address, i.words, seen, wanted))
         raise DriveFault(
-            f"the drive acknowledged {name} = {values[name]} and holds {read[name]}", step=step, value=read[name],
-            limit=values[name], remedy="check that the drive file fits the firmware and that no other master writes",
+            f"the drive acknowledged {name} = {values[name]} and holds {read[name]}",
+            step=step,
+            value=read[name],
+            limit=values[name],
+            remedy="check that the drive file fits the firmware and that no other master writes",
         )
 
 

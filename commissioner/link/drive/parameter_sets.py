@@ -24,7 +24,9 @@ class ParameterSets:
         """The drive file's parameters. UsageError where it describes none."""
         if self.profile.parameters is None:
             raise UsageError(
-                f"{self.profile.name} has no motor parameters that are known", step="read parameters", value=None,
+                f"{self.profile.name} has no motor parameters that are known",
+                step="read parameters",
+                value=None,
                 limit="a table [parameters] in the drive file",
                 remedy=self.profile.unknown.get("parameters", "complete the drive file from the vendor's manual"),
             )
@@ -60,8 +62,11 @@ class ParameterSets:
         for name in values:
             if name not in order:
                 raise UsageError(
-                    f"{name} is not one of the drive's motor parameters", step="write parameters", value=name,
-                    limit=", ".join(order), remedy=self.profile.unknown.get(name, "leave it out"),
+                    f"{name} is not one of the drive's motor parameters",
+                    step="write parameters",
+                    value=name,
+                    limit=", ".join(order),
+                    remedy=self.profile.unknown.get(name, "leave it out"),
                 )
         prefix = "staged_" if self.group.is_staged else ""
         for name, value in values.items():
@@ -73,8 +78,11 @@ class ParameterSets:
         for name, value in wanted.items():
             if not self.items.same_words(name, seen[name], value):
                 raise DriveFault(
-                    f"the drive holds {name} = {seen[name]} instead of {value}", step=step, value=seen[name],
-                    limit=value, remedy="the drive limits, rounds or recomputes the value; see its manual",
+                    f"the drive holds {name} = {seen[name]} instead of {value}",
+                    step=step,
+                    value=seen[name],
+                    limit=value,
+                    remedy="the drive limits, rounds or recomputes the value; see its manual",
                 )
 
     def _read(self, prefix: str) -> dict[str, float]:

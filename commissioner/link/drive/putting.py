@@ -14,7 +14,11 @@ BUSY, DONE = 1, 2
 RESULT_DEADLINE_S = 5.0
 POLL_S = 0.01
 COMMIT_RESULTS = {
-    0: "nothing happened", 1: "still busy", 3: "check sum wrong", 4: "value out of the drive's range", 5: "not stopped"
+    0: "nothing happened",
+    1: "still busy",
+    3: "check sum wrong",
+    4: "value out of the drive's range",
+    5: "not stopped",
 }
 STORE_RESULTS = {0: "nothing happened", 1: "still busy", 3: "the memory failed", 5: "not stopped"}
 
@@ -78,8 +82,11 @@ class Staged:
             result = int(self._items.read_number(item))
         if result != DONE:
             raise DriveFault(
-                f"the drive did not {step}: {meanings.get(result, 'unknown result')}", step=step, value=result,
-                limit=DONE, remedy="check the values against the drive's ranges and that it is stopped",
+                f"the drive did not {step}: {meanings.get(result, 'unknown result')}",
+                step=step,
+                value=result,
+                limit=DONE,
+                remedy="check the values against the drive's ranges and that it is stopped",
             )
 
 

@@ -13,17 +13,44 @@ from commissioner.registers.profile import DriveProfile
 from commissioner.registers.status import DriveState, decode_bits, decode_state
 
 IDENTITY_ITEMS = (
-    "magic", "map_version", "firmware_version", "serial_number", "drive_type", "rated_drive_current_a",
-    "control_period_s", "switching_frequency_hz",
+    "magic",
+    "map_version",
+    "firmware_version",
+    "serial_number",
+    "drive_type",
+    "rated_drive_current_a",
+    "control_period_s",
+    "switching_frequency_hz",
 )
 STATUS_ITEMS = (
-    "status_word", "fault_code", "trip_cause", "trip_value", "trip_limit", "heartbeat_echo", "session_id",
-    "interlocks", "dc_link_v", "heatsink_degc", "winding_degc", "shaft_speed_rad_per_s", "current_magnitude_a",
-    "present_scale", "samples_produced", "overruns", "test_time_left_s", "present_bias_v",
+    "status_word",
+    "fault_code",
+    "trip_cause",
+    "trip_value",
+    "trip_limit",
+    "heartbeat_echo",
+    "session_id",
+    "interlocks",
+    "dc_link_v",
+    "heatsink_degc",
+    "winding_degc",
+    "shaft_speed_rad_per_s",
+    "current_magnitude_a",
+    "present_scale",
+    "samples_produced",
+    "overruns",
+    "test_time_left_s",
+    "present_bias_v",
 )
 NAMEPLATE_ITEMS = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
-    "pole_pairs", "pole_count",
+    "rated_power_w",
+    "rated_voltage_v",
+    "rated_frequency_hz",
+    "rated_current_a",
+    "rated_speed_rpm",
+    "power_factor",
+    "pole_pairs",
+    "pole_count",
 )
 
 
@@ -118,6 +145,9 @@ def _version(word: int) -> str:
 
 def _stranger(name: str, seen: object, wanted: object, profile: DriveProfile) -> IdentityMismatch:
     return IdentityMismatch(
-        f"this is not {profile.name}: {name} differs", step="identify", value=seen, limit=wanted,
+        f"this is not {profile.name}: {name} differs",
+        step="identify",
+        value=seen,
+        limit=wanted,
         remedy="check the URL, or name the drive file that fits this drive and firmware",
     )

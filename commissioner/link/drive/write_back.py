@@ -62,8 +62,11 @@ class WriteBack:
             return self._report(snapshot.in_use, present, is_stored=is_stored)
         except DriveError as error:
             raise WriteBackFailed(
-                f"the snapshot could not be restored: {error.what}", step="restore", value=error.value,
-                limit=error.limit, remedy="run restore again; until then the drive's parameters are not known",
+                f"the snapshot could not be restored: {error.what}",
+                step="restore",
+                value=error.value,
+                limit=error.limit,
+                remedy="run restore again; until then the drive's parameters are not known",
             ) from error
 
     def _check_present(
@@ -86,16 +89,22 @@ class WriteBack:
         status = read_status(self._items)
         if status.is_energised:
             raise CheckFailed(
-                "the drive's output is not blocked", step="write parameters", value=status.state,
-                limit="a stopped drive", remedy="stop the motor first",
+                "the drive's output is not blocked",
+                step="write parameters",
+                value=status.state,
+                limit="a stopped drive",
+                remedy="stop the motor first",
             )
 
     def _check_endurance(self, count: int, writes: int) -> None:
         store = self._profile.store
         if store and store.endurance_writes and count + writes > store.endurance_writes:
             raise CheckFailed(
-                "the drive's parameter memory is worn out", step="store", value=count,
-                limit=f"{store.endurance_writes} writes", remedy="write without storing, or replace the drive's memory",
+                "the drive's parameter memory is worn out",
+                step="store",
+                value=count,
+                limit=f"{store.endurance_writes} writes",
+                remedy="write without storing, or replace the drive's memory",
             )
 
     # --- act ----------------------------------------------------------------------------------------------------
@@ -106,7 +115,9 @@ class WriteBack:
             self._way.put_in_use(target, store=store)
             self._sleep(self._sets.group.settle_s)
             self._sets.verify(target, self._sets.in_use(), "read back the values in use")
-        is_unstored = bool(self._sets.differing(target, self._sets.stored())) if self._sets.group.is_staged else has_changed
+        is_unstored = (
+            bool(self._sets.differing(target, self._sets.stored())) if self._sets.group.is_staged else has_changed
+        )
         if store and is_unstored:
             self._way.put_in_memory(target)
 
@@ -131,7 +142,10 @@ class WriteBack:
         except CommissionerError as second:
             outcome, was_restored = f"the values found before could not be verified: {second.what}", False
         failed = WriteBackFailed(
-            f"writing back failed: {error.what}; {outcome}", step=error.step, value=error.value, limit=error.limit,
+            f"writing back failed: {error.what}; {outcome}",
+            step=error.step,
+            value=error.value,
+            limit=error.limit,
             remedy=error.remedy if was_restored else "run restore before the drive is used",
         )
         failed.was_restored = was_restored
@@ -160,6 +174,9 @@ def _key(identity: DriveIdentity) -> DriveIdentity:
 
 def _changed(what: str, seen: object, wanted: object) -> IdentityMismatch:
     return IdentityMismatch(
-        what, step="compare with the snapshot", value=seen, limit=wanted,
+        what,
+        step="compare with the snapshot",
+        value=seen,
+        limit=wanted,
         remedy="someone or something changed the drive meanwhile; take a new snapshot by running again",
     )

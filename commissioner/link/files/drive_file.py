@@ -66,8 +66,11 @@ def _locate(name_or_path: str) -> Path:
     if name_or_path in known_drives():
         return DRIVES_FOLDER / f"{name_or_path}.toml"
     raise UsageError(
-        f"there is no drive named {name_or_path!r}", step="read configuration", value=name_or_path,
-        limit="one of: " + ", ".join(known_drives()), remedy="give one of these names or the path of a .toml file",
+        f"there is no drive named {name_or_path!r}",
+        step="read configuration",
+        value=name_or_path,
+        limit="one of: " + ", ".join(known_drives()),
+        remedy="give one of these names or the path of a .toml file",
     )
 
 
@@ -103,9 +106,7 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     key = f"items.{name}"
     if table.address < link.address_base:
         raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
-    for what, value, known in (
-        ("convention", table.convention, CONVENTIONS), ("quantity", table.quantity, QUANTITIES)
-    ):
+    for what, value, known in (("convention", table.convention, CONVENTIONS), ("quantity", table.quantity, QUANTITIES)):
         if value and value not in known:
             raise ConfigurationError(
                 file=file, key=f"{key}.{what}", value=value, expected="one of: " + ", ".join(sorted(known))

@@ -101,8 +101,13 @@ class SerialClient(ModbusSerialClient):
         if self.socket is None:
             wanted = self.comm_params
             self.socket = serial.serial_for_url(
-                wanted.host, timeout=wanted.timeout_connect, bytesize=wanted.bytesize, stopbits=wanted.stopbits,
-                baudrate=wanted.baudrate, parity=wanted.parity, exclusive=True,
+                wanted.host,
+                timeout=wanted.timeout_connect,
+                bytesize=wanted.bytesize,
+                stopbits=wanted.stopbits,
+                baudrate=wanted.baudrate,
+                parity=wanted.parity,
+                exclusive=True,
             )
         return True
 
@@ -165,8 +170,11 @@ def client_context(url: TlsUrl) -> ssl.SSLContext:
             context.load_cert_chain(url.cert, url.key, password=_refuse_password)
     except (ssl.SSLError, OSError) as error:
         raise UsageError(
-            f"the TLS files for {url} cannot be used", step="read TLS files", value=error.strerror or str(error),
-            limit="PEM files: CA certificates, our certificate and its key", remedy="check ca=, cert= and key=",
+            f"the TLS files for {url} cannot be used",
+            step="read TLS files",
+            value=error.strerror or str(error),
+            limit="PEM files: CA certificates, our certificate and its key",
+            remedy="check ca=, cert= and key=",
         ) from error
     return context
 
@@ -180,6 +188,9 @@ def _open_socket(client: ModbusTcpClient) -> socket.socket:
 
 def _refuse_password() -> NoReturn:
     raise UsageError(
-        "the TLS key is encrypted", step="read TLS files", value="key=", limit="a key without a pass phrase",
+        "the TLS key is encrypted",
+        step="read TLS files",
+        value="key=",
+        limit="a key without a pass phrase",
         remedy="give a key file that only this user can read, without a pass phrase",
     )

@@ -114,7 +114,9 @@ class ModbusPort:
             self._client.connect()
         except Exception as error:  # pyserial lets termios errors through
             raise LinkUnreachable(
-                f"no connection to {self._url}", step="connect", value=str(error),
+                f"no connection to {self._url}",
+                step="connect",
+                value=str(error),
                 limit=f"a connection within {self._connect_timeout_s:g} s",
                 remedy="check that the drive is powered, the cable, the address and that no other master holds it",
             ) from error
@@ -124,7 +126,9 @@ class ModbusPort:
     def _ask_read(self, address: int, count: int) -> Words:
         what = f"read {count} registers at {address}"
         reply = self._transact(
-            (READ, 2 * count), what, lambda: self._client.read_holding_registers(address, count=count, device_id=self._device)
+            (READ, 2 * count),
+            what,
+            lambda: self._client.read_holding_registers(address, count=count, device_id=self._device),
         )
         return self._words(reply, count, what)
 
@@ -147,21 +151,26 @@ class ModbusPort:
     def _ask_write(self, address: int, values: list[int]) -> None:
         what = f"write {len(values)} registers at {address}"
         reply = self._transact(
-            (WRITE, address, len(values)), what, lambda: self._client.write_registers(address, values, device_id=self._device)
+            (WRITE, address, len(values)),
+            what,
+            lambda: self._client.write_registers(address, values, device_id=self._device),
         )
         self._expect(what, (reply.address, reply.count), (address, len(values)))
 
     def _ask_write_one(self, address: int, value: int) -> None:
         what = f"write register {address}"
         reply = self._transact(
-            (WRITE_ONE, address, value), what, lambda: self._client.write_register(address, value, device_id=self._device)
+            (WRITE_ONE, address, value),
+            what,
+            lambda: self._client.write_register(address, value, device_id=self._device),
         )
         self._expect(what, (reply.address, tuple(reply.registers)), (address, (value,)))
 
     def _ask_write_coil(self, address: int, value: bool) -> None:
         what = f"write coil {address}"
         reply = self._transact(
-            (WRITE_COIL, address, COIL_ON * value), what,
+            (WRITE_COIL, address, COIL_ON * value),
+            what,
             lambda: self._client.write_coil(address, value, device_id=self._device),
         )
         self._expect(what, (reply.address, reply.bits[:1]), (address, [value]))
@@ -172,7 +181,10 @@ class ModbusPort:
             (EXCHANGE, 2 * count),
             what,
             lambda: self._client.readwrite_registers(
-                read_address=read_address, read_count=count, write_address=write_address, values=values,
+                read_address=read_address,
+                read_count=count,
+                write_address=write_address,
+                values=values,
                 device_id=self._device,
             ),
         )
@@ -206,8 +218,13 @@ class ModbusPort:
             return ConnectionTrust(self._client)
         assert isinstance(self._url, RtuUrl)
         return SerialTrust(
-            self._client, self._url, turnaround_s=self._profile.link.turnaround_s,
-            prove=self._prove, stats=self.stats, sleep=self._sleep, clock=self._clock,
+            self._client,
+            self._url,
+            turnaround_s=self._profile.link.turnaround_s,
+            prove=self._prove,
+            stats=self.stats,
+            sleep=self._sleep,
+            clock=self._clock,
         )
 
     def _prove(self) -> None:
@@ -258,7 +275,10 @@ class ModbusPort:
         self.stats.mismatches += 1
         self._trust.doubt()
         raise ReplyMismatch(
-            f"the answer to '{what}' is not its answer", step=what, value=seen, limit=wanted,
+            f"the answer to '{what}' is not its answer",
+            step=what,
+            value=seen,
+            limit=wanted,
             remedy="an answer to another request or a damaged one; check cable, device number and other masters",
         )
 
@@ -270,7 +290,10 @@ class ModbusPort:
         self.stats.mismatches += 1
         self._trust.doubt()
         raise ReplyMismatch(
-            f"the answer to '{what}' cannot be read", step=what, value=str(error), limit="a Modbus answer",
+            f"the answer to '{what}' cannot be read",
+            step=what,
+            value=str(error),
+            limit="a Modbus answer",
             remedy="check cable, baud rate and that the device speaks Modbus",
         ) from error
 
@@ -284,7 +307,10 @@ class ModbusPort:
         self.stats.timeouts += 1
         self._trust.doubt()
         raise ReplyTimeout(
-            f"no answer to '{what}'", step=what, value=value, limit=f"an answer within {self.reply_timeout_s:g} s",
+            f"no answer to '{what}'",
+            step=what,
+            value=value,
+            limit=f"an answer within {self.reply_timeout_s:g} s",
             remedy="check the drive's supply, the cable and the device number",
         ) from error
 
@@ -292,8 +318,11 @@ class ModbusPort:
         self.stats.refusals += 1
         meaning = self._exceptions.get(code, "a code the drive file does not explain")
         raise RequestRefused(
-            f"the drive refused to {what}: exception {code}, {meaning}", step=what, value=code,
-            limit="a request the drive allows now", remedy=f"the drive says: {meaning}",
+            f"the drive refused to {what}: exception {code}, {meaning}",
+            step=what,
+            value=code,
+            limit="a request the drive allows now",
+            remedy=f"the drive says: {meaning}",
         )
 
 

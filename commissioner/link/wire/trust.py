@@ -140,7 +140,10 @@ class SerialTrust:
             self._stats.mismatches += 1
             self.doubt()
             raise ReplyMismatch(
-                "more than one answer came to one question", step="read the line", value=answers, limit=1,
+                "more than one answer came to one question",
+                step="read the line",
+                value=answers,
+                limit=1,
                 remedy="a late answer, an echo or a second master; the line is brought back into step",
             )
 
@@ -151,7 +154,10 @@ class SerialTrust:
         except RequestRefused as refused:
             self.doubt()
             raise ReplyMismatch(
-                "the token was refused", step="prove the line", value=refused.value, limit="the token back",
+                "the token was refused",
+                step="prove the line",
+                value=refused.value,
+                limit="the token back",
                 remedy="a late refusal or a second master; the line is brought back into step",
             ) from refused
 
@@ -170,8 +176,10 @@ class SerialTrust:
             except (ReplyTimeout, ReplyMismatch) as error:
                 failure = error
         raise ReplyTimeout(
-            f"{self._url}: the line does not come into step", step="resynchronise",
-            value=failure.what if failure else None, limit=f"a proven answer within {ATTEMPTS} attempts",
+            f"{self._url}: the line does not come into step",
+            step="resynchronise",
+            value=failure.what if failure else None,
+            limit=f"a proven answer within {ATTEMPTS} attempts",
             remedy="check device number, baud rate, parity, cable and termination, and that there is one master only",
         ) from failure
 

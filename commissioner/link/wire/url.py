@@ -166,7 +166,10 @@ def _bracketed(host: str) -> str:
 
 def _refuse(text: str, value: object, expected: str) -> UsageError:
     return UsageError(
-        f"{without_secrets(text)!r} is not a drive's address", step="read drive URL", value=value, limit=expected,
+        f"{without_secrets(text)!r} is not a drive's address",
+        step="read drive URL",
+        value=value,
+        limit=expected,
         remedy="write tcp://HOST:PORT?device=1, tls://HOST:802?ca=FILE&cert=FILE&key=FILE "
         "or rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1",
     )

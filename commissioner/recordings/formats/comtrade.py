@@ -67,7 +67,9 @@ def _parts(path: Path) -> tuple[str, Stretch]:
         if not {b"CFG", b"DAT"} <= parts.keys():
             Stretch(memoryview(b""), path, _FORM).refuse("no CFG and DAT section")
         return _decoded(parts[b"CFG"]), Stretch(memoryview(parts[b"DAT"]), path, _FORM)
-    return _decoded(bounded_bytes(_beside(path, ".cfg"), MAX_FOREIGN_BYTES)), Stretch.of_file(_beside(path, ".dat"), _FORM)
+    return _decoded(bounded_bytes(_beside(path, ".cfg"), MAX_FOREIGN_BYTES)), Stretch.of_file(
+        _beside(path, ".dat"), _FORM
+    )
 
 
 def _beside(path: Path, ending: str) -> Path:
@@ -123,7 +125,12 @@ def _samples(configuration: _Configuration, data: Stretch) -> tuple[Signal, Sign
         return _ascii(data, count)
     kind, missing = _SAMPLES[configuration.data_type]
     row = np.dtype(
-        [("number", "<u4"), ("stamp", "<u4"), ("a", kind, (count,)), ("d", "<u2", (-(-configuration.status_count // 16),))]
+        [
+            ("number", "<u4"),
+            ("stamp", "<u4"),
+            ("a", kind, (count,)),
+            ("d", "<u2", (-(-configuration.status_count // 16),)),
+        ]
     )
     rows = len(data.data) // row.itemsize
     if 8 * rows * (count + 1) > MAX_BYTES:

@@ -24,7 +24,12 @@ BAND, NOISE_BAND = 2.58, 1.96
 """99 % and 95 % of a normal variable."""
 VISIBLE = 0.02
 """Thinnest band that shows, as a share of a panel's height."""
-CLASS_WORDS = {"excited": "the test's\nown", "odd": "odd\ndistortion", "even": "even\ndistortion", "other": "all others"}
+CLASS_WORDS = {
+    "excited": "the test's\nown",
+    "odd": "odd\ndistortion",
+    "even": "even\ndistortion",
+    "other": "all others",
+}
 Array = NDArray[np.float64]
 Wanted = ParamSpec("Wanted")
 
@@ -140,7 +145,10 @@ def correlation(seen: Correlation, has_causes: bool) -> Figure:
         axes.minorticks_off()
         axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylim(-max(2.0 * largest, 2.0 * BAND), max(2.0 * largest, 2.0 * BAND))
-    axes.set(xlabel="how long the current's error comes after the voltage / ms", ylabel="tie to the voltage,\ntimes the noise")
+    axes.set(
+        xlabel="how long the current's error comes after the voltage / ms",
+        ylabel="tie to the voltage,\ntimes the noise",
+    )
     _legend_above(figure, axes)
     return figure
 
@@ -170,9 +178,14 @@ def look_alikes(seen: Alike, named: Sequence[str]) -> Figure:
 def over_points(points: Sequence[Mapping[str, float]], is_locked: bool, has_causes: bool) -> Figure:
     """Error of the predicted current and power at every test point, over current (locked rotor) or flux (no load), and
     over frequency where the test has several. Rings: the point was left out of the fit; dots: it was in it."""
-    frequency, volts, amps = (np.array([p[k] for p in points]) for k in ("frequency_hz", "voltage_line_v", "current_line_a"))
-    across = [(amps, "line current / A rms")] if is_locked else [(np.sqrt(2.0 / 3.0) * volts / (2.0 * np.pi * frequency),
-                                                                 "stator flux / Wb peak")]
+    frequency, volts, amps = (
+        np.array([p[k] for p in points]) for k in ("frequency_hz", "voltage_line_v", "current_line_a")
+    )
+    across = (
+        [(amps, "line current / A rms")]
+        if is_locked
+        else [(np.sqrt(2.0 / 3.0) * volts / (2.0 * np.pi * frequency), "stator flux / Wb peak")]
+    )
     if np.unique(frequency).size > 1:
         across.append((frequency, "frequency / Hz"))
     figure = _figure(4.6)
@@ -180,9 +193,16 @@ def over_points(points: Sequence[Mapping[str, float]], is_locked: bool, has_caus
     for row, what in zip(panels, ("current", "power"), strict=True):
         for axes, (x, label) in zip(row, across, strict=True):
             for when, color in (("before", ORANGE), ("after", BLUE))[: 2 if has_causes else 1]:
-                out, inside = (100.0 * np.array([p[f"{what}_error_{when}_{how}"] for p in points]) for how in ("left_out", "fitted"))
-                axes.plot(x, inside, ".", color=color, markersize=4, label=f"{BEFORE if when == 'before' else AFTER}, fitted")
-                axes.plot(x, out, "o", color=color, fillstyle="none", markersize=6, label="the same point left out of the fit")
+                out, inside = (
+                    100.0 * np.array([p[f"{what}_error_{when}_{how}"] for p in points])
+                    for how in ("left_out", "fitted")
+                )
+                axes.plot(
+                    x, inside, ".", color=color, markersize=4, label=f"{BEFORE if when == 'before' else AFTER}, fitted"
+                )
+                axes.plot(
+                    x, out, "o", color=color, fillstyle="none", markersize=6, label="the same point left out of the fit"
+                )
             axes.axhline(0.0, color=MUTED, linewidth=0.8)
             axes.set_xlabel(label if what == "power" else "")
         row[0].set_ylabel(f"error of the {what} / %")

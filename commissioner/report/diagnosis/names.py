@@ -14,8 +14,12 @@ TOGETHER = frozenset({"dead_time", "device_drop"})
 """Every inverter has both, and both do the same at one switching frequency and link voltage."""
 LATE = frozenset({"sampling_delay", "sensor_lag"})
 COMMON: Mapping[frozenset[str], Mapping[str, str]] = {
-    TOGETHER: {"voltage_v": "lost per leg", "half_current_a": "half of it reached at", "unequal_v": "leg V against the mean of the three",
-               "unequal_w": "leg W against the mean of the three"},
+    TOGETHER: {
+        "voltage_v": "lost per leg",
+        "half_current_a": "half of it reached at",
+        "unequal_v": "leg V against the mean of the three",
+        "unequal_w": "leg W against the mean of the three",
+    },
     LATE: {"delay_us": "delay in all", "time_constant_us": "delay in all"},
 }
 """What the members of a class share: the only sizes that are known while nobody knows which of them it is."""
@@ -110,7 +114,9 @@ def _main_key(cause: Cause) -> str:
     if not keys or members(cause) == TOGETHER:
         return next(iter(keys), "")
     entries = cause["parameters"]
-    alike = [k for k in keys if entries[k]["unit"] == entries[keys[0]]["unit"] and (k not in PLAIN_NUMBERS or k == keys[0])]
+    alike = [
+        k for k in keys if entries[k]["unit"] == entries[keys[0]]["unit"] and (k not in PLAIN_NUMBERS or k == keys[0])
+    ]
     return max(alike, key=lambda k: abs(entries[k]["value"]))
 
 
@@ -126,11 +132,17 @@ def plain_of(cause: Cause) -> Plain:
     if not cause["equivalent"]:
         return own
     if members(cause) == LATE:
-        return Plain("The current comes {size} late (sampling delay or sensor lag)", own.motor, "", PLAIN["sampling_delay"].measurement)
+        return Plain(
+            "The current comes {size} late (sampling delay or sensor lag)",
+            own.motor,
+            "",
+            PLAIN["sampling_delay"].measurement,
+        )
     others = [PLAIN[n] for n in cause["equivalent"]]
     is_one_side = all(o.motor == own.motor for o in others)
     return Plain(
-        f"Part of the error is {class_name(cause)}; this recording cannot say which", own.motor if is_one_side else "",
+        f"Part of the error is {class_name(cause)}; this recording cannot say which",
+        own.motor if is_one_side else "",
         is_normal=own.is_normal and all(o.is_normal for o in others),
     )
 

@@ -24,13 +24,22 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
         has = bool(seen.found.accepted)
         alike = look_alikes(seen.found.first_screening, seen.found.accepted)
         parts += [
-            *sections.causes(document), *sections.uncertain_names(document), *sections.next_test(document),
-            evidence.where(document, left, has), evidence.frequencies(left, has, tones),
-            sections.not_found(document), sections.parameters(document), evidence.for_experts(document, left, has, alike),
+            *sections.causes(document),
+            *sections.uncertain_names(document),
+            *sections.next_test(document),
+            evidence.where(document, left, has),
+            evidence.frequencies(left, has, tones),
+            sections.not_found(document),
+            sections.parameters(document),
+            evidence.for_experts(document, left, has, alike),
         ]
     parts.append(Section("The data", [*(document["audit"] or ("Nothing unusual was found in the file.",))]))
     return Page(
-        title=f"Diagnosis: {name}", headline=headline(document), tone=tone(document), facts=_facts(document), sections=parts,
+        title=f"Diagnosis: {name}",
+        headline=headline(document),
+        tone=tone(document),
+        facts=_facts(document),
+        sections=parts,
         footer=f"{PLUS_MINUS} Sizes are SI, per phase of the star equivalent; rms: root mean square, the effective value.",
     )
 
@@ -63,7 +72,9 @@ def points_page(document: Mapping[str, Any], name: str) -> Page:
         if document["verdict"] != "unexplained":
             below.append(sections.parameters(document))
     return Page(
-        title=f"Diagnosis of {document.get('test', 'test')} points: {name}", headline=headline(document), tone=tone(document),
+        title=f"Diagnosis of {document.get('test', 'test')} points: {name}",
+        headline=headline(document),
+        tone=tone(document),
         facts=facts,
         sections=below,
         footer=f"{PLUS_MINUS} Steady-state points; line values are effective values (rms), parameters per phase of the star equivalent.",
@@ -74,11 +85,21 @@ def _over_points(document: Document) -> list[Section]:
     if not document.get("points"):
         return []
     is_locked = document["test"] == "locked rotor"
-    over = "With leakage saturation or skin effect left out, the error bends over current or frequency" if is_locked else (
-        "With saturation or a loss that grows with flux left out, the error bends over the flux"
+    over = (
+        "With leakage saturation or skin effect left out, the error bends over current or frequency"
+        if is_locked
+        else ("With saturation or a loss that grows with flux left out, the error bends over the flux")
     )
     drawn = figures.over_points(document["points"], is_locked, bool(document["causes"]))
-    return [Section("Where the circuit is wrong", [
-        picture(drawn, "Simulated against measured, every test point. Dots: the circuit was fitted to all points. Rings: it was "
-                f"fitted to the other points and had to predict this one. {over}; what is left should scatter about zero."),
-    ])]
+    return [
+        Section(
+            "Where the circuit is wrong",
+            [
+                picture(
+                    drawn,
+                    "Simulated against measured, every test point. Dots: the circuit was fitted to all points. Rings: it was "
+                    f"fitted to the other points and had to predict this one. {over}; what is left should scatter about zero.",
+                ),
+            ],
+        )
+    ]

@@ -26,11 +26,13 @@ from commissioner.report.page import Section, Table, Tone
 SURE = 0.8
 """Names below this probability are marked."""
 NAMES = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"), ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
+    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
+    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
     ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
     ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
     ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
-    ("stator_inductance_h", "stator inductance L_s", 1e3, "mH"), ("total_resistance_ohm", "total resistance", 1.0, "Ω"),
+    ("stator_inductance_h", "stator inductance L_s", 1e3, "mH"),
+    ("total_resistance_ohm", "total resistance", 1.0, "Ω"),
     ("loss_at_highest_voltage_w", "loss at the highest voltage", 1.0, "W"),
 )
 
@@ -50,8 +52,10 @@ def causes(document: Document) -> list[Section]:
         if document["verdict"] == "nothing_significant" and is_finished(document):
             return []
         tried = "No cause can be named." if is_finished(document) else "No cause has been named yet."
-        below = "What helped to lower the error stands in the next block" if document.get("uncertain") else (
-            "What these data would have shown is listed further down"
+        below = (
+            "What helped to lower the error stands in the next block"
+            if document.get("uncertain")
+            else ("What these data would have shown is listed further down")
         )
         return [Section("Causes", [f"{tried} {below}."])]
     largest = max(c["gain_share"] for c in found)
@@ -62,21 +66,42 @@ def causes(document: Document) -> list[Section]:
             part_word(cause["gain_share"], largest),
             f"{percent(cause['gain_share'])} of the error's power comes back when this cause alone is left out",
         )
-        rows.append((
-            class_name(cause), size_words(cause), part if is_fit else "-",
-            f"{number(cause['strength_over_noise'], 2)} x noise" if is_fit else "-", sure_words(cause), _best_alternative(cause),
-            limit_words(document, cause["name"]) if is_fit else "-",
-        ))
+        rows.append(
+            (
+                class_name(cause),
+                size_words(cause),
+                part if is_fit else "-",
+                f"{number(cause['strength_over_noise'], 2)} x noise" if is_fit else "-",
+                sure_words(cause),
+                _best_alternative(cause),
+                limit_words(document, cause["name"]) if is_fit else "-",
+            )
+        )
         tones.append("warn" if cause["confidence"] < SURE else "good")
     said_of_others = [of_cause(c) for c in found[1:] if plain_of(c).motor]
-    return [Section("Causes", [
-        Table(
-            ("cause", "size", "part of the error", "its error", "sure of the name", "next best name", "smallest detectable"),
-            rows, tones, caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
-            "not add up to 100 %. Next best name: the other cause that explains most of the same.",
-        ),
-        *dict.fromkeys(said_of_others),
-    ])]
+    return [
+        Section(
+            "Causes",
+            [
+                Table(
+                    (
+                        "cause",
+                        "size",
+                        "part of the error",
+                        "its error",
+                        "sure of the name",
+                        "next best name",
+                        "smallest detectable",
+                    ),
+                    rows,
+                    tones,
+                    caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
+                    "not add up to 100 %. Next best name: the other cause that explains most of the same.",
+                ),
+                *dict.fromkeys(said_of_others),
+            ],
+        )
+    ]
 
 
 def _best_alternative(cause: Cause) -> str:
@@ -92,8 +117,15 @@ def _best_alternative(cause: Cause) -> str:
 def uncertain_names(document: Document) -> list[Section]:
     """What was seen without a sure name, and what was not seen but could hide behind a named cause."""
     out = []
-    for title, is_seen in (("Seen, but the name is uncertain", True), ("Not seen, but could hide behind a named cause", False)):
-        rows = [(spoken(u["name"]), u["why"], coded(u["decides"])) for u in document.get("uncertain", ()) if u["is_seen"] is is_seen]
+    for title, is_seen in (
+        ("Seen, but the name is uncertain", True),
+        ("Not seen, but could hide behind a named cause", False),
+    ):
+        rows = [
+            (spoken(u["name"]), u["why"], coded(u["decides"]))
+            for u in document.get("uncertain", ())
+            if u["is_seen"] is is_seen
+        ]
         if rows:
             tones: list[Tone] = ["warn" if is_seen else "good"] * len(rows)
             out.append(Section(title, [Table(("perhaps", "why it is uncertain", "what would decide it"), rows, tones)]))
@@ -117,10 +149,16 @@ def not_found(document: Document) -> Section:
     """Causes that would have been seen, from which size on; never one that a named cause hides or that was seen."""
     apart = {c["name"] for c in document["causes"]} | {n for c in document["causes"] for n in c["equivalent"]}
     apart |= {u["name"] for u in document.get("uncertain", ())}
-    rows = [(spoken(k), limit_words(document, k), coded(DECIDES.get(k, ""))) for k in document["detection_limits"] if k not in apart]
+    rows = [
+        (spoken(k), limit_words(document, k), coded(DECIDES.get(k, "")))
+        for k in document["detection_limits"]
+        if k not in apart
+    ]
     caption = "Smallest size that these data show beside the named causes."
     title = "Looked for and not found" if is_finished(document) else "Not found yet, and not all looked for"
-    return Section(title, [Table(("looked for", "smallest detectable", "what would show it better"), rows, caption=caption)])
+    return Section(
+        title, [Table(("looked for", "smallest detectable", "what would show it better"), rows, caption=caption)]
+    )
 
 
 def parameters(document: Document) -> Section:
@@ -130,17 +168,33 @@ def parameters(document: Document) -> Section:
         before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
         if before and after:
             change = before["value"] / after["value"] - 1.0
-            rows.append((title, _plain(before, scale, unit), _plain(after, scale, unit), f"{'+' if change > 0.0 else ''}{number(100.0 * change, 3)} %"))
-    return Section("How far the four-parameter values were off", [
-        coded(f"For judging the error only: do not enter these in a drive; use `commissioner identify`.{_flux_of(document)}"),
-        Table(("", "plain simulation", "with the causes", "plain one was off by"), rows),
-    ])
+            rows.append(
+                (
+                    title,
+                    _plain(before, scale, unit),
+                    _plain(after, scale, unit),
+                    f"{'+' if change > 0.0 else ''}{number(100.0 * change, 3)} %",
+                )
+            )
+    return Section(
+        "How far the four-parameter values were off",
+        [
+            coded(
+                f"For judging the error only: do not enter these in a drive; use `commissioner identify`.{_flux_of(document)}"
+            ),
+            Table(("", "plain simulation", "with the causes", "plain one was off by"), rows),
+        ],
+    )
 
 
 def _flux_of(document: Document) -> str:
     if "magnetizing_saturation" in {c["name"] for c in document["causes"]}:
         return " The magnetizing inductance here is the unsaturated value, above the one at rated flux."
-    return " The magnetizing inductance depends on the flux: here it holds for this test." if document["kind"] != "points" else ""
+    return (
+        " The magnetizing inductance depends on the flux: here it holds for this test."
+        if document["kind"] != "points"
+        else ""
+    )
 
 
 def _plain(entry: Mapping[str, Any], scale: float, unit: str) -> str:
@@ -154,13 +208,25 @@ def points_causes(document: Document) -> Section:
         return Section("Causes", ["No cause was found in these points."])
     largest = max(c["gain_share"] for c in found)
     rows = [
-        (class_name(c), size_words(c), hinted(part_word(c["gain_share"], largest), f"{percent(c['gain_share'])} comes back without it"),
-         chance(c["p_value"]))
+        (
+            class_name(c),
+            size_words(c),
+            hinted(part_word(c["gain_share"], largest), f"{percent(c['gain_share'])} comes back without it"),
+            chance(c["p_value"]),
+        )
         for c in found
     ]
     others = [of_cause(c) for c in found[1:]]
-    return Section("Causes", [
-        str(document["reason"]),
-        Table(("cause", "size", "part of the error", "chance that scatter made it up"), rows, ["good"] * len(rows), caption=PLUS_MINUS),
-        *others,
-    ])
+    return Section(
+        "Causes",
+        [
+            str(document["reason"]),
+            Table(
+                ("cause", "size", "part of the error", "chance that scatter made it up"),
+                rows,
+                ["good"] * len(rows),
+                caption=PLUS_MINUS,
+            ),
+            *others,
+        ],
+    )

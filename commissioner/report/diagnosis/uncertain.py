@@ -39,7 +39,8 @@ def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[dict[str
     why |= {name: behind[name] for name in behind if name in hidden}
     return [
         {"name": name, "why": reason, "decides": what_decides(name, seen.found.record), "is_seen": name not in hidden}
-        for name, reason in why.items() if name not in named
+        for name, reason in why.items()
+        if name not in named
     ]
 
 

@@ -64,7 +64,10 @@ def _points_headline(document: Document) -> str:
         return "No circuit of the catalogue describes these points."
     if not document["causes"]:
         return str(document["reason"]).replace(" (1 causes tested)", " (one cause tested)")
-    named = [f"{class_name(c)} ({main_name(c)} {size})" if (size := main_size(c)) else class_name(c) for c in ordered(document)]
+    named = [
+        f"{class_name(c)} ({main_name(c)} {size})" if (size := main_size(c)) else class_name(c)
+        for c in ordered(document)
+    ]
     return f"Constant parameters are not enough for these points; what is missing: {listed(named)}."
 
 
@@ -76,7 +79,9 @@ def _share(document: Document) -> str:
 
 def _how_much(document: Document, causes: list[Cause]) -> str:
     rest = len(causes) - 1
-    lesser = f"With {COUNTS.get(rest, rest)} lesser cause{'s' if rest > 1 else ''} it explains" if rest else "It explains"
+    lesser = (
+        f"With {COUNTS.get(rest, rest)} lesser cause{'s' if rest > 1 else ''} it explains" if rest else "It explains"
+    )
     return f"{lesser} {_share(document)} of the simulation's error."
 
 
@@ -113,7 +118,10 @@ def meaning(document: Document) -> list[str]:
     """What it means for the motor, and how much of the error is explained, a paragraph each."""
     if document["verdict"] == "refused":
         error = document.get("error")
-        return [said(str(document["reason"])), *([f"Seen: {_seen(error['value'])}; expected: {error['limit']}."] if error else [])]
+        return [
+            said(str(document["reason"])),
+            *([f"Seen: {_seen(error['value'])}; expected: {error['limit']}."] if error else []),
+        ]
     causes, out = ordered(document), []
     is_points = document["kind"] == "points"
     if not is_finished(document):
@@ -152,7 +160,9 @@ def first_capital(text: str) -> str:
 
 def _of_points(document: Document) -> str:
     gain = document["gain"]
-    before, after = (f"{number(gain[f'rmse_{k}_a'], 2)} A ({percent(gain[f'relative_error_{k}'])})" for k in ("before", "after"))
+    before, after = (
+        f"{number(gain[f'rmse_{k}_a'], 2)} A ({percent(gain[f'relative_error_{k}'])})" for k in ("before", "after")
+    )
     return f"On points kept aside for checking, the error goes from {before} with constant parameters to {after}."
 
 
@@ -195,9 +205,17 @@ def next_promise(plan: Mapping[str, Any]) -> str:
     clear = plan.get("predicted_sigma")
     times = "more than 100" if clear and clear > 100 else f"about {clear:.0f}" if clear else ""
     repeats = plan.get("repeats", 2)
-    count = "One new recording is enough" if repeats == 1 else "Record it twice" if repeats == 2 else f"Record it {repeats} times"
-    shown = f": the difference will be {times} times its own uncertainty (10 are plenty)" if times else (
-        "; what differs between equal recordings is chance"
+    count = (
+        "One new recording is enough"
+        if repeats == 1
+        else "Record it twice"
+        if repeats == 2
+        else f"Record it {repeats} times"
+    )
+    shown = (
+        f": the difference will be {times} times its own uncertainty (10 are plenty)"
+        if times
+        else ("; what differs between equal recordings is chance")
     )
     return f"{count}{shown}."
 

@@ -54,9 +54,12 @@ def _facts(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]]) -> I
         yield "Begun (UTC)", str(journal[0]["utc"])[:16].replace("T", " ")
     plate = next((line["record"]["nameplate"] for line in journal if line["kind"] == "job"), None)
     if plate:
-        yield "Motor", (
-            f"{1e-3 * plate['rated_power_w']:g} kW, {plate['rated_voltage_v']:g} V {plate['connection']}, "
-            f"{plate['rated_current_a']:g} A, {plate['rated_speed_rpm']:g} 1/min"
+        yield (
+            "Motor",
+            (
+                f"{1e-3 * plate['rated_power_w']:g} kW, {plate['rated_voltage_v']:g} V {plate['connection']}, "
+                f"{plate['rated_current_a']:g} A, {plate['rated_speed_rpm']:g} 1/min"
+            ),
         )
     drive = result.get("drive") or {}
     if drive:

@@ -97,7 +97,9 @@ def _result(folder: Path) -> dict[str, Any] | None:
 def _drive(records: list[dict[str, Any]]) -> str:
     for found in _of(records, "drive_identified"):
         number = found.get("serial_number")
-        return f"{found.get('drive_type')} #{number}" if number else f"{found.get('drive_type')}, serial number not known"
+        return (
+            f"{found.get('drive_type')} #{number}" if number else f"{found.get('drive_type')}, serial number not known"
+        )
     return "not identified"
 
 

@@ -155,7 +155,9 @@ def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
     document = read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
     missing = [key for key in needed if key not in document]
     if missing or not document:
-        raise damaged(folder, name, f"no {missing[0]}" if document else "not readable" if path.is_file() else "no such file")
+        raise damaged(
+            folder, name, f"no {missing[0]}" if document else "not readable" if path.is_file() else "no such file"
+        )
     return document
 
 

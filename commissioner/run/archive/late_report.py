@@ -21,7 +21,9 @@ def mark_restored(run: RunSummary) -> None:
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     with suppress(OSError), closing(RunFolder(page.parent)) as folder:
         text = page.read_text("utf-8")
-        folder.save_text(page.name, with_notice(text, f"Restored on {when}: the drive holds the values it had before this run."))
+        folder.save_text(
+            page.name, with_notice(text, f"Restored on {when}: the drive holds the values it had before this run.")
+        )
 
 
 def make_report(run: RunSummary) -> None:

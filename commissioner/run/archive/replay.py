@@ -157,8 +157,13 @@ def _decision(kind: str, record: object) -> dict[str, Any]:
 
 
 def _decide_again(
-    job: Job, findings: Findings, journal: list[dict[str, Any]], folder: Path,
-    announcer: Announcer | None = None, *, with_end: bool = False,
+    job: Job,
+    findings: Findings,
+    journal: list[dict[str, Any]],
+    folder: Path,
+    announcer: Announcer | None = None,
+    *,
+    with_end: bool = False,
 ) -> Iterator[dict[str, Any]]:
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
     blocks = (block for _, block in read_blocks(folder / "blocks.bin"))
@@ -247,7 +252,9 @@ def read_snapshot(folder: Path, journal: list[dict[str, Any]]) -> ParameterSnaps
     taken = [
         line["record"]["reply"]
         for line in journal
-        if line["kind"] == "reply" and isinstance(line["record"], dict) and line["record"].get("command") == "TakeSnapshot"
+        if line["kind"] == "reply"
+        and isinstance(line["record"], dict)
+        and line["record"].get("command") == "TakeSnapshot"
     ]
     if taken and document != taken[-1]:
         raise damaged(folder, "snapshot.json", _otherwise(document, taken[-1]))

@@ -172,7 +172,38 @@ def _numbers(m: Machine) -> tuple[float, ...]:
     turn = 0.0 if math.isinf(m.cut_off_hz) else 2.0 * math.pi * m.cut_off_hz
     knee = 0.0 if math.isinf(m.knee_wb) else 1.0 / m.knee_wb
     iron = 0.0 if math.isinf(m.iron_ohm) else m.iron_ohm
-    return (m.loop_a, m.loop_wb, m.meet_wb, m.r_s, m.warming / 60.0, m.r_r, m.l_s, m.l_r, m.l_m, knee, m.foot, m.foot_wb, iron, m.leg_v, m.leg_a, m.legs, m.lag_s, turn, m.delay_s, m.read_late_s, m.sag / PLATE["rated_power_w"], m.sag_s, m.again_s, m.has_diodes, m.bar_share, m.bar_s, m.ripple, m.ripple_hz, m.swing, 2.0 * math.pi * m.swing_hz)
+    return (
+        m.loop_a,
+        m.loop_wb,
+        m.meet_wb,
+        m.r_s,
+        m.warming / 60.0,
+        m.r_r,
+        m.l_s,
+        m.l_r,
+        m.l_m,
+        knee,
+        m.foot,
+        m.foot_wb,
+        iron,
+        m.leg_v,
+        m.leg_a,
+        m.legs,
+        m.lag_s,
+        turn,
+        m.delay_s,
+        m.read_late_s,
+        m.sag / PLATE["rated_power_w"],
+        m.sag_s,
+        m.again_s,
+        m.has_diodes,
+        m.bar_share,
+        m.bar_s,
+        m.ripple,
+        m.ripple_hz,
+        m.swing,
+        2.0 * math.pi * m.swing_hz,
+    )
 
 
 @njit(cache=True)
@@ -232,12 +263,37 @@ def _middle(x, own, l_s, l_m, knee, foot, foot_wb, loops):
     middle = (x[0] / l_s + x[1] / own - loops) / (1.0 / l_s + 1.0 / own + 1.0 / l_m)
     for _ in range(12 if knee > 0.0 or foot > 0.0 else 0):
         wrong = (x[0] - middle) / l_s + (x[1] - middle) / own - _magnetizing(middle, l_m, knee, foot, foot_wb) - loops
-        middle += wrong / (1.0 / l_s + 1.0 / own + (1.0 + 9.0 * (abs(middle) * knee) ** 8 + foot * math.exp(-((abs(middle) / foot_wb) ** 2))) / l_m)
+        middle += wrong / (
+            1.0 / l_s
+            + 1.0 / own
+            + (1.0 + 9.0 * (abs(middle) * knee) ** 8 + foot * math.exp(-((abs(middle) / foot_wb) ** 2))) / l_m
+        )
     return middle
 
 
 @njit(cache=True)
-def _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega):
+def _rates(
+    x,
+    v,
+    loops,
+    r_s,
+    r_r,
+    l_s,
+    l_r,
+    l_m,
+    knee,
+    foot,
+    foot_wb,
+    iron,
+    leg_v,
+    leg_a,
+    legs,
+    lag,
+    turn,
+    bar,
+    diffusion,
+    omega,
+):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
 
     currents of the bar's layers.
@@ -270,7 +326,45 @@ def _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_
 
 
 @njit(cache=True)
-def _simulated(volts, period, fine, begin, left, kept, plays, loop_a, loop_wb, meet_wb, cold, warming, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, delay, read_late, sag, sag_s, again_s, diodes, bar, diffusion, ripple, ripple_hz, swing, swings):
+def _simulated(
+    volts,
+    period,
+    fine,
+    begin,
+    left,
+    kept,
+    plays,
+    loop_a,
+    loop_wb,
+    meet_wb,
+    cold,
+    warming,
+    r_r,
+    l_s,
+    l_r,
+    l_m,
+    knee,
+    foot,
+    foot_wb,
+    iron,
+    leg_v,
+    leg_a,
+    legs,
+    lag,
+    turn,
+    delay,
+    read_late,
+    sag,
+    sag_s,
+    again_s,
+    diodes,
+    bar,
+    diffusion,
+    ripple,
+    ripple_hz,
+    swing,
+    swings,
+):
     """Current (n,) that the sensors see, `delay` old, before noise; what the link has lost then, of it; and the last rotor flux."""
     n, h = volts.size, period / fine
     x = np.zeros(7 + LAYERS.size, dtype=np.complex128)
@@ -289,23 +383,132 @@ def _simulated(volts, period, fine, begin, left, kept, plays, loop_a, loop_wb, m
         lost[k] = sag * drops - ripple * math.cos(2.0 * math.pi * ripple_hz * (k + 0.5) * period)
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k1, seen, drawn = _rates(
+                x,
+                v,
+                loops,
+                r_s,
+                r_r,
+                l_s,
+                l_r,
+                l_m,
+                knee,
+                foot,
+                foot_wb,
+                iron,
+                leg_v,
+                leg_a,
+                legs,
+                lag,
+                turn,
+                bar,
+                diffusion,
+                omega,
+            )
             memory[at % (late + 1)] = seen
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
                 v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * k * period))
-                k1, seen, drawn = _rates(x, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+                k1, seen, drawn = _rates(
+                    x,
+                    v,
+                    loops,
+                    r_s,
+                    r_r,
+                    l_s,
+                    l_r,
+                    l_m,
+                    knee,
+                    foot,
+                    foot_wb,
+                    iron,
+                    leg_v,
+                    leg_a,
+                    legs,
+                    lag,
+                    turn,
+                    bar,
+                    diffusion,
+                    omega,
+                )
             at += 1
-            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
-            k4, seen, drawn = _rates(x + h * k3, v, loops, r_s, r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion, omega)
+            k2, seen, drawn = _rates(
+                x + 0.5 * h * k1,
+                v,
+                loops,
+                r_s,
+                r_r,
+                l_s,
+                l_r,
+                l_m,
+                knee,
+                foot,
+                foot_wb,
+                iron,
+                leg_v,
+                leg_a,
+                legs,
+                lag,
+                turn,
+                bar,
+                diffusion,
+                omega,
+            )
+            k3, seen, drawn = _rates(
+                x + 0.5 * h * k2,
+                v,
+                loops,
+                r_s,
+                r_r,
+                l_s,
+                l_r,
+                l_m,
+                knee,
+                foot,
+                foot_wb,
+                iron,
+                leg_v,
+                leg_a,
+                legs,
+                lag,
+                turn,
+                bar,
+                diffusion,
+                omega,
+            )
+            k4, seen, drawn = _rates(
+                x + h * k3,
+                v,
+                loops,
+                r_s,
+                r_r,
+                l_s,
+                l_r,
+                l_m,
+                knee,
+                foot,
+                foot_wb,
+                iron,
+                leg_v,
+                leg_a,
+                legs,
+                lag,
+                turn,
+                bar,
+                diffusion,
+                omega,
+            )
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             if loop_a > 0.0:
                 flux = x[2] if iron > 0.0 else _middle(x, (1.0 - bar) * l_r, l_s, l_m, knee, foot, foot_wb, loops)
                 loops = _relays(flux, plays, loop_a, loop_wb, meet_wb)
             if sag > 0.0:
-                load += h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - (0.0 if diodes and load < 0.0 else load))
+                load += (
+                    h / sag_s * (1.5 * (volts[k] * drawn.conjugate()).real - (0.0 if diodes and load < 0.0 else load))
+                )
                 drops = drops + h / again_s * (load - drops) if again_s > 0.0 else load
-            v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 1.5) / fine) * period))
+            v = volts[k] * (
+                1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * (k + (step + 1.5) / fine) * period)
+            )
     return out, lost, x[1]

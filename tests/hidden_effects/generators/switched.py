@@ -67,7 +67,16 @@ def switched(drive: Drive, seconds: float = 2.0, seed: int = 1) -> StandstillRec
         volts = _command(drive, level, bias, seconds, np.random.default_rng([seed, 0 if k == 3 else k]))
         angles = math.radians(axis) - 2.0 * math.pi / 3.0 * np.arange(3)
         legs = np.cos(angles)[:, None] * volts
-        numbers = (drive.r_s, drive.r_r, drive.l_sigma, drive.l_m, drive.lag_s, drive.dead_s, drive.charging_ohm, drive.link_f)
+        numbers = (
+            drive.r_s,
+            drive.r_r,
+            drive.l_sigma,
+            drive.l_m,
+            drive.lag_s,
+            drive.dead_s,
+            drive.charging_ohm,
+            drive.link_f,
+        )
         phases, link = _through_the_pulses(np.ascontiguousarray(legs), *numbers)
         phases += drive.noise * PEAK_A * random.normal(size=phases.shape)
         t = k * (seconds + PAUSE_S) + np.arange(volts.size) * PERIOD_S

@@ -188,7 +188,8 @@ PYMODBUS_ERRORS = [
 
 def test_the_list_of_pymodbus_errors_is_complete():
     defined = {
-        value for value in vars(pymodbus_exceptions).values()
+        value
+        for value in vars(pymodbus_exceptions).values()
         if isinstance(value, type) and issubclass(value, pymodbus_exceptions.ModbusException)
     }
     assert defined - {pymodbus_exceptions.ModbusException} == set(PYMODBUS_ERRORS)

@@ -176,7 +176,10 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
 
 
 @FEW
-@given(st.binary(max_size=400), st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms", ".mf4", ".cfg", ".cff"]))
+@given(
+    st.binary(max_size=400),
+    st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms", ".mf4", ".cfg", ".cff"]),
+)
 def test_random_bytes_give_a_typed_error_in_every_importer(tmp_path, data, ending):
     path = tmp_path / f"r{ending}"
     path.write_bytes(data)
@@ -196,7 +199,9 @@ def matlab_files():
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.booleans(), st.integers(0, 10**6), st.integers(1, 255), st.booleans())
-def test_a_damaged_matlab_file_gives_a_typed_error_or_a_recording(tmp_path, matlab_files, compressed, place, flip, is_cut):
+def test_a_damaged_matlab_file_gives_a_typed_error_or_a_recording(
+    tmp_path, matlab_files, compressed, place, flip, is_cut
+):
     data = matlab_files[compressed]
     place %= len(data)
     path = tmp_path / "r.mat"
@@ -232,7 +237,9 @@ def test_matlab_arrays_come_as_scipy_wrote_them(tmp_path, compressed, kind):
     assert {name for name in found if name[0] in "tz"} == set()
 
 
-CELLS = st.sampled_from(["t", "ia", "fs", "0", "1,5", "2.5", "-1", "inf", "nan", "", "x", "mA", "(V)", '"', "\x00", "# fs: 0"])
+CELLS = st.sampled_from(
+    ["t", "ia", "fs", "0", "1,5", "2.5", "-1", "inf", "nan", "", "x", "mA", "(V)", '"', "\x00", "# fs: 0"]
+)
 
 
 @FEW
@@ -252,7 +259,7 @@ HOSTILE_TOML = {
     "inline keys": "\n".join(f"k{n} = {{{'.'.join('a' * 480)} = 1}}" for n in range(250)),
     "a huge file": "#" * 250_001,
     "no text": "\udcff",
-    "code": 'rated_power_w = "__import__(\'os\').system(\'true\')"',
+    "code": "rated_power_w = \"__import__('os').system('true')\"",
 }
 
 
@@ -274,7 +281,9 @@ def test_random_bytes_as_toml_are_a_configuration_error(tmp_path, data):
         assert isinstance(typed(lambda act=read: act(str(path))), ConfigurationError)
 
 
-@pytest.mark.parametrize("text", ["[" * 200_000, "1" * 10_000, "{}", json.dumps({"parameters": [], "version": 1}), "\x00"])
+@pytest.mark.parametrize(
+    "text", ["[" * 200_000, "1" * 10_000, "{}", json.dumps({"parameters": [], "version": 1}), "\x00"]
+)
 @pytest.mark.parametrize("read", [plate.start_from, baseline.read])
 def test_hostile_json_is_a_configuration_error(tmp_path, text, read):
     path = tmp_path / "stranger.json"

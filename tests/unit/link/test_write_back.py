@@ -28,8 +28,11 @@ class Bench:
         self.now = 0.0
         self.journal = []
         self.inverter = Inverter(
-            self.drive, PROFILE, lambda i: self.journal.append((i.action, dict(i.values), len(self.drive.log))),
-            sleep=self.sleep, clock=lambda: self.now,
+            self.drive,
+            PROFILE,
+            lambda i: self.journal.append((i.action, dict(i.values), len(self.drive.log))),
+            sleep=self.sleep,
+            clock=lambda: self.now,
         )
         self.snapshot = self.inverter.snapshot()
 
@@ -100,7 +103,9 @@ def test_a_journal_that_cannot_write_stops_before_the_commit(bench):
 @pytest.mark.parametrize(
     ("item", "value"),
     [
-        ("serial_number", 4712), ("firmware_version", 0x00010204), ("rotor_resistance", 2.1),
+        ("serial_number", 4712),
+        ("firmware_version", 0x00010204),
+        ("rotor_resistance", 2.1),
         ("stored_rotor_resistance", 2.1),
     ],
 )

@@ -50,7 +50,19 @@ def configuration(form, *, rate="8000,400", year=",1999", side="P", ratio="1,1")
     volts = [f"{k + 4},,{'ABC'[k]},,kV,{VOLTS_PER_COUNT / 1000},0,0,-99999,99999,1,1,P" for k in range(3)]
     rates = ["1", rate] if rate else ["0", "0,400"]
     dates = ["01/02/2026,10:00:00.000000", "01/02/2026,10:00:00.000000"]
-    lines = [f"pump house,3{year}", "8,6A,2D", *currents, *volts, "1,trip,,,0", "2,run,,,0", "50", *rates, *dates, form, "1"]
+    lines = [
+        f"pump house,3{year}",
+        "8,6A,2D",
+        *currents,
+        *volts,
+        "1,trip,,,0",
+        "2,run,,,0",
+        "50",
+        *rates,
+        *dates,
+        form,
+        "1",
+    ]
     return "\r\n".join(lines) + "\r\n"
 
 
@@ -99,13 +111,17 @@ def test_secondary_values_come_on_the_primary_side(tmp_path):
 def test_a_single_file_comtrade(tmp_path):
     path = tmp_path / "fault.cff"
     parts = [b"--- file type: CFG ---\r\n", configuration("BINARY32", year=",2013").encode()]
-    parts += [b"--- file type: INF ---\r\n", f"--- file type: DAT BINARY32: {len(samples('BINARY32'))} ---\r\n".encode()]
+    parts += [
+        b"--- file type: INF ---\r\n",
+        f"--- file type: DAT BINARY32: {len(samples('BINARY32'))} ---\r\n".encode(),
+    ]
     path.write_bytes(b"".join([*parts, samples("BINARY32")]))
     assert_is_the_recording(read_running(path), volts=0.01)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"), [("8000,400", "8000,200", ""), ("6A", "999999A", "configuration"), ("BINARY32", "MORSE", "MORSE")]
+    ("old", "new", "says"),
+    [("8000,400", "8000,200", ""), ("6A", "999999A", "configuration"), ("BINARY32", "MORSE", "MORSE")],
 )
 def test_a_comtrade_that_contradicts_itself_is_refused_or_read_whole(tmp_path, old, new, says):
     path = write(tmp_path, "BINARY32")

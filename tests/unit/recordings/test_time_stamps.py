@@ -15,7 +15,9 @@ def period_of(time_s, **metadata):
     return sample_period(Table({"time_s": time_s}, metadata, "file"), np.zeros(time_s.size))
 
 
-@pytest.mark.parametrize(("rate_hz", "decimals", "begin_s"), [(6000.0, 6, 0.0), (8000.0, 5, 0.0), (5000.0, 6, 1.79e9), (3000.0, 5, 7.3)])
+@pytest.mark.parametrize(
+    ("rate_hz", "decimals", "begin_s"), [(6000.0, 6, 0.0), (8000.0, 5, 0.0), (5000.0, 6, 1.79e9), (3000.0, 5, 7.3)]
+)
 def test_the_period_is_not_bent_by_rounded_stamps(rate_hz, decimals, begin_s):
     stamps = np.round(begin_s + np.arange(30_000) / rate_hz, decimals)
     assert period_of(stamps) == pytest.approx(1.0 / rate_hz, rel=1e-5)

@@ -38,7 +38,14 @@ def test_a_size_has_the_digits_of_its_interval(entry, words):
 
 def test_a_sizes_name_keeps_the_phase_and_loses_the_unit():
     keys = ("offset_v_a", "half_current_a", "gain_w_over_u", "amplitude_50_hz_a", "drift_u_a_per_min", "voltage_v")
-    assert [quantity_name(k) for k in keys] == ["offset v", "half current", "w against u", "amplitude 50 Hz", "drift u", "voltage"]
+    assert [quantity_name(k) for k in keys] == [
+        "offset v",
+        "half current",
+        "w against u",
+        "amplitude 50 Hz",
+        "drift u",
+        "voltage",
+    ]
 
 
 def test_numbers_have_no_tails_and_nothing_is_certain():
@@ -49,7 +56,10 @@ def test_numbers_have_no_tails_and_nothing_is_certain():
 
 
 def test_a_detection_limit_is_read_in_the_unit_of_its_size():
-    limits = {"sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}}, "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}}}
+    limits = {
+        "sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}},
+        "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}},
+    }
     document = {"detection_limits": limits}
     assert limit_words(document, "sensor_offset") == "71 µA"
     assert limit_words(document, "dc_link_sag") == "0.12 %"
@@ -64,7 +74,9 @@ def test_a_next_experiment_promises_only_what_was_predicted():
 
 
 def test_a_refusal_has_a_headline():
-    assert "cannot carry" in headline(refused_document(refused("too short", 3, "at least 5", "record longer"), "recording"))
+    assert "cannot carry" in headline(
+        refused_document(refused("too short", 3, "at least 5", "record longer"), "recording")
+    )
 
 
 def screening(gram):

@@ -142,6 +142,8 @@ def test_the_last_word_of_the_journal_says_which_parameters_the_drive_holds(fold
 @pytest.mark.parametrize("mark", [": ", ":", " = ", "="])
 def test_a_comment_with_an_equals_sign_is_a_value_too(tmp_path, mark):
     path = tmp_path / "a.csv"
-    path.write_text(f"# rated_current_a{mark}5.2\n# note{mark}at 20:15, R=3\n# nothing\ntime_s,current_u_a\n0,1\n0.001,2\n")
+    path.write_text(
+        f"# rated_current_a{mark}5.2\n# note{mark}at 20:15, R=3\n# nothing\ntime_s,current_u_a\n0,1\n0.001,2\n"
+    )
     metadata = read_table(path).metadata
     assert metadata["rated_current_a"] == 5.2 and metadata["note"] == "at 20:15, R=3"

@@ -69,7 +69,9 @@ def with_ripple(setting, nominal, frequency_hz):
         turn = np.cos(2.0 * np.pi * frequency_hz * segment.time_s)
         s = 2j * np.pi * np.fft.rfftfreq(segment.count, segment.period_s)
         impedance = r_s + s * l_sigma + s * l_m * r_r / (r_r + s * l_m)
-        segments.append((segment, np.fft.irfft(np.fft.rfft(0.01 * segment.voltage_axis_v * turn) / impedance, segment.count)))
+        segments.append(
+            (segment, np.fft.irfft(np.fft.rfft(0.01 * segment.voltage_axis_v * turn) / impedance, segment.count))
+        )
     return segments
 
 
@@ -94,10 +96,20 @@ def test_a_foot_of_the_magnetizing_curve_is_not_cut_off_on_twice_the_knots(setti
     """It had been, where no coefficient beyond a quarter of the flux might fall: the finer fit began 1 700 in chi2 higher."""
     coarse, fine = even_vectors(intervals), even_vectors(2 * intervals)
     lower = [
-        np.array([t.lower for t in CATALOGUE["magnetizing_saturation"].terms(replace(setting, layout=replace(setting.layout, iron_vectors=v)))][:-1])
+        np.array(
+            [
+                t.lower
+                for t in CATALOGUE["magnetizing_saturation"].terms(
+                    replace(setting, layout=replace(setting.layout, iron_vectors=v))
+                )
+            ][:-1]
+        )
         for v in (coarse, fine)
     ]
-    weights = np.where(np.isinf(lower[0]), -1.0, 0.0) + np.r_[np.zeros(intervals // 2), np.ones(intervals + 1 - intervals // 2)]
+    weights = (
+        np.where(np.isinf(lower[0]), -1.0, 0.0)
+        + np.r_[np.zeros(intervals // 2), np.ones(intervals + 1 - intervals // 2)]
+    )
     assert (weights < 0.0).sum() >= 3
     halved = with_halved_intervals(coarse, weights, fine)
     assert np.all(halved > lower[1] - 1e-9)

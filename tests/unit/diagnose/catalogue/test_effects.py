@@ -228,7 +228,9 @@ def test_bars_that_carry_most_of_the_current_stay_stable_where_loops_are_asked_f
     """Paths of 11 times the conductance and 0.2 ms make a mode of 12 periods' rate: steps for 0.2 ms alone let it grow."""
     bars, loops = CATALOGUE["rotor_skin_effect"].terms(setting), CATALOGUE["magnetic_hysteresis"].terms(setting)
     r_s, r_r, l_sigma, l_m = nominal.nominal
-    fast = min((t for t in bars), key=lambda t: abs(setting.layout.branch_time_s[t.index] - setting.facts.sample_period_s))
+    fast = min(
+        (t for t in bars), key=lambda t: abs(setting.layout.branch_time_s[t.index] - setting.facts.sample_period_s)
+    )
     model = Model((r_s, 20.0 * r_r, l_sigma, l_m), bars, tuple(11.0 / (20.0 * r_r) if t is fast else 0.0 for t in bars))
     jacobian = predict(model, setting.record, 0, setting.layout, wanted=(*bars, *loops)).jacobian
     assert np.isfinite(jacobian).all() and np.abs(jacobian).max() < 1e6

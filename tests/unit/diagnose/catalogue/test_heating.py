@@ -55,7 +55,8 @@ def test_leaks_in_place_of_one_between_them_read_as_that_one(setting, leak_s):
 
 
 @pytest.mark.parametrize(
-    ("name", "rise", "leak_s"), [("rotor_heating", 3.0, 8.0), ("rotor_heating", 2.0, 25.0), ("stator_heating", 0.3, 12.0)]
+    ("name", "rise", "leak_s"),
+    [("rotor_heating", 3.0, 8.0), ("rotor_heating", 2.0, 25.0), ("stator_heating", 0.3, 12.0)],
 )
 def test_heat_that_leaks_away_within_the_recording_is_named_with_its_first_rise(name, rise, leak_s):
     document = copy.deepcopy(hidden.draw(SEED, "one", only=name, noise="white", seconds=3.0).document)

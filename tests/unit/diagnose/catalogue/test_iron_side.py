@@ -40,7 +40,9 @@ def test_causes_that_place_one_iron_share_what_is_left_to_either_side(setting, n
 
 
 def test_one_cause_has_all_of_it(setting, nominal):
-    assert reach(bent(setting, nominal, IRON[:1], splits=[0.3]), setting.layout) == pytest.approx(np.array([[-0.8, 0.2]]))
+    assert reach(bent(setting, nominal, IRON[:1], splits=[0.3]), setting.layout) == pytest.approx(
+        np.array([[-0.8, 0.2]])
+    )
 
 
 def test_a_fit_ends_on_the_stators_side_and_not_beyond(setting, nominal):
@@ -50,7 +52,8 @@ def test_a_fit_ends_on_the_stators_side_and_not_beyond(setting, nominal):
     noise = np.random.default_rng(5)
     currents = [predict(truth, record, k, layout).currents_a for k in range(len(record.segments))]
     segments = tuple(
-        replace(s, currents_a=i + 0.01 * noise.standard_normal(i.shape)) for s, i in zip(record.segments, currents, strict=True)
+        replace(s, currents_a=i + 0.01 * noise.standard_normal(i.shape))
+        for s, i in zip(record.segments, currents, strict=True)
     )
     seen = Record(segments, record.facts, record.channel_names, record.channels)
     found = fit(bent(setting, nominal, IRON, splits=[0.2, 0.28], height=1.0), seen, layout, WHITE)

@@ -24,19 +24,26 @@ def looping(setting, nominal, radii_wb, currents_a):
 
 
 def currents(model, setting):
-    return np.concatenate([predict(model, setting.record, k, setting.layout).currents_a for k in range(len(setting.record.segments))], axis=1)
+    return np.concatenate(
+        [predict(model, setting.record, k, setting.layout).currents_a for k in range(len(setting.record.segments))],
+        axis=1,
+    )
 
 
 def test_a_loop_that_the_flux_no_longer_fills_is_inductance(setting, nominal):
     """A large motor's flux had been taken for twice what it was: a stop of 1.8 times the flux carried 31 A, and L_M was twice the true one."""
     flux = setting.iron_flux_wb
     model, there = looping(setting, nominal, [0.2 * flux, 1.8 * flux], [0.05, 0.6])
-    there = replace(there, layout=replace(there.layout, iron_top_wb=2.0 * there.layout.iron_top_wb), iron_flux_wb=2.0 * flux)
+    there = replace(
+        there, layout=replace(there.layout, iron_top_wb=2.0 * there.layout.iron_top_wb), iron_flux_wb=2.0 * flux
+    )
     fresh, spread = respread(model, there)
     assert fresh.of("magnetic_hysteresis") == {"loop_0": 0.05, "split": -0.5}
     assert spread.layout.stop_radius_wb == pytest.approx(np.array([[0.2 * flux, 0.0]]))
     assert 1.0 / fresh.nominal[3] == pytest.approx(1.0 / nominal.nominal[3] + 0.6 / (1.8 * flux))
-    assert currents(fresh, spread) == pytest.approx(currents(model, there), abs=1e-3 * np.abs(currents(model, there)).max())
+    assert currents(fresh, spread) == pytest.approx(
+        currents(model, there), abs=1e-3 * np.abs(currents(model, there)).max()
+    )
 
 
 def test_closer_radii_are_looked_for_where_the_flux_fills_them(setting, nominal):

@@ -34,8 +34,11 @@ VALUES = {
     "sensor_nonlinearity": {f"{p}_{k}": 0.01 for p in ("odd", "even") for k in "uvw"},
     "clock_drift": {"drift": 40.0},
     "inductance_anisotropy": {
-        "leakage_cos": 0.03 * (1.0 - SHARE), "leakage_sin": -0.02 * (1.0 - SHARE),
-        "magnetizing_cos": -0.03 * SHARE, "magnetizing_sin": 0.02 * SHARE, "split": 0.5,
+        "leakage_cos": 0.03 * (1.0 - SHARE),
+        "leakage_sin": -0.02 * (1.0 - SHARE),
+        "magnetizing_cos": -0.03 * SHARE,
+        "magnetizing_sin": 0.02 * SHARE,
+        "split": 0.5,
     },  # a leakage that lies on the rotor's side, as in the Gamma circuit
     "resistance_anisotropy": {"stator_cos": 0.02, "stator_sin": 0.03},
     "cable_capacitance": {"at": 3e-8},
@@ -161,7 +164,8 @@ def test_numbers_that_no_motor_has_are_refused(setting):
     term = good["terms"][0]
     for change, said in (
         ({"nominal": good["nominal"] | {"stator_resistance_ohm": -3.0}}, "above zero"),
-        ({"terms": [term | {"value": float("nan")}]}, "finite"), ({"terms": [term | {"kind": 77}]}, "kind 77"),
+        ({"terms": [term | {"value": float("nan")}]}, "finite"),
+        ({"terms": [term | {"kind": 77}]}, "kind 77"),
         ({"dictionary": {}}, "dictionary"),
     ):
         with pytest.raises(ValueError, match=said):

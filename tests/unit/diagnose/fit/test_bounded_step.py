@@ -12,7 +12,9 @@ from commissioner.diagnose.fit.gauss_newton import bounded_step
 def _drawn(seed: int, numbers: int, bounded: int):
     random = np.random.default_rng(seed)
     directions = random.standard_normal((300, numbers)) * 10.0 ** random.uniform(-3.0, 3.0, numbers)
-    residual = random.standard_normal(300) + directions @ (3.0 * random.standard_normal(numbers) / np.abs(directions).max(0))
+    residual = random.standard_normal(300) + directions @ (
+        3.0 * random.standard_normal(numbers) / np.abs(directions).max(0)
+    )
     low, high = np.full(numbers, -np.inf), np.full(numbers, np.inf)
     few = random.choice(numbers, bounded, replace=False)
     low[few], high[few] = 0.0, 1.0 / np.abs(directions).max(0)[few]

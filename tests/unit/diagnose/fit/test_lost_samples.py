@@ -66,6 +66,7 @@ def test_samples_lost_before_the_first_one_of_a_segment_are_found(nominal, setti
 @pytest.mark.parametrize("ppm", [100.0, 300.0])
 def test_a_clock_that_runs_fast_is_not_a_staircase_of_losses(nominal, setting, ppm):
     """By nearly two samples within a segment."""
+
     def early(k, rows):
         t = np.arange(rows.shape[1])
         return np.stack([np.interp(t * (1.0 + 1e-6 * ppm), t, row) for row in rows])
@@ -92,7 +93,10 @@ def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, s
             rows[:, held] = rows[:, held - 1]
         return rows
 
-    record, noise = record_with(nominal, setting, change), measure_noise(record_with(nominal, setting, lambda k, rows: rows))
+    record, noise = (
+        record_with(nominal, setting, change),
+        measure_noise(record_with(nominal, setting, lambda k, rows: rows)),
+    )
     true = fit(nominal, record, setting.layout, noise)
     excess = true.chi2 / float(true.normal.count.sum()) - 1.0
     low = replace(noise, sigma_a=noise.sigma_a / np.sqrt(1.0 + excess), uncertainty=excess)
@@ -100,7 +104,6 @@ def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, s
     losses = _mended(record, current, setting.layout, low, lambda _: None)[2]
     assert sum(x.samples for x in losses) == held.size
     assert _mended(record, current, setting.layout, replace(low, uncertainty=0.0), lambda _: None)[2] == ()
-
 
 
 def with_spikes(rows, random):

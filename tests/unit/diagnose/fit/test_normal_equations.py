@@ -23,7 +23,11 @@ def of_dead_time(setting, nominal, block=1):
 def test_they_are_the_products_of_what_is_whitened(setting, nominal, share_lost):
     drawn = np.random.default_rng(2)
     segments = tuple(
-        replace(s, currents_a=s.currents_a + 0.01 * drawn.standard_normal(s.currents_a.shape), is_good=drawn.random(s.count) >= share_lost)
+        replace(
+            s,
+            currents_a=s.currents_a + 0.01 * drawn.standard_normal(s.currents_a.shape),
+            is_good=drawn.random(s.count) >= share_lost,
+        )
         for s in setting.record.segments
     )
     record = replace(setting.record, segments=segments)

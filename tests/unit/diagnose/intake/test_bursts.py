@@ -73,7 +73,9 @@ def test_an_offset_of_two_values_jumps(record, kind):
 def test_spikes_and_masked_samples_are_no_moments(record):
     rows = residuals(record, "white")
     rows[0][:, ::97] += 1.0
-    masked = replace(record, segments=tuple(replace(s, is_good=np.arange(s.count) >= 10 * BLOCK) for s in record.segments))
+    masked = replace(
+        record, segments=tuple(replace(s, is_good=np.arange(s.count) >= 10 * BLOCK) for s in record.segments)
+    )
     for row in rows:
         row[:, : 10 * BLOCK] *= 10.0
     assert bursts_sigma(rows, masked, noise_of()) == 0.0

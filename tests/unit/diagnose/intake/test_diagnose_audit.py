@@ -111,7 +111,10 @@ def test_what_carries_nothing_is_refused_with_the_reason():
     assert prepare([source])[1].refusal is None
 
 
-@pytest.mark.parametrize(("volts", "amps", "said"), [(1.0, 1000.0, "times the rated peak"), (1e-3, 1.0, "rated impedance"), (1.0, 1e-3, "rated impedance")])
+@pytest.mark.parametrize(
+    ("volts", "amps", "said"),
+    [(1.0, 1000.0, "times the rated peak"), (1e-3, 1.0, "rated impedance"), (1.0, 1e-3, "rated impedance")],
+)
 def test_units_that_no_motor_of_the_nameplate_has_are_refused(volts, amps, said):
     source = measured()
     rows = {f"current_{p}_a": amps * getattr(source, f"current_{p}_a") for p in "uvw"}

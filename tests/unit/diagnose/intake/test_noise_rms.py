@@ -29,7 +29,9 @@ def test_a_few_spikes_are_not_noise():
     """Ten of 40 A had made a noise of 10 mA ten times as large."""
     blank = recording(axes=(0.0, 60.0, 120.0, 0.0))
     random = np.random.default_rng(1)
-    rows = 0.01 * random.standard_normal((3, blank.time_s.size)) + 0.1 * blank.voltage_axis_v * np.cos(np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg))
+    rows = 0.01 * random.standard_normal((3, blank.time_s.size)) + 0.1 * blank.voltage_axis_v * np.cos(
+        np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg)
+    )
     rows[1, [500, 3000, 19000]] = 40.0
     noise = measure_noise(prepare([replace(blank, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[0])
     assert noise.source == "repeated segments" and noise.sigma_a == pytest.approx(0.01, rel=0.05)
@@ -52,10 +54,16 @@ def _resting(hum_a, memory=0.0):
     """Measured on four tests that begin with 0.3 s at zero voltage, none a repeat."""
     blank = recording(axes=(0.0, 60.0, 120.0, 30.0))
     random = np.random.default_rng(4)
-    rows = 0.01 * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], random.standard_normal((3, blank.time_s.size)))
+    rows = (
+        0.01 * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], random.standard_normal((3, blank.time_s.size)))
+    )
     rows += hum_a * np.sin(2.0 * np.pi * 49.97 * blank.time_s + np.array([[0.3], [1.1], [2.0]]))
     volts = blank.voltage_axis_v * (blank.time_s % 2.2 > 0.3)
     rows += 0.1 * volts * np.cos(np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg))
-    noise = measure_noise(prepare([replace(blank, voltage_axis_v=volts, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[0])
+    noise = measure_noise(
+        prepare([replace(blank, voltage_axis_v=volts, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])])[
+            0
+        ]
+    )
     assert noise.source == "zero voltage"
     return noise

@@ -123,7 +123,9 @@ def test_a_weak_structure_around_the_tones_is_seen_and_noise_is_not(plain, setti
 
 def test_a_law_met_in_two_samples_of_a_thousand_is_seen_and_no_cause_is_named_for_it(plain, setting, nominal):
     """A sensor that cannot follow the steepest instants: 6 sigma there, nothing elsewhere, 0.27 of the noise in all."""
-    expected = np.concatenate([predict(nominal, setting.record, k, setting.layout).currents_a for k in range(3)], axis=1)
+    expected = np.concatenate(
+        [predict(nominal, setting.record, k, setting.layout).currents_a for k in range(3)], axis=1
+    )
     slope = np.gradient(expected, axis=1)
     steep = np.abs(slope) > np.quantile(np.abs(slope), 0.998)
     rows = [plain.current_u_a, plain.current_v_a, plain.current_w_a] - 0.06 * np.sign(slope) * steep

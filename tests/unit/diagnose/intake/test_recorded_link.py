@@ -37,14 +37,18 @@ def test_a_sag_has_the_same_size_on_the_recorded_link_and_on_lagged_power(settin
     model = model_of(seen, nominal, link_recorded=0.5, sag_3ms=0.01)
     alone = without_the_recorded_link(model, seen.record)
     wanted = {"sag_3ms": 0.06}
-    assert alone.of("dc_link_sag") == pytest.approx({t.symbol: wanted.get(t.symbol, 0.0) for t in model.terms}, abs=1e-6)
+    assert alone.of("dc_link_sag") == pytest.approx(
+        {t.symbol: wanted.get(t.symbol, 0.0) for t in model.terms}, abs=1e-6
+    )
     sizes = [SAG.sizes(seen, m.of("dc_link_sag"))["sag_at_rated_power"][0] for m in (model, alone)]
     assert sizes == pytest.approx([0.06, 0.06], rel=1e-3)
 
 
 def test_what_the_load_does_not_make_is_said_as_a_part_of_the_recorded_swing(setting, nominal):
     seen = with_link(setting, tone(7.3))
-    assert SAG.sizes(seen, model_of(seen, nominal, link_recorded=0.9).of("dc_link_sag")) == {"of_the_recorded_swing": (0.9, "1")}
+    assert SAG.sizes(seen, model_of(seen, nominal, link_recorded=0.9).of("dc_link_sag")) == {
+        "of_the_recorded_swing": (0.9, "1")
+    }
 
 
 def test_a_rectifiers_ripple_is_none_of_it(setting):

@@ -43,8 +43,12 @@ def bent(current, limit, form):
     return np.sign(current) * np.where(over > 0.0, knee + (limit - knee) * over / np.sqrt(1.0 + over**2), size)
 
 
-@pytest.mark.parametrize(("form", "phases", "share"), [("tanh", (0, 1, 2), 0.95), ("tanh", (1,), 0.8), ("root", (0, 1, 2), 0.9)])
-def test_a_soft_limit_is_named_whatever_its_law_and_however_many_channels_have_it(nominal, setting, form, phases, share):
+@pytest.mark.parametrize(
+    ("form", "phases", "share"), [("tanh", (0, 1, 2), 0.95), ("tanh", (1,), 0.8), ("root", (0, 1, 2), 0.9)]
+)
+def test_a_soft_limit_is_named_whatever_its_law_and_however_many_channels_have_it(
+    nominal, setting, form, phases, share
+):
     rows = np.concatenate([predict(nominal, setting.record, k, setting.layout).currents_a for k in range(3)], axis=1)
     limit = share * np.abs(rows).max()
     rows = np.stack([bent(row, limit, form) if p in phases else row for p, row in enumerate(rows)])

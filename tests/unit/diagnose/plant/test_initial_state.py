@@ -66,7 +66,9 @@ def test_in_bent_iron_flux_decays_as_its_own_magnetizing_current_demands(nominal
     assert np.hypot(*left) < 0.98 * share * size
 
 
-@pytest.mark.parametrize("held", [{"flux_carried_over": 0.3}, {"flux_carried_over": -0.2, "flux_carried_over_turned": 0.4}])
+@pytest.mark.parametrize(
+    "held", [{"flux_carried_over": 0.3}, {"flux_carried_over": -0.2, "flux_carried_over_turned": 0.4}]
+)
 def test_in_straight_iron_a_share_is_left_and_may_have_turned(nominal, behind, held):
     along, across = held["flux_carried_over"], held.get("flux_carried_over_turned", 0.0)
     left = np.array([[along, -across], [across, along]]) @ BEFORE_WB
@@ -87,10 +89,17 @@ def test_flux_that_tilts_is_what_an_open_machine_keeps(nominal, behind):
     assert start[2:4] == pytest.approx(expm(rate) @ BEFORE_WB, rel=2e-3)
 
 
-@pytest.mark.parametrize("symbol", ["leakage_cos", "leakage_sin", "magnetizing_cos", "magnetizing_sin", "split", "curve_3", "flux_carried_over"])
+@pytest.mark.parametrize(
+    "symbol",
+    ["leakage_cos", "leakage_sin", "magnetizing_cos", "magnetizing_sin", "split", "curve_3", "flux_carried_over"],
+)
 def test_sensitivities_of_the_currents_hold_with_flux_from_the_segment_before(nominal, behind, symbol):
     """What is left of that flux tilts with the open machine's rate, and the cage's resistance by the share of the leakage."""
-    effects, iron = (["magnetizing_saturation"], bent()) if symbol == "curve_3" else (["inductance_anisotropy"], {"flux_carried_over": 0.4})
+    effects, iron = (
+        (["magnetizing_saturation"], bent())
+        if symbol == "curve_3"
+        else (["inductance_anisotropy"], {"flux_carried_over": 0.4})
+    )
     model = model_of(nominal, behind, effects, {**TILTED, **iron})
     row = 4 + [t.symbol for t in model.terms].index(symbol)
     jacobian = predict(model, behind.record, 1, behind.layout, wanted=model.terms).jacobian[row]
@@ -105,20 +114,33 @@ def test_slopes_of_the_start_are_those_of_the_start(nominal, behind, effects, sh
     model = model_of(nominal, behind, effects, {**bent(*share), **TILTED})
     path = trajectory(model, behind.record, 1, behind.layout, model.terms)
     slopes = slopes_of_start(model, behind.record.segments[1], path.machine, behind.layout, model.terms)
-    scale = np.array([model.nominal[0], model.nominal[1], -1.0 / model.nominal[2], -1.0 / model.nominal[3], *(t.step for t in model.terms)])
+    scale = np.array(
+        [
+            model.nominal[0],
+            model.nominal[1],
+            -1.0 / model.nominal[2],
+            -1.0 / model.nominal[3],
+            *(t.step for t in model.terms),
+        ]
+    )
     for row in range(slopes.shape[0]):
         h = 1e-4 * np.eye(slopes.shape[0])[row]
         more, less = (start_of(model.moved(model.theta + sign * h), behind) for sign in (1.0, -1.0))
         expected = (more - less) / 2e-4
         about = model.terms[row - 4].symbol if row > 3 else row
-        assert scale[row] * slopes[row] == pytest.approx(expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-3)), about
+        assert scale[row] * slopes[row] == pytest.approx(
+            expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-3)
+        ), about
 
 
 @pytest.fixture
 def remembering(setting):
     """The setting whose second segment follows one in which the iron went up and down along 40 degrees."""
     size = setting.iron_flux_wb * np.array([0.0, 0.9, -0.7, 0.5, -0.1, 0.0])
-    path = np.outer([np.cos(np.deg2rad(40.0)), np.sin(np.deg2rad(40.0))], np.interp(np.linspace(0.0, 5.0, 400), np.arange(6.0), size))
+    path = np.outer(
+        [np.cos(np.deg2rad(40.0)), np.sin(np.deg2rad(40.0))],
+        np.interp(np.linspace(0.0, 5.0, 400), np.arange(6.0), size),
+    )
     segments = list(setting.record.segments)
     segments[1] = replace(segments[1], iron_before_wb=path)
     return replace(setting, record=replace(setting.record, segments=tuple(segments)))
@@ -126,7 +148,15 @@ def remembering(setting):
 
 def loops_that_remember(nominal, setting, split=0.3):
     terms = (*CATALOGUE["magnetic_hysteresis"].terms(setting), CARRIED)
-    held = {"loop_1": 0.05, "loop_3": 0.03, "loop_7": 0.04, "loop_9": 0.02, "loop_13": 0.03, "split": split, "carried": 1.0}
+    held = {
+        "loop_1": 0.05,
+        "loop_3": 0.03,
+        "loop_7": 0.04,
+        "loop_9": 0.02,
+        "loop_13": 0.03,
+        "split": split,
+        "carried": 1.0,
+    }
     return Model(nominal.nominal, terms, tuple(held.get(t.symbol, 0.0) for t in terms))
 
 
@@ -142,11 +172,16 @@ def test_slopes_of_what_memory_keeps_up_are_those_of_the_start(nominal, remember
     model = loops_that_remember(nominal, remembering)
     path = trajectory(model, remembering.record, 1, remembering.layout, model.terms)
     slopes = slopes_of_start(model, remembering.record.segments[1], path.machine, remembering.layout, model.terms)
-    for row, per_theta in ((3, -1.0 / model.nominal[3]), *((4 + k, t.step) for k, t in enumerate(model.terms) if t.symbol.startswith("loop"))):
+    for row, per_theta in (
+        (3, -1.0 / model.nominal[3]),
+        *((4 + k, t.step) for k, t in enumerate(model.terms) if t.symbol.startswith("loop")),
+    ):
         h = 1e-4 * np.eye(slopes.shape[0])[row]
         more, less = (start_of(model.moved(model.theta + sign * h), remembering) for sign in (1.0, -1.0))
         expected = (more - less) / 2e-4
-        assert per_theta * slopes[row] == pytest.approx(expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-6)), row
+        assert per_theta * slopes[row] == pytest.approx(
+            expected, rel=0.02, abs=2e-3 * np.abs(expected).max(initial=1e-6)
+        ), row
 
 
 def test_the_flux_that_stays_is_where_the_memory_and_the_magnetizing_current_cancel(nominal, remembering):

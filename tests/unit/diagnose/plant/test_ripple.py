@@ -47,6 +47,9 @@ def test_derivatives_by_lag_and_shape_hold(setting, nominal):
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
     for row in (2, 4, 5):
         h = 1e-3 * np.eye(6)[row]
-        more, less = (predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a for sign in (1.0, -1.0))
+        more, less = (
+            predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a
+            for sign in (1.0, -1.0)
+        )
         slope = (more - less) / 2e-3
         assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) < 0.02 * np.sqrt(np.mean(slope**2))

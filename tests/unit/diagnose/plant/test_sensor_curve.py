@@ -38,7 +38,10 @@ def test_sensitivities_of_bends_hold_on_a_bent_curve(nominal, setting):
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
     for row in (0, 2, *range(4, 4 + len(terms), 5)):
         h = 1e-3 * np.eye(4 + len(terms))[row]
-        more, less = (predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a for sign in (1.0, -1.0))
+        more, less = (
+            predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a
+            for sign in (1.0, -1.0)
+        )
         slope = (more - less) / 2e-3
         assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
 

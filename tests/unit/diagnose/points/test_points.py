@@ -117,8 +117,12 @@ def test_what_cannot_be_used_is_refused_with_the_row_the_limit_and_the_remedy():
     assert "needs the column power_w" in refusal({k: v for k, v in columns.items() if k != "power_w"})
     loaded = columns | {"frequency_hz": np.full(12, 50.0), "voltage_line_v": np.full(12, 400.0)}
     assert "loaded" in refusal(loaded | {"power_w": 0.5 * 400.0 * columns["current_line_a"]})
-    alike = {k: v[2] * np.linspace(0.95, 1.05, 9) if k != "frequency_hz" else np.full(9, 50.0) for k, v in columns.items()}
-    assert "1.11 times the smallest" in refusal(alike | {"power_w": columns["power_w"][2] * np.linspace(0.95, 1.05, 9) ** 2})
+    alike = {
+        k: v[2] * np.linspace(0.95, 1.05, 9) if k != "frequency_hz" else np.full(9, 50.0) for k, v in columns.items()
+    }
+    assert "1.11 times the smallest" in refusal(
+        alike | {"power_w": columns["power_w"][2] * np.linspace(0.95, 1.05, 9) ** 2}
+    )
 
 
 def test_copied_rows_make_nothing_surer():
@@ -133,7 +137,9 @@ def test_points_of_no_one_test_are_unexplained_and_nothing_is_named(motor):
     """Two motors in one table, both tests in one table, a running motor, numbers without a circuit."""
     random = np.random.default_rng(10)
     one = locked(motor, random, 0.003, saturation=0.1)
-    other = locked(next(m for m in MOTORS if m.truth[2] > 1.5 * motor.truth[2] or m.truth[2] < motor.truth[2] / 1.5), random, 0.003)
+    other = locked(
+        next(m for m in MOTORS if m.truth[2] > 1.5 * motor.truth[2] or m.truth[2] < motor.truth[2] / 1.5), random, 0.003
+    )
     idle = no_load(motor, random, 0.003, saturation=0.5, growth=0.6)
     shaken = one | {"voltage_line_v": one["voltage_line_v"] * random.uniform(1.0, 2.0, 12)}
     for wrong in ({k: np.r_[one[k], other[k]] for k in one}, {k: np.r_[one[k], idle[k]] for k in one}, shaken):
@@ -155,7 +161,9 @@ def test_the_page_draws_every_point_fitted_and_left_out():
     _, seen = named(locked(MOTORS[0], np.random.default_rng(4), 0.002, skin=0.15, saturation=0.12))
     document = points_document(seen)
     assert len(document["points"]) == 12
-    before, after = (max(abs(p[f"current_error_{w}_left_out"]) for p in document["points"]) for w in ("before", "after"))
+    before, after = (
+        max(abs(p[f"current_error_{w}_left_out"]) for p in document["points"]) for w in ("before", "after")
+    )
     assert after < 0.5 * before
     page = points_page(document, "table")
     assert "leakage saturation" in page.headline

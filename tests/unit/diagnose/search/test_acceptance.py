@@ -20,7 +20,9 @@ def test_clocks_pass_and_what_imitates_a_delay_does_not(setting):
     assert constancy(dict(zip(CLOCK_RATES, like_a_delay, strict=True)), record) > constant
     for rates in ({"drift": 3.0}, {"wander_cos": 1.0}, {"wander_sin": 2.0}, {"running": 1.0}, {}):
         assert constancy(rates, record) < min(constant, 0.95) - 0.1
-    assert constancy(dict(zip(CLOCK_RATES, -like_a_delay, strict=True)), record) > constant  # early alike: a conductance
+    assert (
+        constancy(dict(zip(CLOCK_RATES, -like_a_delay, strict=True)), record) > constant
+    )  # early alike: a conductance
     both = [constancy({"drift": 1.0, "wander_sin": x}, record) for x in np.linspace(-10.0, 10.0, 81)]
     assert max(both) < min(constant, 0.95)
 
@@ -55,7 +57,9 @@ def test_a_link_recorded_too_coarsely_to_show_it_is_no_witness(setting, nominal)
     terms = CATALOGUE["dc_link_sag"].terms(setting)
     model = replace(nominal, terms=terms, values=tuple(1e-3 * (t.symbol == "sag_10ms") for t in terms))
     random = np.random.default_rng(2)
-    assert is_plausible(model, "dc_link_sag", recorded_link(setting, lambda s, c: 0.05 * random.standard_normal(s.count)))
+    assert is_plausible(
+        model, "dc_link_sag", recorded_link(setting, lambda s, c: 0.05 * random.standard_normal(s.count))
+    )
 
 
 def test_no_link_gives_its_rated_power_while_it_loses_more_than_half(setting, nominal):

@@ -23,7 +23,8 @@ def late(setting, nominal):
     model = replace(nominal.with_terms(terms), values=(4e-5, 0.0))
     record = setting.record
     segments = tuple(
-        replace(s, currents_a=predict(model, record, k, setting.layout).currents_a) for k, s in enumerate(record.segments)
+        replace(s, currents_a=predict(model, record, k, setting.layout).currents_a)
+        for k, s in enumerate(record.segments)
     )
     return Record(segments, record.facts, record.channel_names, record.channels)
 
@@ -36,7 +37,9 @@ def test_rotor_paths_at_zero_do_not_hide_a_delay(late, setting, nominal):
     alone = promised(nominal, late, setting, ["sampling_delay"]).scores["sampling_delay"].delta_chi2
     beside = nominal.with_terms(CATALOGUE["rotor_skin_effect"].terms(setting))
     assert not beside.is_free[4:].any()
-    assert promised(beside, late, setting, ["sampling_delay"]).scores["sampling_delay"].delta_chi2 == pytest.approx(alone, rel=1e-6)
+    assert promised(beside, late, setting, ["sampling_delay"]).scores["sampling_delay"].delta_chi2 == pytest.approx(
+        alone, rel=1e-6
+    )
     moved = replace(beside, values=tuple(0.01 for _ in beside.values))
     assert moved.is_free.all()
 
@@ -54,7 +57,9 @@ def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_fo
     losses = {"shaft_motion": 1e8}
     large, small = 0.05 * steps.count, 0.005 * steps.count
     asked = [steps._guard(losses, "inductance_anisotropy", rest) for rest in (large, small, 1e9)]
-    assert asked == pytest.approx([ENTIRELY * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")])
+    assert asked == pytest.approx(
+        [ENTIRELY * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")]
+    )
 
 
 def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
@@ -76,7 +81,10 @@ def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_a_crumb
     assert steps._most_alien(screening, guards) == Alien()
     steps.ruled_out["sampling_delay"] = 0.5
     alien = steps.alien = steps._most_alien(screening, guards)
-    assert alien.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2) and alien.chi2 > steps.material_chi2
+    assert (
+        alien.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
+        and alien.chi2 > steps.material_chi2
+    )
     assert steps._crumb(0.0) == CRUMB * alien.chi2
     assert steps._most_alien(screening, guards | {"sampling_delay": 2.0 * alien.chi2}) == Alien()
     small, large = 0.005 * steps.count, 0.05 * steps.count
