@@ -272,6 +272,14 @@ def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     replay_run(runs, run, as_json=json)
 
 
+@app.command()
+def docs(name: Annotated[str | None, typer.Argument(help="Chapter; all are listed without it.")] = None, json: Json = False) -> None:
+    """The manual: its chapters, or one of them."""
+    from commissioner.cli.docs import docs as verb
+
+    verb(name, as_json=json)
+
+
 def main() -> None:
     """Entry point of the console script."""
     run_to_exit(app, sys.argv[1:])
