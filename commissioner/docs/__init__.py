@@ -9,7 +9,9 @@ ENDING = ".md"
 
 def chapter_names() -> tuple[str, ...]:
     """Names of the chapters there are, in alphabetical order."""
-    return tuple(sorted(entry.name.removesuffix(ENDING) for entry in files(__name__).iterdir() if entry.name.endswith(ENDING)))
+    return tuple(
+        sorted(entry.name.removesuffix(ENDING) for entry in files(__name__).iterdir() if entry.name.endswith(ENDING))
+    )
 
 
 def read_chapter(name: str) -> str:
