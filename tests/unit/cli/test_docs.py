@@ -70,7 +70,9 @@ def test_every_verb_that_is_named_exists(page):
 
 
 def test_the_readme_names_every_verb():
-    assert {verb.partition(" ")[0] for verb in verbs()} <= {verb.partition(" ")[0] for verb in named_verbs(in_code(README))}
+    assert {verb.partition(" ")[0] for verb in verbs()} <= {
+        verb.partition(" ")[0] for verb in named_verbs(in_code(README))
+    }
 
 
 @pytest.mark.parametrize("page", sorted(PAGES))
