@@ -282,6 +282,16 @@ def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
 
 
 @app.command()
+def docs(
+    name: Annotated[str | None, typer.Argument(help="Chapter; all are listed without it.")] = None, json: Json = False
+) -> None:
+    """The manual: its chapters, or one of them."""
+    from commissioner.cli.verbs.docs import docs as verb
+
+    verb(name, as_json=json)
+
+
+@app.command()
 def ports(json: Json = False) -> None:
     """The serial adapters of this computer, each with its --drive URL. Opens none."""
     from commissioner.cli.verbs.ports import ports as verb
