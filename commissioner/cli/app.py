@@ -38,6 +38,17 @@ Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in c
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
 ]
+Seal = Annotated[
+    Path | None,
+    typer.Option(
+        "--seal",
+        envvar="COMMISSIONER_SEAL",
+        help="Key file: what is archived is sealed with it, and proved by `verify`.",
+    ),
+]
+Salvage = Annotated[
+    bool, typer.Option("--salvage", help="Go on with what is whole of a damaged run; the loss is still named.")
+]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
 
@@ -95,6 +106,7 @@ def run(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
+    seal: Seal = None,
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
@@ -111,6 +123,7 @@ def run(
         runs=runs,
         as_json=json,
         diagnosis=diagnosis,
+        seal=seal,
     )
 
 
@@ -242,13 +255,14 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 def runs_export(
     run: Run,
     out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """The samples of a run as one recording; works for runs that were cut off, too."""
     from commissioner.cli.verbs.runs import export_run
 
-    export_run(runs, run, out, as_json=json)
+    export_run(runs, run, out, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
@@ -259,26 +273,41 @@ def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json
     compare_runs(runs, before, after, as_json=json)
 
 
+@runs_app.command("verify")
+def runs_verify(
+    run: Annotated[str | None, typer.Argument(help="Run id, or the start of one; `last` for the newest.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Every run in the archive.")] = False,
+    seal: Seal = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Files and hash chain: exit 0 intact (a run that was killed is cut off, not damaged), 3 something lost or changed."""
+    from commissioner.cli.verbs.verify import verify_runs
+
+    verify_runs(runs, run, everything=everything, seal=seal, as_json=json)
+
+
 @app.command()
 def restore(
     run: Run,
     drive: Annotated[str | None, typer.Option("--drive", help="Drive URL; the run's own if not given.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    seal: Seal = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """Write back the parameter set a run found in the drive, verified and stored."""
     from commissioner.cli.verbs.archive import restore_run
 
-    restore_run(runs, run, drive, yes=yes, as_json=json)
+    restore_run(runs, run, drive, yes=yes, as_json=json, seal=seal)
 
 
 @app.command()
-def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
+def replay(run: Run = "last", salvage: Salvage = False, runs: Runs = RUNS, json: Json = False) -> None:
     """Feed the archived blocks through the pure layers; decisions must come out identical."""
     from commissioner.cli.verbs.archive import replay_run
 
-    replay_run(runs, run, as_json=json)
+    replay_run(runs, run, as_json=json, salvage=salvage)
 
 
 @app.command()

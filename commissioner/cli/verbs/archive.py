@@ -9,10 +9,11 @@ from commissioner.errors import DataRefused
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.archive.replay import replay
+from commissioner.run.archive.verify import refuse_damage, verify
 from commissioner.run.restore import restore
 
 
-def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool) -> None:
+def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, seal: Path | None = None) -> None:
     """Write the run's snapshot back, after asking."""
     screen.require_yes(yes, as_json=as_json)
     summary = find_run(runs, run)
@@ -40,14 +41,19 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
         screen.out.print(screen.wear(done.store_count, done.wear_fraction))
 
 
-def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
-    """Decide the run again from its archive; exit 3 where a decision comes out otherwise."""
+def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
+    """Decide the run again from its archive; exit 3 where the folder is not as the run left it, or a decision comes out
+    otherwise."""
     summary = find_run(runs, run)
+    folder = Path(summary.folder)
+    verified = verify(folder)
+    if not salvage:
+        refuse_damage(folder, verified, "replay")
     with screen.busy("deciding again"):
-        done = replay(Path(summary.folder))
+        done = replay(folder, salvage=not verified.is_whole)
     if as_json:
         screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
-                     "difference": done.difference})  # fmt: skip
+                     "difference": done.difference, "state": verified.state, "losses": verified.losses})  # fmt: skip
         if not done.is_identical:
             raise SystemExit(DataRefused.exit_code)
         return
@@ -57,4 +63,5 @@ def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
             value=done.difference.replayed, limit=done.difference.archived,
             remedy="the run was made by another version of commissioner, or its folder was changed",
         )  # fmt: skip
-    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]")
+    until = "" if verified.is_whole else f" up to the first loss; {screen.text(verified.usable)}"
+    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]{until}")
