@@ -110,21 +110,29 @@ void motor_run(const motor_data *data, motor *state, double seconds, int steps, 
     state->warmth += data->warming_per_a2s * (i.a * i.a + i.b * i.b) * seconds;
 }
 
+/* How fast the main flux falls while the rotor alone carries it: psi_r = psi_m + L_lr i_m(psi_m), d psi_r/dt = -R_r i_m. */
+static double decay(const motor_data *data, double main_flux, double resistance_ohm)
+{
+    return -resistance_ohm * magnetizing_current(data, main_flux)
+        / (1.0 + data->rotor_leakage_h * magnetizing_slope(data, main_flux));
+}
+
 void motor_coast(const motor_data *data, motor *state, double seconds)
 {
-    double size = hypot(state->rotor_flux.a, state->rotor_flux.b);
+    double size = hypot(state->rotor_flux.a, state->rotor_flux.b), left = seconds;
     double along_a = size > 0.0 ? state->rotor_flux.a / size : 1.0, along_b = size > 0.0 ? state->rotor_flux.b / size : 0.0;
-    double resistance_ohm = data->rotor_resistance_ohm * (1.0 + state->warmth), left = seconds, flux = size;
+    double resistance_ohm = data->rotor_resistance_ohm * (1.0 + state->warmth);
+    double flux = solve_main_flux(data, 1.0 / data->rotor_leakage_h, size / data->rotor_leakage_h, size);
     while (left > 0.0 && flux > 1e-9) {
-        double h = fmin(left, 2e-3);
-        flux = flux + h * -resistance_ohm * magnetizing_current(data, flux) / (1.0 + h * resistance_ohm * magnetizing_slope(data, flux));
+        double h = fmin(left, 2e-3), middle = flux + 0.5 * h * decay(data, flux, resistance_ohm);
+        flux += h * decay(data, middle, resistance_ohm);
         left -= h;
     }
-    state->rotor_flux.a = flux * along_a;
-    state->rotor_flux.b = flux * along_b;
-    /* without stator current the stator sees the main flux, which carries the rotor's magnetizing current */
-    double through = solve_main_flux(data, 1.0 / data->rotor_leakage_h, flux / data->rotor_leakage_h, flux);
-    state->main_flux = through;
-    state->stator_flux.a = through * along_a;
-    state->stator_flux.b = through * along_b;
+    /* without current of its own the stator sees the main flux */
+    double rotor_flux = flux + data->rotor_leakage_h * magnetizing_current(data, flux);
+    state->rotor_flux.a = rotor_flux * along_a;
+    state->rotor_flux.b = rotor_flux * along_b;
+    state->main_flux = flux;
+    state->stator_flux.a = flux * along_a;
+    state->stator_flux.b = flux * along_b;
 }

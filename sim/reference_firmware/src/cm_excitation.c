@@ -29,7 +29,7 @@ static uint32_t as_turn(double turns)
 
 static uint32_t periods(float seconds, float period_s)
 {
-    double count = ceil((double)seconds / (double)period_s - 1.0e-6);
+    double count = ceil((double)seconds / (double)period_s * (1.0 - 1.0e-6)); /* two floats are no nearer than that */
     return count > 4.0e9 ? 4000000000u : (uint32_t)count;
 }
 

@@ -40,7 +40,7 @@ static uint16_t examine(const cm_drive *drive, uint16_t address, uint16_t count,
     if (skip % each || count < each)
         return 0; /* a number is never written by half */
     uint16_t left = (uint16_t)(cm_words(item) - skip);
-    uint16_t used = left <= count ? left : (uint16_t)(count - count % each);
+    uint16_t used = (uint16_t)(left <= count ? left : count - count % each);
     *answer = CM_BUSY;
     if ((item->flags & CM_NEEDS_STOP) && drive->state == CM_ENABLED)
         return 0;

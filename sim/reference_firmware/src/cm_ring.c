@@ -76,7 +76,7 @@ void cm_build_window(cm_drive *drive, uint16_t registers)
     cm_ring *ring = &drive->ring;
     uint16_t *window = &drive->image[CM_WINDOW];
     uint16_t channels = channels_of(ring->mask), used = 0, flags = 0;
-    uint16_t room = registers > CM_WINDOW_HEADER && channels ? (uint16_t)((registers - CM_WINDOW_HEADER) / channels) : 0;
+    uint16_t room = (uint16_t)(registers > CM_WINDOW_HEADER && channels ? (registers - CM_WINDOW_HEADER) / channels : 0);
     uint32_t wanted = cm_get_u32(&drive->image[CM_WINDOW_INDEX]);
 
     memset(window, 0, CM_WINDOW_WORDS * sizeof *window);
