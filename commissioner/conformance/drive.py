@@ -214,19 +214,19 @@ class Drive:
         right = crc16_modbus([*words[: head - 1], *used]) == crc
         return RawWindow(session, high << 16 | low, count, mask, flags, link, right, data)
 
-    def stream(self, samples: int) -> Steps[list[RawWindow]]:
-        """Windows one after the other from sample 0 until so many samples are there or the session has ended."""
-        index, windows, idle = 0, [], 0
+    def stream(self, samples: int, start: int = 0) -> Steps[list[RawWindow]]:
+        """Windows one after the other from `start` on until so many samples are there or the session has ended."""
+        index, windows, idle = start, [], 0
         ended = self.layout.flags["ended"]
-        while index < samples:
+        while index < start + samples:
             window = yield from self.window(index)
             windows.append(window)
             index = window.first + window.count
             idle = 0 if window.count else idle + 1
             if window.flags & ended or idle > POLLS:
                 break
-            if not window.count:
-                yield Wait(POLL_S)
+            if window.count < self.layout.data_registers // max(1, window.mask.bit_count()):
+                yield Wait(POLL_S)  # a window that is full costs the line no more than one that is not
         return windows
 
     def recorded(self, signal: Signal, samples: int, supervision: Supervision | None = None) -> Steps[Real]:
