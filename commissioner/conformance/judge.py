@@ -50,7 +50,9 @@ class Recorder:
             return result
 
 
-def judge(rules: Iterable[Rule], drive: Drive, perform: Perform, why_not: Callable[[Rule], str]) -> Iterator[RuleResult]:
+def judge(
+    rules: Iterable[Rule], drive: Drive, perform: Perform, why_not: Callable[[Rule], str]
+) -> Iterator[RuleResult]:
     """One result per rule, as they end. `why_not` names a reason not to try a rule, empty where there is none.
 
     After every rule that energises, the output is switched off and faults are reset before the next begins.

@@ -99,7 +99,10 @@ class Line:
             if transaction != self._transaction:
                 continue
             if protocol or unit != device or len(pdu) != length - 1:
-                return pdu, f"a header that does not fit: protocol {protocol}, unit {unit}, {len(pdu)} of {length - 1} bytes"
+                return (
+                    pdu,
+                    f"a header that does not fit: protocol {protocol}, unit {unit}, {len(pdu)} of {length - 1} bytes",
+                )
             return pdu, ""
 
     def _exactly(self, count: int) -> bytes:

@@ -43,7 +43,7 @@ def commanded_v(signal: Signal, samples: int, period_s: float) -> Real:
     tones = np.zeros(samples)
     for amplitude_v, frequency_hz, phase_rad in signal.tones:
         tones += amplitude_v * np.cos(2 * np.pi * frequency_hz * t + phase_rad)
-    return bias + scale * tones
+    return np.asarray(bias + scale * tones)
 
 
 def ramp_allowance_v(signal: Signal, period_s: float) -> float:

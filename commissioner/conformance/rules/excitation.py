@@ -28,7 +28,9 @@ def _must_follow(seen: Real, wanted: Real, allowed: float, what: str) -> None:
     off = np.abs(seen - wanted)
     if np.any(~(off <= allowed)):
         k = int(np.argmax(~(off <= allowed)))
-        raise Broken(f"{what}: sample {k} is {seen[k]:.3f} V, the formula says {wanted[k]:.3f} V within {allowed:.3f} V")
+        raise Broken(
+            f"{what}: sample {k} is {seen[k]:.3f} V, the formula says {wanted[k]:.3f} V within {allowed:.3f} V"
+        )
 
 
 def _voltage(drive: Drive, signal: Signal, samples: int) -> Steps[tuple[Real, float, float]]:
@@ -44,7 +46,10 @@ def eight_tones_at_control_rate(drive: Drive) -> Steps[None]:
     """Eight tones with their own amplitudes, frequencies and phases, summed at every control period from t = 0 at enable."""
     drive.needs_level()
     each_v = 0.25 * drive.level_v
-    frequencies_hz, phases = (3.0, 11.3, 23.9, 41.7, 77.1, 123.4, 211.0, 347.0), (0.0, 1.0, -2.0, 0.5, 3.0, 2.2, -1.1, 4.0)
+    frequencies_hz, phases = (
+        (3.0, 11.3, 23.9, 41.7, 77.1, 123.4, 211.0, 347.0),
+        (0.0, 1.0, -2.0, 0.5, 3.0, 2.2, -1.1, 4.0),
+    )
     tones = tuple((each_v * (1 + 0.1 * k), frequencies_hz[k], phases[k]) for k in range(8))
     signal = Signal(tones=tones, scale_ramp_per_s=1000.0)
     seen_v, period_s, allowed_v = yield from _voltage(drive, signal, 1000)
@@ -109,9 +114,13 @@ def live_values_are_reached_at_their_ramps(drive: Drive) -> Steps[None]:
     steps_v = np.abs(np.diff(seen_v))
     largest_v = 8 * level_v * scales["control_period_s"] + 2 * GRID_COUNTS * scales["voltage_scale_v"]
     if float(steps_v.max()) > largest_v:
-        raise Broken(f"the bias jumps by {float(steps_v.max()):.3g} V between samples, its ramp allows {largest_v:.3g} V")
+        raise Broken(
+            f"the bias jumps by {float(steps_v.max()):.3g} V between samples, its ramp allows {largest_v:.3g} V"
+        )
     if not abs(seen_v[-1] - 0.5 * level_v) < 3 * scales["voltage_scale_v"] or not abs(present_v - 0.5 * level_v) < 1e-2:
-        raise Broken(f"the bias was set to {0.5 * level_v:.3f} V; the samples end at {seen_v[-1]:.3f} V, present {present_v:.3f} V")
+        raise Broken(
+            f"the bias was set to {0.5 * level_v:.3f} V; the samples end at {seen_v[-1]:.3f} V, present {present_v:.3f} V"
+        )
     if not abs(present - 0.25) < 1e-3:
         raise Broken(f"the scale was set to 0.25 and present_scale is {present:g}")
 
@@ -167,8 +176,10 @@ def the_voltage_limit_clamps_and_is_flagged(drive: Drive) -> Steps[None]:
         if peak_v > limit_v + grid_v:
             raise Broken(f"{peak_v:.2f} V pass the voltage limit of {limit_v:.2f} V")
         is_flagged = bool(window.flags & flag)
-        if is_flagged and most_v < limit_v - 0.2 or not is_flagged and most_v > limit_v + 0.2:
-            raise Broken(f"up to {most_v:.2f} V were asked for, the limit is {limit_v:.2f} V, flagged clamped: {is_flagged}")
+        if (is_flagged and most_v < limit_v - 0.2) or (not is_flagged and most_v > limit_v + 0.2):
+            raise Broken(
+                f"up to {most_v:.2f} V were asked for, the limit is {limit_v:.2f} V, flagged clamped: {is_flagged}"
+            )
 
 
 @rule

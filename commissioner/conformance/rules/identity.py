@@ -58,7 +58,9 @@ def ratings_can_be(drive: Drive) -> Steps[None]:
     if not (math.isfinite(current_a) and current_a > 0):
         raise Broken(f"rated_drive_current_a is {current_a}")
     if not CONTROL_PERIOD_S[0] <= period_s <= CONTROL_PERIOD_S[1]:
-        raise Broken(f"control_period_s is {period_s:g} s, wanted {CONTROL_PERIOD_S[0]:g} ... {CONTROL_PERIOD_S[1]:g} s")
+        raise Broken(
+            f"control_period_s is {period_s:g} s, wanted {CONTROL_PERIOD_S[0]:g} ... {CONTROL_PERIOD_S[1]:g} s"
+        )
     turns = switching_hz * period_s
     if not (is_close(turns, 0.5, 1e-3) or is_close(turns, max(1.0, round(turns)), 1e-3)):
         raise Broken(f"control period times switching frequency is {turns:g}, wanted a half or a whole number")
@@ -69,9 +71,9 @@ def stream_scales_reach(drive: Drive) -> Steps[None]:
     """The window's 16-bit counts reach the current sensor's end and the DC link, and the ring bridges a late reader."""
     scale_a, full_a = (yield from drive.number("current_scale_a")), (yield from drive.number("current_full_scale_a"))
     scale_v, link_v = (yield from drive.number("dc_link_scale_v")), (yield from drive.number("dc_link_v"))
-    if not 0 < scale_a or not full_a > 0 or scale_a * 32768 < full_a:
+    if not scale_a > 0 or not full_a > 0 or scale_a * 32768 < full_a:
         raise Broken(f"32767 counts of {scale_a:g} A do not reach the full scale of {full_a:g} A")
-    if not 0 < scale_v or scale_v * 32767 < link_v:
+    if not scale_v > 0 or scale_v * 32767 < link_v:
         raise Broken(f"32767 counts of {scale_v:g} V do not reach the DC link of {link_v:g} V")
     held_s = (yield from drive.number("ring_capacity")) * (yield from drive.number("control_period_s"))
     if held_s < SHORTEST_RING_S:
@@ -105,7 +107,9 @@ def interlocks_are_the_files(drive: Drive) -> Steps[None]:
         raise Broken(f"interlocks is 0x{word:04X}; the drive file knows the bits 0x{known:04X}")
     is_remote = bool(word >> bits["remote_control"] & 1) if "remote_control" in bits else bool(status & 0x0200)
     if drive.profile.status_decoder == "cia402" and is_remote != bool(status & 0x0200):
-        raise Broken(f"remote control is {is_remote} in the interlocks and {not is_remote} in status word 0x{status:04X}")
+        raise Broken(
+            f"remote control is {is_remote} in the interlocks and {not is_remote} in status word 0x{status:04X}"
+        )
 
 
 @rule

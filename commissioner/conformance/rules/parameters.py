@@ -53,7 +53,9 @@ def the_check_sum_covers_every_value(drive: Drive) -> Steps[None]:
         result = yield from _carried_out(drive, "commit")
         yield from _must_hold(drive, "", before, f"a commit with another {name} than summed")
         if result != WRONG_CHECK_SUM:
-            raise Broken(f"{name} was changed behind the check sum and commit_result is {result}, not {WRONG_CHECK_SUM}")
+            raise Broken(
+                f"{name} was changed behind the check sum and commit_result is {result}, not {WRONG_CHECK_SUM}"
+            )
 
 
 @rule
@@ -88,7 +90,9 @@ def a_commit_brings_into_use_and_does_not_store(drive: Drive) -> Steps[None]:
     if seen != target:
         raise Broken(f"{target} was committed and {seen} is in use")
     if stored_after != stored or count_after != count:
-        raise Broken(f"a commit changed what is stored: {stored} to {stored_after}, counter {count:g} to {count_after:g}")
+        raise Broken(
+            f"a commit changed what is stored: {stored} to {stored_after}, counter {count:g} to {count_after:g}"
+        )
 
 
 @rule

@@ -50,7 +50,9 @@ def reads_agree_however_they_are_cut(drive: Drive) -> Steps[None]:
         for address in range(span.address, span.address + span.count):
             (word,) = yield from pdu.read(address, 1)
             if word != whole[address - span.address]:
-                raise Broken(f"register {address} is 0x{word:04X} alone and 0x{whole[address - span.address]:04X} in a run")
+                raise Broken(
+                    f"register {address} is 0x{word:04X} alone and 0x{whole[address - span.address]:04X} in a run"
+                )
 
 
 @rule
@@ -74,7 +76,9 @@ def unmapped_registers_are_refused(drive: Drive) -> Steps[None]:
         )
     before = _unmapped(drive)[0]
     yield from pdu.refusal(
-        pdu.read_pdu(before - 1, 2), (pdu.BAD_ADDRESS,), f"read registers {before - 1} and {before}, the second unmapped"
+        pdu.read_pdu(before - 1, 2),
+        (pdu.BAD_ADDRESS,),
+        f"read registers {before - 1} and {before}, the second unmapped",
     )
 
 
@@ -87,7 +91,14 @@ def unknown_functions_are_refused(drive: Drive) -> Steps[None]:
 @rule
 def read_only_items_stay(drive: Drive) -> Steps[None]:
     """Writing an item that can only be read is refused and changes nothing."""
-    for name in ("magic", "serial_number", "rated_drive_current_a", "ring_capacity", "stator_resistance", "store_count"):
+    for name in (
+        "magic",
+        "serial_number",
+        "rated_drive_current_a",
+        "ring_capacity",
+        "stator_resistance",
+        "store_count",
+    ):
         item = drive.item(name)
         yield from drive.refuses(name, [1] * item.words, (pdu.BAD_ADDRESS, pdu.BAD_VALUE))
 

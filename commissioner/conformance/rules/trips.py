@@ -158,7 +158,9 @@ def the_trip_cause_outlives_the_reset(drive: Drive) -> Steps[None]:
     yield from _watched(drive)
     enabled = yield from drive.number("trip_cause")
     if after_reset != TIME_LIMIT or enabled:
-        raise Broken(f"trip_cause is {after_reset:g} after the reset (wanted {TIME_LIMIT}) and {enabled:g} after the next enable")
+        raise Broken(
+            f"trip_cause is {after_reset:g} after the reset (wanted {TIME_LIMIT}) and {enabled:g} after the next enable"
+        )
 
 
 def _must_have_tripped(drive: Drive, cause: int, by: str) -> Steps[None]:

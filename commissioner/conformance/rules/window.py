@@ -146,7 +146,9 @@ def the_mask_chooses_channels(drive: Drive) -> Steps[None]:
         data, fits = joined(windows), drive.layout.data_registers // len(columns)
         largest = max((w.count for w in windows), default=0)
         if {w.mask for w in windows} != {mask} or not 0 < largest <= fits:
-            raise Broken(f"mask {mask}: windows carry masks {sorted({w.mask for w in windows})}, up to {largest} samples")
+            raise Broken(
+                f"mask {mask}: windows carry masks {sorted({w.mask for w in windows})}, up to {largest} samples"
+            )
         if 0 in columns and not np.array_equal(data[:200, 0], every[:200, 0]):
             raise Broken(f"mask {mask}: the first channel is not the axis voltage of the same test with all channels")
 
@@ -216,8 +218,12 @@ def write_and_read_apart_give_the_same_window(drive: Drive) -> Steps[None]:
         yield from drive.put({"window_index": index})
         words = yield from pdu.read(drive.layout.address, drive.layout.words)
         apart = drive.decoded(words)
-        if (apart.first, apart.count) != (together.first, together.count) or not np.array_equal(apart.data, together.data):
-            raise Broken(f"sample {index} on: {together.count} samples by function 23, {apart.count} others by 16 and 3")
+        if (apart.first, apart.count) != (together.first, together.count) or not np.array_equal(
+            apart.data, together.data
+        ):
+            raise Broken(
+                f"sample {index} on: {together.count} samples by function 23, {apart.count} others by 16 and 3"
+            )
 
 
 @rule
