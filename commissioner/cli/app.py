@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from commissioner.cli.console import degrade_output
+from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
 
 app = typer.Typer(
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
 app.add_typer(runs_app, name="runs")
+app.add_typer(drives_app, name="drives")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Diagnosed = Annotated[
