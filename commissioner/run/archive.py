@@ -126,14 +126,20 @@ def read_blocks(path: Path) -> Iterator[tuple[int, SampleBlock]]:
         return
     length = path.stat().st_size
     with path.open("rb") as file:
-        while len(head := file.read(_RECORD.size)) == _RECORD.size:
-            mark, size, check = _RECORD.unpack(head)
-            if mark != _MARK or size > length - file.tell():
-                return
-            payload = file.read(size)
-            if zlib.crc32(payload) != check:
-                return
-            yield _decode(payload)
+        while (block := read_next_block(file, length)) is not None:
+            yield block
+
+
+def read_next_block(file: BinaryIO, length: int) -> tuple[int, SampleBlock] | None:
+    """The next (segment, block) of a file of `length` bytes; None at its end and at a record that is not whole."""
+    head = file.read(_RECORD.size)
+    if len(head) != _RECORD.size:
+        return None
+    mark, size, check = _RECORD.unpack(head)
+    if mark != _MARK or size > length - file.tell():
+        return None
+    payload = file.read(size)
+    return _decode(payload) if zlib.crc32(payload) == check else None
 
 
 def read_journal(path: Path) -> list[dict[str, Any]]:
