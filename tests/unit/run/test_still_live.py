@@ -132,7 +132,7 @@ def test_a_stop_during_the_write_back_lets_it_end_as_written(folder):
 
     class Writing(Drive):
         def write_circuit(self, *_):
-            stop.asked = "SIGTERM"
+            stop.ask("", "SIGTERM")
             return WriteReport((), True, 0, 1, None)
 
     plate = load_motor("motor_2kw2")
