@@ -29,6 +29,7 @@ from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Course, Present, Runner, kind_of
+from commissioner.run.stop_file import stopped_by_file
 
 BUSY = 3.0
 """The closing diagnosis may take this much longer on a computer that does something else as well."""
@@ -90,7 +91,7 @@ def commission(
     order = Order(url, profile, nameplate, plan, write_back)
     findings = Findings()
     folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
-    with closing(folder), stop or OperatorStop() as stop:
+    with closing(folder), stop or OperatorStop() as stop, stopped_by_file(folder.path, stop):
         begun(folder.path)
         _tell(folder, present, WarmingUp())
         warm_up(nameplate)
