@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 Signal = NDArray[np.float64]
 POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
-POINT_RESISTANCES = ("winding_resistance_uv_ohm", "winding_resistance_ohm", "resistance_ohm", "winding_resistance_line_ohm")
+POINT_RESISTANCES = (
+    "winding_resistance_uv_ohm",
+    "winding_resistance_ohm",
+    "resistance_ohm",
+    "winding_resistance_line_ohm",
+)
 """Names under which it may have the winding's resistance between two terminals, at every point."""
 
 

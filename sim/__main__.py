@@ -16,7 +16,7 @@ from sim.scenario import Scenario, ScenarioError, build, read_document
 def main(arguments: list[str] | None = None) -> int:
     """Exit code: 0 done, 2 what was asked for cannot be, 5 a port or device cannot be had."""
     options = _parser().parse_args(arguments)
-    from sim.faults import FaultError
+    from sim.wire.faults import FaultError
 
     try:
         document = read_document(options.scenario)
@@ -41,7 +41,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
     parser.add_argument("--baud", type=int, default=115200)
     parser.add_argument("--parity", choices="NEO", default="N")
-    parser.add_argument("--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port")
+    parser.add_argument(
+        "--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port"
+    )
     parser.add_argument("--cert", type=Path, help="server certificate (PEM)")
     parser.add_argument("--key", type=Path, help="its key (PEM)")
     parser.add_argument("--ca", type=Path, help="certificate authority that client certificates must come from")
@@ -49,7 +51,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--nvm", type=Path, help="file that is the drive's non-volatile memory")
     parser.add_argument("--state-log", type=Path, help="JSON lines of what is really true")
-    parser.add_argument("--fault", action="append", default=[], metavar="NAME[:ARG][@WHEN]", help="see sim/faults.py")
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="NAME[:ARG][@WHEN]", help="see sim/wire/faults.py"
+    )
     parser.add_argument("--truth", action="store_true", help="print the answer key as JSON")
     parser.add_argument("--recording", type=Path, metavar="FILE", help="write a recording (.csv, .csv.gz, .parquet)")
     parser.add_argument("--list", action="store_true", help="list the scenarios")
@@ -81,9 +85,9 @@ def _print_truth(truth: dict[str, object]) -> None:
 
 
 def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
-    from sim.server import serve
-    from sim.station import Options
     from sim.truth import answer_key
+    from sim.wire.server import serve
+    from sim.wire.station import Options
 
     if options.list:
         return _list()
@@ -92,9 +96,17 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
     if options.tcp < 0 and options.tls < 0 and not options.rtu:
         return 0 if options.truth else _nothing_to_do()
     serving = Options(
-        _speed(options.speed), options.seed, options.nvm, options.state_log, tuple(options.fault),
-        options.tcp, options.tls, _tls(options) if options.tls >= 0 else None,
-        options.rtu, options.baud, options.parity,
+        _speed(options.speed),
+        options.seed,
+        options.nvm,
+        options.state_log,
+        tuple(options.fault),
+        options.tcp,
+        options.tls,
+        _tls(options) if options.tls >= 0 else None,
+        options.rtu,
+        options.baud,
+        options.parity,
     )
     asyncio.run(_serve_until_signal(scenario, serving, serve))
     return 0
@@ -135,7 +147,7 @@ def _tls(options: argparse.Namespace) -> ssl.SSLContext:
 
 
 def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
-    from sim.recording import record, write_table
+    from sim.recordings.standstill import record, write_table
 
     columns, metadata, truth = record(scenario, options.seed)
     write_table(options.recording, columns, metadata)
@@ -145,8 +157,8 @@ def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
 
 
 def _record_running(document: dict[str, object], options: argparse.Namespace) -> int:
-    from sim.recording import write_table
-    from sim.running_recording import record
+    from sim.recordings.running import record
+    from sim.recordings.standstill import write_table
 
     columns, metadata, truth = record(document, options.seed)
     if options.recording:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim import effects
-from sim.laws import SATURATION_SHAPES, SIGN_SHAPES
-from sim.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, Sensors
-from sim.states import Setup
+from sim.drive.states import Setup
+from sim.physics import effects
+from sim.physics.laws import SATURATION_SHAPES, SIGN_SHAPES
+from sim.physics.machine import Effect, Heating, Machine, Nameplate, Plant, PowerStage, Sensors
 
 FOLDER = Path(__file__).parent / "scenarios"
 MACHINE_TABLE = FOLDER / "machines.csv"
@@ -302,7 +302,16 @@ def _effect(name: str, entry: Any, source: str) -> Effect:
 
 def _setup(drive: dict[str, Any], interlocks: dict[str, Any], source: str) -> Setup:
     parameters = drive.pop("parameters", None)
-    fixed = {"interlocks", "parameters", "ignores", "commit_sticks", "store_fails", "refuses", "heeds_heartbeat", "runs_away"}
+    fixed = {
+        "interlocks",
+        "parameters",
+        "ignores",
+        "commit_sticks",
+        "store_fails",
+        "refuses",
+        "heeds_heartbeat",
+        "runs_away",
+    }
     defaults = Setup()
     fields = {f.name for f in dataclasses.fields(Setup)} - fixed
     _known(drive, fields, source, "drive.")

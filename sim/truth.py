@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from sim import effects
-from sim import layout as at
-from sim.inductance import inverse_gamma, saturated
-from sim.kernel import load
-from sim.laws import sign_law
-from sim.machine import Plant
-from sim.packing import pack
+from sim.physics import effects
+from sim.physics import layout as at
+from sim.physics.inductance import inverse_gamma, saturated
+from sim.physics.kernel import load
+from sim.physics.laws import sign_law
+from sim.physics.machine import Plant
+from sim.physics.packing import pack
 from sim.scenario import Scenario
 
 KINDS = ("secant", "incremental", "sine")

@@ -55,10 +55,16 @@ def demo(
     diagnosis: Diagnosed = True,
 ) -> None:
     """The whole job against the simulated inverter, started as its own process on loopback."""
-    from commissioner.cli.demo import demo as verb
+    from commissioner.cli.verbs.demo import demo as verb
 
     verb(
-        scenario=scenario, speed=speed, seed=seed, axes=axes, write_back=write_back, runs=runs, as_json=json,
+        scenario=scenario,
+        speed=speed,
+        seed=seed,
+        axes=axes,
+        write_back=write_back,
+        runs=runs,
+        as_json=json,
         diagnosis=diagnosis,
     )
 
@@ -72,7 +78,7 @@ def check(
     json: Json = False,
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
-    from commissioner.cli.check import check as verb
+    from commissioner.cli.verbs.check import check as verb
 
     verb(drive=drive, profile=profile, motor=motor, procedure=procedure, as_json=json)
 
@@ -91,7 +97,7 @@ def run(
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
-    from commissioner.cli.run import run as verb
+    from commissioner.cli.verbs.run import run as verb
 
     verb(
         drive=drive,
@@ -109,7 +115,9 @@ def run(
 
 @app.command()
 def identify(
-    files: Annotated[list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")
+    ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
     write_back: Annotated[
@@ -123,8 +131,8 @@ def identify(
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
-    from commissioner.cli.identify import identify as verb
-    from commissioner.cli.identify import identify_and_write
+    from commissioner.cli.verbs.identify import identify as verb
+    from commissioner.cli.verbs.identify import identify_and_write
 
     if not write_back:
         verb(files, motor=motor, estimator=estimator, as_json=json)
@@ -154,7 +162,7 @@ def monitor(
     json: Json = False,
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
-    from commissioner.cli.monitor import monitor as verb
+    from commissioner.cli.verbs.monitor import monitor as verb
 
     verb(
         file, motor=motor, out=out, baseline=baseline, learn=learn, start=start, load_hz=tuple(load_hz or ()),
@@ -178,7 +186,7 @@ def diagnose(
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
-    from commissioner.cli.diagnose import diagnose as verb
+    from commissioner.cli.verbs.diagnose import diagnose as verb
 
     verb(files, motor=motor, out=out, as_json=json)
 
@@ -196,7 +204,7 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Play a drive or motor configuration, plain or extended by diagnose, into a recording."""
-    from commissioner.cli.simulate import simulate as verb
+    from commissioner.cli.verbs.simulate import simulate as verb
 
     verb(model, out, like=like, seconds=seconds, axes=axes, noise_a=noise_a, seed=seed, plain=plain, as_json=json)
 
@@ -204,7 +212,7 @@ def simulate(
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.runs import list_runs
+    from commissioner.cli.verbs.runs import list_runs
 
     list_runs(runs, as_json=json)
 
@@ -216,7 +224,7 @@ def runs_show(
     json: Json = False,
 ) -> None:
     """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.runs import show_run
+    from commissioner.cli.verbs.runs import show_run
 
     show_run(runs, run, as_json=json)
 
@@ -224,7 +232,7 @@ def runs_show(
 @runs_app.command("report")
 def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Where the HTML report of a run is; made again from its archive where it is missing."""
-    from commissioner.cli.runs import report_run
+    from commissioner.cli.verbs.runs import report_run
 
     report_run(runs, run, as_json=json)
 
@@ -237,7 +245,7 @@ def runs_export(
     json: Json = False,
 ) -> None:
     """The samples of a run as one recording; works for runs that were cut off, too."""
-    from commissioner.cli.runs import export_run
+    from commissioner.cli.verbs.runs import export_run
 
     export_run(runs, run, out, as_json=json)
 
@@ -245,7 +253,7 @@ def runs_export(
 @runs_app.command("compare")
 def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.runs import compare_runs
+    from commissioner.cli.verbs.runs import compare_runs
 
     compare_runs(runs, before, after, as_json=json)
 
@@ -259,7 +267,7 @@ def restore(
     json: Json = False,
 ) -> None:
     """Write back the parameter set a run found in the drive, verified and stored."""
-    from commissioner.cli.archive import restore_run
+    from commissioner.cli.verbs.archive import restore_run
 
     restore_run(runs, run, drive, yes=yes, as_json=json)
 
@@ -267,7 +275,7 @@ def restore(
 @app.command()
 def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Feed the archived blocks through the pure layers; decisions must come out identical."""
-    from commissioner.cli.archive import replay_run
+    from commissioner.cli.verbs.archive import replay_run
 
     replay_run(runs, run, as_json=json)
 

@@ -16,7 +16,7 @@ from typer.exceptions import TyperException
 
 from commissioner.cli.secrets import Secrets
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
-from commissioner.link.url import without_secrets
+from commissioner.link.wire.url import without_secrets
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 INTERRUPTED = 130
@@ -61,7 +61,7 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
 
 
 def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:
-    from commissioner.cli import screen
+    from commissioner.cli.screens import screen
 
     for fact in ("what", "step", "value", "limit", "remedy"):
         setattr(error, fact, hide(getattr(error, fact)))
@@ -73,14 +73,16 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
 
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return UsageError(
-        text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call"
-    )
+    return UsageError(text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call")
 
 
 def _stopped() -> CommissionerError:
     return Aborted(
-        "stopped by the operator", step="wait", value="Ctrl-C, SIGTERM or no", limit="no stop", remedy="start again when ready"
+        "stopped by the operator",
+        step="wait",
+        value="Ctrl-C, SIGTERM or no",
+        limit="no stop",
+        remedy="start again when ready",
     )
 
 

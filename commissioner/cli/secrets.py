@@ -7,11 +7,15 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
 
-from commissioner.link.url import USERINFO
+from commissioner.link.wire.url import USERINFO
 
 HIDDEN = "***"
-_OPTION = re.compile(r"--?[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL)
-_TLS_FILE = re.compile(r"[?&](?:c|%63)(?:e|%65)(?:r|%72)(?:t|%74)=([^&]+)|[?&](?:k|%6b)(?:e|%65)(?:y|%79)=([^&]+)", re.IGNORECASE)
+_OPTION = re.compile(
+    r"--?[\w-]*(?:pass|pwd|secret|token|credential|auth|key)[\w-]*(?:=(.*))?", re.IGNORECASE | re.DOTALL
+)
+_TLS_FILE = re.compile(
+    r"[?&](?:c|%63)(?:e|%65)(?:r|%72)(?:t|%74)=([^&]+)|[?&](?:k|%6b)(?:e|%65)(?:y|%79)=([^&]+)", re.IGNORECASE
+)
 
 
 class Secrets:

@@ -8,8 +8,17 @@ from enum import Enum
 
 import numpy as np
 
-from commissioner.diagnose.audit import Audit, prepare
-from commissioner.diagnose.causes import (
+from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.catalogue.inverter import tail_of_legs
+from commissioner.diagnose.export.model_file import model_document
+from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
+from commissioner.diagnose.fit.gauss_newton import Fit, inverse
+from commissioner.diagnose.intake.audit import Audit, prepare
+from commissioner.diagnose.intake.line_classes import Split, split_lines
+from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
+from commissioner.diagnose.plant.model import Layout
+from commissioner.diagnose.search.search import Found, search
+from commissioner.diagnose.verdict.causes import (
     LEAST_SHARE,
     MOSTLY_EXPLAINED_SIGMA,
     Cause,
@@ -17,19 +26,10 @@ from commissioner.diagnose.causes import (
     doubt,
     explained_share,
 )
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.effects.inverter import tail_of_legs
-from commissioner.diagnose.evidence import HeldOut, hold_out
-from commissioner.diagnose.experiment import next_experiment
-from commissioner.diagnose.extended import model_document
-from commissioner.diagnose.fit import Fit, inverse
-from commissioner.diagnose.leftover import Leftover, leftover
-from commissioner.diagnose.model import Layout
-from commissioner.diagnose.moved import PARAMETERS
-from commissioner.diagnose.noise import Noise, measure_noise, resting_share
-from commissioner.diagnose.refusals import check_before_search, check_one_state
-from commissioner.diagnose.search import Found, search
-from commissioner.diagnose.split import Split, split_lines
+from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
+from commissioner.diagnose.verdict.experiment import next_experiment
+from commissioner.diagnose.verdict.lack_of_fit import Leftover, leftover
+from commissioner.diagnose.verdict.parameter_shift import PARAMETERS
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
@@ -85,8 +85,11 @@ class Diagnosis:
 
 
 def diagnose(
-    recordings: Sequence[StandstillRecording], *, excluded: Sequence[str] = (),
-    report: Callable[[str], None] = lambda _: None, go_on: Callable[[], bool] = lambda: True,
+    recordings: Sequence[StandstillRecording],
+    *,
+    excluded: Sequence[str] = (),
+    report: Callable[[str], None] = lambda _: None,
+    go_on: Callable[[], bool] = lambda: True,
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about the recordings of one motor.
 
@@ -103,7 +106,14 @@ def diagnose(
     report(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
-        found = search(record, noise, excluded=excluded, report=report, check=lambda f, r: check_before_search(f, r, noise), go_on=go_on)
+        found = search(
+            record,
+            noise,
+            excluded=excluded,
+            report=report,
+            check=lambda f, r: check_before_search(f, r, noise),
+            go_on=go_on,
+        )
         check_one_state(found.fit, found.record)
     except DataRefused as refusal:
         return _refused(refusal, audit, noise)
@@ -136,13 +146,28 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
     is_seen = max(rest.from_states_sigma, rest.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
-    verdict, reason = _verdict(causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found)
+    verdict, reason = _verdict(
+        causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
+    )
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
-        verdict, reason, tuple(sorted(causes, key=lambda c: -c.gain_share)), tuple(trifles), audit, noise, held,
-        rest, _parameters(found.nominal, layout), _parameters(found.fit, layout), experiment,
-        model_document(found, [*causes, *unsure]), found, split_lines(record), share,
-        _remarks(noise, found, unsure), unsure,
+        verdict,
+        reason,
+        tuple(sorted(causes, key=lambda c: -c.gain_share)),
+        tuple(trifles),
+        audit,
+        noise,
+        held,
+        rest,
+        _parameters(found.nominal, layout),
+        _parameters(found.fit, layout),
+        experiment,
+        model_document(found, [*causes, *unsure]),
+        found,
+        split_lines(record),
+        share,
+        _remarks(noise, found, unsure),
+        unsure,
     )
 
 
@@ -151,8 +176,10 @@ def _verdict(
 ) -> tuple[Verdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
-        rest.sigma > UNEXPLAINED_SIGMA or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA) or leaves_a_trace
+        rest.sigma > UNEXPLAINED_SIGMA
+        or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
+        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA)
+        or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         if not found.is_complete:
@@ -161,8 +188,14 @@ def _verdict(
                 f"times the noise is left so far{', beside ' + names if names else ''}."
             )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
-        comes_and_goes = " It comes and goes: in some moments much more is left than in most." if rest.from_bursts_sigma else ""
-        alien = f" Part of it looks like {found.alien.name}, which the recorded DC link rules out." if found.alien.chi2 else ""
+        comes_and_goes = (
+            " It comes and goes: in some moments much more is left than in most." if rest.from_bursts_sigma else ""
+        )
+        alien = (
+            f" Part of it looks like {found.alien.name}, which the recorded DC link rules out."
+            if found.alien.chi2
+            else ""
+        )
         return Verdict.UNEXPLAINED, (
             f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{alien}{seen}"
         )
@@ -201,7 +234,11 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
 
 
 def _remarks(noise: Noise, found: Found, unsure: Sequence[Cause]) -> tuple[str, ...]:
-    out = [] if found.is_complete else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
+    out = (
+        []
+        if found.is_complete
+        else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
+    )
     if unsure:
         names = ", ".join(f"{c.name} ({c.strength_sigma:.2g} times the noise)" for c in unsure)
         out.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {names}.")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.diagnose.causes import Cause
-from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
-from commissioner.diagnose.points_diagnosis import PointsDiagnosis
+from commissioner.diagnose.points.diagnosis import PointsDiagnosis
+from commissioner.diagnose.verdict.causes import Cause
+from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 
@@ -37,8 +37,12 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
             "explained_share": seen.explained_share if held else None,
             "structured_error_over_noise": left.sigma if left else None,
         },
-        "noise": None if noise is None else {
-            "source": noise.source, "is_known": noise.is_known, "is_white": noise.is_white,
+        "noise": None
+        if noise is None
+        else {
+            "source": noise.source,
+            "is_known": noise.is_known,
+            "is_white": noise.is_white,
             "sigma_a": [float(x) for x in noise.sigma_a],
         },
         "parameters_before": _quantities(seen.parameters_before),
@@ -86,14 +90,20 @@ def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
             {
                 "name": c.name,
                 "parameters": {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in c.sizes.items()},
-                "gain_share": c.gain_share, "confidence": 1.0 - min(c.p_value * 100.0, 0.5), "equivalent": [],
+                "gain_share": c.gain_share,
+                "confidence": 1.0 - min(c.p_value * 100.0, 0.5),
+                "equivalent": [],
                 "p_value": c.p_value,
             }
             for c in seen.causes
         ],
         "gain": {
-            "held_out": seen.held_out_gain, "rmse_before_a": seen.rmse_before_a, "rmse_after_a": seen.rmse_after_a,
-            "noise_floor_a": None, "relative_error_before": seen.relative_before, "relative_error_after": seen.relative_after,
+            "held_out": seen.held_out_gain,
+            "rmse_before_a": seen.rmse_before_a,
+            "rmse_after_a": seen.rmse_after_a,
+            "noise_floor_a": None,
+            "relative_error_before": seen.relative_before,
+            "relative_error_after": seen.relative_after,
         },
         "parameters_before": _quantities(seen.parameters_before),
         "parameters_after": _quantities(seen.parameters_after),
@@ -108,8 +118,10 @@ def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
 def _points(seen: PointsDiagnosis) -> list[dict[str, float]]:
     """Every point with the relative error of its predicted current and power, left out of the fit and in it."""
     columns = {
-        "frequency_hz": seen.points.frequency_hz, "voltage_line_v": seen.points.voltage_line_v,
-        "current_line_a": seen.points.current_line_a, "power_w": seen.points.power_w,
+        "frequency_hz": seen.points.frequency_hz,
+        "voltage_line_v": seen.points.voltage_line_v,
+        "current_line_a": seen.points.current_line_a,
+        "power_w": seen.points.power_w,
     }
     for when, errors in (("before", seen.errors_before), ("after", seen.errors_after)):
         for how, table in (("left_out", errors.left_out), ("fitted", errors.fitted)):
@@ -125,7 +137,15 @@ def _error(refusal: DataRefused | None) -> dict[str, Any]:
 def refused_document(refusal: DataRefused, kind: str) -> dict[str, Any]:
     """The document where nothing could be answered."""
     return {
-        "verdict": "refused", "reason": f"{refusal.what}; {refusal.remedy}", **_error(refusal), "kind": kind, "convention": CONVENTION, "causes": [],
+        "verdict": "refused",
+        "reason": f"{refusal.what}; {refusal.remedy}",
+        **_error(refusal),
+        "kind": kind,
+        "convention": CONVENTION,
+        "causes": [],
         "gain": {"held_out": None, "rmse_before_a": None, "rmse_after_a": None, "noise_floor_a": None},
-        "parameters_before": {}, "parameters_after": {}, "next_experiment": None, "model_file": None,
+        "parameters_before": {},
+        "parameters_after": {},
+        "next_experiment": None,
+        "model_file": None,
     }

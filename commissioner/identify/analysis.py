@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.errors import UsageError
-from commissioner.identify.audit import Audit, audit
-from commissioner.identify.axis import (
+from commissioner.identify.estimate.axes import AxisEstimate, Combined, combine
+from commissioner.identify.estimate.axis import (
     LARGEST_DISAGREEMENT,
     AxisFit,
     AxisResult,
@@ -27,13 +27,13 @@ from commissioner.identify.axis import (
     judge_axis,
     segments,
 )
-from commissioner.identify.combine import AxisEstimate, Combined, combine
-from commissioner.identify.leg_family import one_inverter
-from commissioner.identify.leg_refit import with_known_law
-from commissioner.identify.plate import nameplate_from
-from commissioner.identify.resistance import InverterError
-from commissioner.identify.stretches import Stretch
-from commissioner.identify.sufficient import require_amperes, require_tones, require_volts
+from commissioner.identify.estimate.leg_family import one_inverter
+from commissioner.identify.estimate.leg_refit import with_known_law
+from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
+from commissioner.identify.intake.audit import Audit, audit
+from commissioner.identify.intake.plate import nameplate_from
+from commissioner.identify.intake.stretches import Stretch
+from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
 from commissioner.records import StandstillRecording

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from commissioner.identify.axis import AxisResult
-from commissioner.identify.resistance import InverterError, Staircase
+from commissioner.identify.estimate.axis import AxisResult
+from commissioner.identify.inverter.staircase import InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma, Quantity
 
 if TYPE_CHECKING:

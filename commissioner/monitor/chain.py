@@ -6,27 +6,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor import combs as comb_search
-from commissioner.monitor import feeder, waveform
-from commissioner.monitor import fit as fitting
-from commissioner.monitor.audit import inspect
-from commissioner.monitor.averaging import Comb, Lines, separate
-from commissioner.monitor.characteristic import LoadPeriod, characteristic, load_periods
-from commissioner.monitor.combs import SUPPLY_ORDERS, Found
-from commissioner.monitor.estimate import estimate
-from commissioner.monitor.findings import Audited, Finding
-from commissioner.monitor.fit import Fitted, Problem, Start
-from commissioner.monitor.mean_speed import whole_record_speed
-from commissioner.monitor.members import members_of, pole_count, with_wobble
-from commissioner.monitor.pairing_by_slip import better_order, shaft_search
-from commissioner.monitor.periods import ShaftSearch, slip_of
-from commissioner.monitor.proof import Proof, prove
-from commissioner.monitor.quiet import SEGMENT_S, quietest
-from commissioner.monitor.slow_slip import slip_phase
-from commissioner.monitor.steadiness import frequency_wander, too_little
-from commissioner.monitor.supply import TurningFrame, turning_frame
-from commissioner.monitor.systematic import with_sensors
-from commissioner.monitor.waveform import Solved, Waveform
+from commissioner.monitor.intake.audit import inspect
+from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.loads.mean_speed import whole_record_speed
+from commissioner.monitor.loads.members import members_of, pole_count, with_wobble
+from commissioner.monitor.loads.pairing_by_slip import better_order, shaft_search
+from commissioner.monitor.machine import fit as fitting
+from commissioner.monitor.machine import waveform
+from commissioner.monitor.machine.characteristic import LoadPeriod, characteristic, load_periods
+from commissioner.monitor.machine.estimate import estimate
+from commissioner.monitor.machine.fit import Fitted, Problem, Start
+from commissioner.monitor.machine.proof import Proof, prove
+from commissioner.monitor.machine.slow_slip import slip_phase
+from commissioner.monitor.machine.systematic import with_sensors
+from commissioner.monitor.machine.waveform import Solved, Waveform
+from commissioner.monitor.periods import combs as comb_search
+from commissioner.monitor.periods.combs import SUPPLY_ORDERS, Found
+from commissioner.monitor.periods.periods import ShaftSearch, slip_of
+from commissioner.monitor.periods.steadiness import frequency_wander, too_little
+from commissioner.monitor.signals import feeder
+from commissioner.monitor.signals.averaging import Comb, Lines, separate
+from commissioner.monitor.signals.quiet import SEGMENT_S, quietest
+from commissioner.monitor.signals.supply import TurningFrame, turning_frame
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording
@@ -157,9 +158,7 @@ def _invert(
     solved = with_sensors(
         waveform.solve(problem, fitted, kept), audited.sensors.gain_std, lines, len(combs), problem, fitted, start
     )
-    period = characteristic(
-        audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia
-    )
+    period = characteristic(audited, frame, part, combs, found.shaft.frequency_hz, problem, solved, inertia)
     torque, torque_std, sensor_std = waveform.mean_torque_nm(problem, solved)
     ripple = solved.speed.amplitude_rad_per_s / problem.lines.rate_rad_per_s[problem.on.positive]
     ripple_rad = float(np.sqrt(2 * np.sum(np.abs(ripple) ** 2)))

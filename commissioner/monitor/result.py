@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.monitor.chain import Observation, Refused
-from commissioner.monitor.findings import Audited, Finding
-from commissioner.monitor.fit import NAMES, Fitted, circuit_at, steps
-from commissioner.monitor.indicators import Indicator, Pulses, rotor_side_bands
-from commissioner.monitor.trend import Entry, Verdict
+from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
+from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
+from commissioner.monitor.trend.trend import Entry, Verdict
 from commissioner.motor.circuit import EQUAL_LEAKAGE
 
 OPEN = 0.25

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any
 
-from commissioner.procedure.excite import excite
+from commissioner.procedure.energised.excite import excite
+from commissioner.procedure.energised.staircase import measure_resistance
 from commissioner.procedure.findings import RunEnded, StateEntered
-from commissioner.procedure.staircase import measure_resistance
 from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
 from commissioner.procedure.steps import Findings, Job, Step, check, connect, judge, write
 from commissioner.safety.commands import Command, Tell

@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from commissioner.identify.analysis import Identification, identify
-from commissioner.identify.excitation import DesignedExcitation
-from commissioner.identify.longer import LongerTest, longer_test
-from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, Staircase
+from commissioner.identify.excite.duration import LongerTest, longer_test
+from commissioner.identify.excite.tones import DesignedExcitation
+from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.monitor.trend import Entry, History, State, Verdict, judge
+from commissioner.monitor.trend.trend import Entry, History, State, Verdict, judge
 from commissioner.recordings.whole import whole_file
 
 VERSION = 1

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.recordings import comtrade, matlab, mdf4, tdms
-from commissioner.recordings.foreign_csv import has_other_separators, parse_csv, read_text
+from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
+from commissioner.recordings.formats.foreign_csv import has_other_separators, parse_csv, read_text
 from commissioner.recordings.names import is_per_minute, key_of, meaning_of, uses_rst
 from commissioner.recordings.table import CONTRACT_COLUMNS, READ, Table, read_table, to_running
 from commissioner.recordings.units import scale_of, unit_in

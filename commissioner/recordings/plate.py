@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.monitor.fit import PRIOR_FROM_COMMISSIONING, Start
+from commissioner.monitor.machine.fit import PRIOR_FROM_COMMISSIONING, Start
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check
 from commissioner.motor.running import equal_leakages

@@ -60,7 +60,13 @@ def read_table(path: Path) -> Table:
         if path.suffix == ".parquet":
             return _read_parquet(path)
         if _is_binary(path):
-            raise _refuse(path, "the file holds bytes, not text", path.suffix or "no ending", READ, "give the recording, not a picture of it")
+            raise _refuse(
+                path,
+                "the file holds bytes, not text",
+                path.suffix or "no ending",
+                READ,
+                "give the recording, not a picture of it",
+            )
         return _read_csv(path)
     except (
         pa.ArrowInvalid,
@@ -154,7 +160,10 @@ def to_running(table: Table) -> RunningRecording:
     currents = ("current_u_a", "current_v_a", "current_w_a")
     if "voltage_axis_v" in columns and is_line and not any(name in columns for name in line):
         raise _refuse(
-            Path(table.source), "this is a recording at standstill", "voltage_axis_v", "three voltages of a running motor",
+            Path(table.source),
+            "this is a recording at standstill",
+            "voltage_axis_v",
+            "three voltages of a running motor",
             "`commissioner identify` or `commissioner diagnose` reads it",
         )
     _require(table, _all_but_one(currents, columns), "a running-motor recording")
@@ -255,7 +264,9 @@ def _read_csv(path: Path) -> Table:
     columns = text.readline().count(b",") + 1
     if columns > MAX_COLUMNS:
         raise too_large(path, f"{columns} columns", MAX_COLUMNS)
-    rest = pa.BufferReader(memoryview(data)[start:])  # a thread that reads a Python file is cut off at exit, which then hangs or aborts
+    rest = pa.BufferReader(
+        memoryview(data)[start:]
+    )  # a thread that reads a Python file is cut off at exit, which then hangs or aborts
     table = pa_csv.read_csv(rest, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
     return _as_table(path, table, _typed(path, metadata))
 
@@ -307,9 +318,15 @@ def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
             number = math.nan
         if key in TEXT_KEYS:
             typed[key] = value
-        elif (key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}) and not 0.0 < number < math.inf:
+        elif (
+            key.startswith("rated_") or key in {"power_factor", "pole_pairs", "sample_period_s"}
+        ) and not 0.0 < number < math.inf:
             raise _refuse(
-                path, f"metadata {key} is no positive number", value, "a finite number above zero, in SI units", f"correct {key}"
+                path,
+                f"metadata {key} is no positive number",
+                value,
+                "a finite number above zero, in SI units",
+                f"correct {key}",
             )
         elif math.isfinite(number):
             typed[key] = number

@@ -30,7 +30,10 @@ def folder_to_write(path: Path) -> Path:
         trial.unlink()
     except OSError as error:
         raise UsageError(
-            f"{path} is no folder that can be written to", step="write results", value=error.strerror or str(error), limit="a writable folder",
+            f"{path} is no folder that can be written to",
+            step="write results",
+            value=error.strerror or str(error),
+            limit="a writable folder",
             remedy="choose another --out",
         ) from error
     return path

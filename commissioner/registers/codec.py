@@ -24,8 +24,11 @@ def decode_item(item: Item, words: Sequence[int]) -> Value:
     """
     if len(words) != item.words:
         raise ReplyMismatch(
-            f"{item.name} came with {len(words)} registers", step=f"decode {item.name}", value=len(words),
-            limit=f"{item.words} registers", remedy="check that the drive file fits the drive's firmware",
+            f"{item.name} came with {len(words)} registers",
+            step=f"decode {item.name}",
+            value=len(words),
+            limit=f"{item.words} registers",
+            remedy="check that the drive file fits the drive's firmware",
         )
     if item.type == "ascii":
         return struct.pack(f">{len(words)}H", *words).decode("ascii", "replace").rstrip("\x00 ")
@@ -127,6 +130,9 @@ def _encode_ascii(item: Item, value: object) -> Words:
 
 def _unfit(item: Item, value: object, expected: str) -> UsageError:
     return UsageError(
-        f"{item.name} cannot hold {value!r}", step=f"encode {item.name}", value=repr(value), limit=expected,
+        f"{item.name} cannot hold {value!r}",
+        step=f"encode {item.name}",
+        value=repr(value),
+        limit=expected,
         remedy=f"ask for a value the register at {item.address} ({item.type}) can hold",
     )

@@ -70,8 +70,10 @@ def drive_value(item: Item, circuit: InverseGamma, nameplate: Nameplate | None =
     known = _CIRCUITS[model](circuit) if model else {}
     if quantity not in known:
         raise UsageError(
-            f"{item.name}: '{item.convention}' says nothing about {quantity}", step="convert to the drive's convention",
-            value=item.convention, limit=", ".join(sorted(known)) or ", ".join(CONVENTIONS),
+            f"{item.name}: '{item.convention}' says nothing about {quantity}",
+            step="convert to the drive's convention",
+            value=item.convention,
+            limit=", ".join(sorted(known)) or ", ".join(CONVENTIONS),
             remedy="give the item a quantity and a convention that belong together",
         )
     factor = 1.0 if quantity == "rotor_time_constant" else representation_factor(quantity, form, nameplate)
@@ -93,8 +95,11 @@ def representation_factor(quantity: str, form: str, nameplate: Nameplate | None)
         return 2.0 if form == "line_to_line" else 1.0
     if nameplate is None:
         raise UsageError(
-            f"the drive wants {quantity} as {form.replace('_', ' ')}", step="convert to the drive's convention",
-            value="no nameplate", limit="rated voltage, current and frequency", remedy="name the motor with --motor",
+            f"the drive wants {quantity} as {form.replace('_', ' ')}",
+            step="convert to the drive's convention",
+            value="no nameplate",
+            limit="rated voltage, current and frequency",
+            remedy="name the motor with --motor",
         )
     omega = 2 * math.pi * nameplate.rated_frequency_hz if quantity in INDUCTANCES else 1.0
     impedance_ohm = nameplate.rated_voltage_v / (math.sqrt(3) * nameplate.rated_current_a)

@@ -14,15 +14,59 @@ WORDS_PER_ELEMENT = MappingProxyType({"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f
 """Registers one element of a type takes; an ascii element is a register with two characters."""
 
 COMMISSIONING_ITEMS = (
-    "magic", "map_version", "firmware_version", "serial_number", "drive_type", "rated_drive_current_a",
-    "control_period_s", "switching_frequency_hz", "echo", "control_word", "mode", "heartbeat", "window_index",
-    "status_word", "fault_code", "trip_cause", "trip_value", "trip_limit", "heartbeat_echo", "session_id",
-    "interlocks", "dc_link_v", "heatsink_degc", "winding_degc", "shaft_speed_rad_per_s", "current_magnitude_a",
-    "present_scale", "samples_produced", "overruns", "test_time_left_s", "present_bias_v", "current_limit_a",
-    "test_time_limit_s", "voltage_limit_v", "axis_deg", "dc_bias_v", "bias_ramp_v_per_s", "amplitude_scale",
-    "scale_ramp_per_s", "duration_s", "tone_count", "tones", "channel_mask", "decimation", "current_scale_a",
-    "voltage_scale_v", "dc_link_scale_v", "current_full_scale_a", "commit", "store", "commit_result",
-    "store_result", "store_count",
+    "magic",
+    "map_version",
+    "firmware_version",
+    "serial_number",
+    "drive_type",
+    "rated_drive_current_a",
+    "control_period_s",
+    "switching_frequency_hz",
+    "echo",
+    "control_word",
+    "mode",
+    "heartbeat",
+    "window_index",
+    "status_word",
+    "fault_code",
+    "trip_cause",
+    "trip_value",
+    "trip_limit",
+    "heartbeat_echo",
+    "session_id",
+    "interlocks",
+    "dc_link_v",
+    "heatsink_degc",
+    "winding_degc",
+    "shaft_speed_rad_per_s",
+    "current_magnitude_a",
+    "present_scale",
+    "samples_produced",
+    "overruns",
+    "test_time_left_s",
+    "present_bias_v",
+    "current_limit_a",
+    "test_time_limit_s",
+    "voltage_limit_v",
+    "axis_deg",
+    "dc_bias_v",
+    "bias_ramp_v_per_s",
+    "amplitude_scale",
+    "scale_ramp_per_s",
+    "duration_s",
+    "tone_count",
+    "tones",
+    "channel_mask",
+    "decimation",
+    "current_scale_a",
+    "voltage_scale_v",
+    "dc_link_scale_v",
+    "current_full_scale_a",
+    "commit",
+    "store",
+    "commit_result",
+    "store_result",
+    "store_count",
 )
 """What a drive of kind `commissioning_map` must have, beside the watchdog's register and the parameter items."""
 
@@ -174,15 +218,20 @@ class DriveProfile:
             return self.items[name]
         why = self.unknown.get(name, "the drive file does not describe it")
         raise UsageError(
-            f"{self.name} has no known register for {name}", step="look up register", value=name,
-            limit="an item of the drive file", remedy=why,
+            f"{self.name} has no known register for {name}",
+            step="look up register",
+            value=name,
+            limit="an item of the drive file",
+            remedy=why,
         )
 
     def require(self, capability: str) -> None:
         """Nothing where the drive can do it; UsageError with what it can do otherwise."""
         if capability not in self.capabilities:
             raise UsageError(
-                f"{self.name} cannot {capability.replace('_', ' ')}", step="check capabilities", value=capability,
+                f"{self.name} cannot {capability.replace('_', ' ')}",
+                step="check capabilities",
+                value=capability,
                 limit=", ".join(sorted(self.capabilities)) or "none",
                 remedy=self.unknown.get(capability, "use a drive or firmware whose file lists this capability"),
             )

@@ -103,7 +103,9 @@ def channel_mask(channels: Sequence[str]) -> int:
     mask = sum({CHANNEL_BITS[name] for name in channels if name in CHANNEL_BITS})
     if unknown or mask & NEEDED_BITS != NEEDED_BITS:
         raise UsageError(
-            "these channels cannot be streamed", step="choose channels", value=", ".join(channels),
+            "these channels cannot be streamed",
+            step="choose channels",
+            value=", ".join(channels),
             limit="voltage_axis_v, current_u_a, current_v_a and optionally current_w_a",
             remedy="name the axis voltage and at least currents u and v",
         )

@@ -13,7 +13,8 @@ def folded(summary: str, parts: Sequence[str | Picture]) -> Picture:
     """Paragraphs and pictures under one line that opens them; text is escaped."""
     inside = Markup("").join(
         Markup("<figure>{}<figcaption>{}</figcaption></figure>").format(Markup(part.markup), part.caption)
-        if isinstance(part, Picture) else Markup("<p>{}</p>").format(part)
+        if isinstance(part, Picture)
+        else Markup("<p>{}</p>").format(part)
         for part in parts
     )
     return Picture(str(Markup("<details><summary>{}</summary>{}</details>").format(summary, inside)), "")

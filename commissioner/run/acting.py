@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from commissioner.link.facts import Intent
-from commissioner.link.inverter import Inverter
-from commissioner.link.port import LinkStats, Words
+from commissioner.link.drive.facts import Intent
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.wire.port import LinkStats, Words
 from commissioner.registers.profile import DriveProfile
 from commissioner.safety import commands as ask
 

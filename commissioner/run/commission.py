@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import Action, Intent
-from commissioner.link.inverter import Inverter
-from commissioner.link.url import parse_url, without_secrets
+from commissioner.link.drive.facts import Action, Intent
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
-from commissioner.procedure.excite import warm_up
+from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import Diagnosing, RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
-from commissioner.report.run_page import run_page
-from commissioner.report.summary import diagnosis_sentences, summarise
-from commissioner.run.archive import RunFolder, archive_lost, plain, read_journal, write_recording
+from commissioner.report.run.page import run_page
+from commissioner.report.run.summary import diagnosis_sentences, summarise
+from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal, write_recording
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
@@ -160,7 +160,9 @@ def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnd
     try:
         return _saved(order, folder, findings, ended)
     except OSError as failure:
-        raise archive_lost(folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}") from failure
+        raise archive_lost(
+            folder.path, failure, f"; the run itself ended as {ended.outcome}: {ended.reason}"
+        ) from failure
 
 
 def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:

@@ -7,10 +7,10 @@ from typing import Any
 
 from commissioner.diagnose.diagnosis import Diagnosis, diagnose
 from commissioner.diagnose.document import as_document
-from commissioner.diagnose.moved import moved_parameters
+from commissioner.diagnose.verdict.parameter_shift import moved_parameters
 from commissioner.errors import CommissionerError
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.run.archive import RunFolder, plain
+from commissioner.run.archive.folder import RunFolder, plain
 
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
 
@@ -23,14 +23,23 @@ def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]
     try:
         recording = to_standstill(read_table(folder.path / RECORDING))
     except CommissionerError as error:
-        return {"verdict": "refused", "reason": error.what, "causes": [], "moved": [], "is_complete": True, "file": None}
+        return {
+            "verdict": "refused",
+            "reason": error.what,
+            "causes": [],
+            "moved": [],
+            "is_complete": True,
+            "file": None,
+        }
     seen = diagnose([recording], go_on=go_on)
     document = plain(as_document(seen, None))
     folder.save(FILE, document)
     return {
         "verdict": document["verdict"],
         "reason": document["reason"],
-        "causes": [{key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]],
+        "causes": [
+            {key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]
+        ],
         "moved": _moved(seen),
         "remarks": document["remarks"],
         "is_complete": document["is_complete"],

@@ -6,10 +6,10 @@ import traceback
 from contextlib import suppress
 
 from commissioner.errors import CommissionerError, DriveFault, UsageError, WriteBackFailed
-from commissioner.link.facts import DisarmReport
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import DisarmReport
+from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
-from commissioner.run.archive import RunFolder, archive_lost
+from commissioner.run.archive.folder import RunFolder, archive_lost
 
 
 def let_go(inverter: Inverter) -> DisarmReport:

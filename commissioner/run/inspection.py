@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import CheckResult, judge_drive, judge_idle
 from commissioner.procedure.plan import ProcedurePlan

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import parse_url
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.plan import ProcedurePlan
@@ -26,7 +26,6 @@ FLUX_FRACTION = 1.1
 LATENCY_PROBES = 20
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
-
 
 
 @contextmanager

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TlsUrl, parse_url
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.records import ParameterSnapshot, WrittenParameter
 from commissioner.registers.codec import encode_item
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
-from commissioner.run.archive import RunFolder, damaged, read_journal, read_saved
-from commissioner.run.catalogue import RunSummary
+from commissioner.run.archive.catalogue import RunSummary
+from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
+from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.operator_stop import OperatorStop
-from commissioner.run.replay import read_snapshot
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
-from commissioner.run.archive import RunFolder
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
 from commissioner.run.operator_stop import OperatorStop, StopAsked
 from commissioner.safety import commands as ask

@@ -8,8 +8,8 @@ from contextlib import closing
 from pathlib import Path
 
 from commissioner.identify.analysis import Identification
-from commissioner.link.drive_file import load_profile
-from commissioner.link.url import parse_url
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.recorded import recorded_course

@@ -15,10 +15,10 @@ from scipy.linalg import expm
 from scipy.optimize import fmin
 from scipy.signal import lfilter
 
-from commissioner.identify.batch import Segment
-from commissioner.identify.bound import cramer_rao
-from commissioner.identify.fit import fit_segments
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.batch.bound import cramer_rao
+from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.segments import Segment
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
 from tests.support.standstill import linear_current, multitone, usable_motors
@@ -80,8 +80,8 @@ def rls_series_parallel(u, y, f1, f2):
 
 
 def rls(u, y):
-    from commissioner.identify.coordinates import filter_poles
-    from commissioner.identify.kernels import machine_from_theta
+    from commissioner.identify.observer.coordinates import filter_poles
+    from commissioner.identify.observer.kernels import machine_from_theta
 
     f = filter_poles(prior(MOTOR.plate), PERIOD_S)
     out = np.full(4, np.nan)

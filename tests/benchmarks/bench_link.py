@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
-from commissioner.link.url import parse_url
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import parse_url
 from commissioner.registers.window import StreamCursor
 from tests.support.sim_process import SimProcess
 
@@ -21,7 +21,12 @@ def start(inverter: Inverter, seconds: float) -> StreamCursor:
     inverter.set_watchdog(2000)
     inverter.set_limits(current_a=10.0, voltage_v=90.0, time_s=600.0)
     inverter.load_excitation(
-        axis_deg=0.0, tones=[(10.0, 5.0, 0.0)], bias_v=4.0, bias_ramp_v_per_s=40.0, scale=0.5, scale_ramp_per_s=5.0,
+        axis_deg=0.0,
+        tones=[(10.0, 5.0, 0.0)],
+        bias_v=4.0,
+        bias_ramp_v_per_s=40.0,
+        scale=0.5,
+        scale_ramp_per_s=5.0,
         duration_s=seconds,
     )
     return inverter.enable()

@@ -10,8 +10,8 @@ import time
 import pytest
 
 from commissioner.monitor.chain import Observation, observe
-from commissioner.monitor.indicators import pulses, trendable
-from sim.running_recording import load_scenario, record
+from commissioner.monitor.trend.indicators import pulses, trendable
+from sim.recordings.running import load_scenario, record
 from tests.campaigns.monitor import as_plate, as_recording
 
 

@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim import layout as at
-from sim.drive_map import load_map
-from sim.firmware import Firmware
-from sim.kernel import play_voltages
-from sim.machine import Heating, Machine, Plant, PowerStage, Sensors
-from sim.memory import Memory
-from sim.packing import fresh_state, pack
+from sim.drive.drive_map import load_map
+from sim.drive.firmware import Firmware
+from sim.drive.memory import Memory
+from sim.drive.states import Setup
+from sim.physics import layout as at
+from sim.physics.kernel import play_voltages
+from sim.physics.machine import Heating, Machine, Plant, PowerStage, Sensors
+from sim.physics.packing import fresh_state, pack
 from sim.scenario import load
-from sim.server import run_in_thread
-from sim.states import Setup
-from sim.station import Options
+from sim.wire.server import run_in_thread
+from sim.wire.station import Options
 from tests.sim.client import TcpClient
 
 PEER_PERIOD_S = 3e-4

@@ -28,17 +28,17 @@ from typing import Any
 import hypothesis
 from hypothesis import HealthCheck, Phase
 
-from commissioner.procedure.excite import warm_up
+from commissioner.procedure.energised.excite import warm_up
 from sim.scenario import Scenario
-from tests.campaigns import truth
-from tests.campaigns.one_run import Outcome, run_until_undisturbed, short_scenario
-from tests.campaigns.sequences import WIRES, Sequence, sequences
-from tests.campaigns.short_course import PLAN, Script, plate
+from tests.campaigns.short_run import truth
+from tests.campaigns.short_run.one_run import Outcome, run_until_undisturbed, short_scenario
+from tests.campaigns.short_run.sequences import WIRES, Sequence, sequences
+from tests.campaigns.short_run.short_course import PLAN, Script, plate
 
 SHARE = 50
 """Sequences drawn from one seed. Hypothesis begins each share with its simplest sequences."""
 WORKERS = multiprocessing.get_context("forkserver")
-WORKERS.set_forkserver_preload(["tests.campaigns.one_run", "tests.campaigns.warm"])
+WORKERS.set_forkserver_preload(["tests.campaigns.short_run.one_run", "tests.campaigns.short_run.warm"])
 
 
 def share(count: int, seed: int, wire: str, end: float = float("inf"), *, shrinks: bool = False) -> list[Outcome]:

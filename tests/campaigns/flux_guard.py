@@ -20,19 +20,19 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from commissioner.identify.bias import CUT_ABOVE, BiasGuard, plan_bias
-from commissioner.identify.compensation import NOTHING, Compensation
-from commissioner.identify.coordinates import PRIOR_LOG_STD
-from commissioner.identify.excitation import Excitation, ExcitationLimits, design
-from commissioner.identify.flux import FluxAdvice, FluxGuard
-from commissioner.identify.observer import ParallelObserver
-from commissioner.identify.resistance import IDEAL_INVERTER, DcLevel, InverterError, StaircaseLimits, staircase
+from commissioner.identify.excite.bias import CUT_ABOVE, BiasGuard, plan_bias
+from commissioner.identify.excite.flux_guard import FluxAdvice, FluxGuard
+from commissioner.identify.excite.tones import Excitation, ExcitationLimits, design
+from commissioner.identify.inverter.compensation import NOTHING, Compensation
+from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, StaircaseLimits, staircase
+from commissioner.identify.observer.coordinates import PRIOR_LOG_STD
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
+from commissioner.procedure.energised.closing_bias import SECONDS as BIAS_S
+from commissioner.procedure.energised.multitone import KNOWN_LOG_STD
 from commissioner.procedure.steps import BELOW_TRIP
-from commissioner.procedure.under_bias import SECONDS as BIAS_S
-from commissioner.procedure.under_test import KNOWN_LOG_STD
 from tests.support.standstill import saturating_block, usable_motors
 
 PERIOD_S = 2e-4

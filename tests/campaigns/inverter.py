@@ -17,10 +17,10 @@ import numpy as np
 
 from commissioner.identify.analysis import Identification, identify
 from commissioner.records import StandstillRecording
-from sim.hidden import impedance
-from sim.inductance import inverse_gamma
-from sim.machine import Machine
-from sim.recording import record
+from sim.physics.inductance import inverse_gamma
+from sim.physics.machine import Machine
+from sim.recordings.hidden import impedance
+from sim.recordings.standstill import record
 from sim.scenario import Scenario, build, table_machine, table_rows
 
 NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")

@@ -26,21 +26,21 @@ from typing import Any
 import numpy as np
 
 from commissioner.errors import CommissionerError, LinkError
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import parse_url
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.url import parse_url
 from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock
-from commissioner.run.archive import RunFolder, read_blocks, read_journal
-from commissioner.run.catalogue import RunSummary, find_run
+from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal
 from commissioner.run.job import bounds, watch_limits
 from commissioner.run.restore import restore
 from commissioner.run.runner import Runner
-from tests.campaigns import truth
-from tests.campaigns.one_run import make_job
-from tests.campaigns.sequences import WIRES
-from tests.campaigns.short_course import (
+from tests.campaigns.short_run import truth
+from tests.campaigns.short_run.one_run import make_job
+from tests.campaigns.short_run.sequences import WIRES
+from tests.campaigns.short_run.short_course import (
     NEW_ON_THE_WIRE,
     OLD_ON_THE_WIRE,
     REPLY_TIMEOUT_S,
@@ -54,7 +54,7 @@ from tests.support.sim_process import SimProcess
 LONGEST_RUN_S = 60.0
 PROFILE = "simulated"
 VICTIMS = multiprocessing.get_context("forkserver")
-VICTIMS.set_forkserver_preload(["tests.campaigns.one_run", "tests.campaigns.warm"])
+VICTIMS.set_forkserver_preload(["tests.campaigns.short_run.one_run", "tests.campaigns.short_run.warm"])
 WHOLE_RUN_ATTEMPTS = 5
 """A busy machine can miss the short reply time-out of these runs."""
 

@@ -17,12 +17,12 @@ import numpy as np
 from scipy.signal import decimate
 
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
-from commissioner.monitor.fit import Start
+from commissioner.monitor.machine.fit import Start
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit
 from commissioner.records import RunningRecording
-from sim.running import Played
-from sim.running_recording import CURRENTS, LINES, NAMEPLATE, PHASES, record, run
+from sim.physics.running import Played
+from sim.recordings.running import CURRENTS, LINES, NAMEPLATE, PHASES, record, run
 
 MOTORS = Path(__file__).parents[1] / "data" / "motors" / "motors.csv"
 KINDS = ("compressor", "leak", "imbalance", "pump", "brake", "gear", "both")

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from commissioner.monitor.chain import Refused
-from commissioner.monitor.indicators import pulses, trendable
 from commissioner.monitor.result import entry_of
-from commissioner.monitor.trend import Entry, History, State, judge
-from sim.running_recording import load_scenario, run
+from commissioner.monitor.trend.indicators import pulses, trendable
+from commissioner.monitor.trend.trend import Entry, History, State, judge
+from sim.recordings.running import load_scenario, run
 
 LEAKS_MM2 = (0.0, 0.8, 1.5, 3.1)
 LEARNED = 20

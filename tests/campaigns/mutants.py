@@ -26,18 +26,26 @@ ROOT = Path(__file__).resolve().parents[2]
 TARGETS = {
     "commissioner.safety.limits": ("tests/unit/safety/test_limits.py",),
     "commissioner.safety.watch": ("tests/unit/safety/test_watch.py",),
-    "commissioner.procedure.states": ("tests/unit/test_states.py",),
+    "commissioner.procedure.states": ("tests/unit/procedure/test_states.py",),
 }
 """commands.py holds records only: there is nothing to mutate."""
 EXPLAINED = {
-    ("commissioner.safety.watch", "-(block.current_u_a + block.current_v_a)"):
-        "the same: only the magnitude of the third phase is looked at",
-    ("commissioner.safety.limits", '_within("sum of tone amplitudes", peak, 0.0, bounds.test_voltage_v)'):
-        "0.0 or -1.0 as the lower limit: a sum of magnitudes is below neither",
-    ("commissioner.safety.limits", 'return _within("bias", abs(command.bias_v), 0.0, bounds.test_voltage_v)'):
-        "0.0 or -1.0 as the lower limit: a magnitude is below neither",
-    ("commissioner.safety.limits", "limits = zip(fields(circuit), circuit.as_tuple(), box.lower.as_tuple(),"):
-        "strict or not: four fields, four values, four limits",
+    (
+        "commissioner.safety.watch",
+        "-(block.current_u_a + block.current_v_a)",
+    ): "the same: only the magnitude of the third phase is looked at",
+    (
+        "commissioner.safety.limits",
+        '_within("sum of tone amplitudes", peak, 0.0, bounds.test_voltage_v)',
+    ): "0.0 or -1.0 as the lower limit: a sum of magnitudes is below neither",
+    (
+        "commissioner.safety.limits",
+        'return _within("bias", abs(command.bias_v), 0.0, bounds.test_voltage_v)',
+    ): "0.0 or -1.0 as the lower limit: a magnitude is below neither",
+    (
+        "commissioner.safety.limits",
+        "limits = zip(fields(circuit), circuit.as_tuple(), box.lower.as_tuple(),",
+    ): "strict or not: four fields, four values, four limits",
 }
 """(module, part of the line, with the mutant in it) of survivors, and why no test can kill them."""
 
@@ -192,7 +200,9 @@ def main(arguments: list[str] | None = None) -> int:
             if has_survived:
                 alive.append(mutant)
     unexplained = [mutant for mutant in alive if not mutant.is_explained]
-    print(f"{count} mutants, {count - len(alive)} killed, {len(alive)} survived, {len(unexplained)} of them unexplained")
+    print(
+        f"{count} mutants, {count - len(alive)} killed, {len(alive)} survived, {len(unexplained)} of them unexplained"
+    )
     return int(bool(unexplained))
 
 

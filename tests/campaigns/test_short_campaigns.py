@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from commissioner.link.facts import DisarmReport
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import DisarmReport
+from commissioner.link.drive.inverter import Inverter
 from commissioner.run import runner
 from tests.campaigns import mutants
 from tests.campaigns.faults import campaign, report
-from tests.campaigns.one_run import run_one, run_until_undisturbed, short_scenario
-from tests.campaigns.sequences import Sequence
-from tests.campaigns.short_course import Script
+from tests.campaigns.short_run.one_run import run_one, run_until_undisturbed, short_scenario
+from tests.campaigns.short_run.sequences import Sequence
+from tests.campaigns.short_run.short_course import Script
 
 SCENARIO = short_scenario()
 SEQUENCES, FIRST_SEED = 200, 100_000

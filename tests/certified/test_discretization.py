@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from commissioner.identify.batch import Segment
-from commissioner.identify.fit import fit_segments
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.segments import Segment
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.nameplate import prior
 from tests.support.standstill import linear_current, multitone, usable_motors
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.bound import cramer_rao
-from commissioner.identify.excitation import ExcitationLimits, design
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.batch.bound import cramer_rao
+from commissioner.identify.excite.tones import ExcitationLimits, design
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior, rated_flux
 from tests.support.standstill import linear_current, usable_motors

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.observer import ParallelObserver
-from commissioner.identify.whiteness import whiteness
+from commissioner.identify.batch.whiteness import whiteness
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
 from tests.support.standstill import linear_current, multitone, usable_motors

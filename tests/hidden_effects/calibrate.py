@@ -1,7 +1,7 @@
 """Weights of the confidence from blind rows: `python -m tests.hidden_effects.calibrate rows.json ...`.
 
 Logistic regression with a small ridge; five folds by case, so that no case judges itself. Rows must be of another release
-than those the protocol reports. Prints the tuple for `commissioner/diagnose/calibration.py`.
+than those the protocol reports. Prints the tuple for `commissioner/diagnose/verdict/calibration.py`.
 """
 
 from __future__ import annotations

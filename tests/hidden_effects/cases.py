@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from commissioner.records import StandstillRecording
-from sim.effects import CATALOGUE
-from sim.hidden import STRATA, UNUSUAL, draw
-from sim.recording import record
+from sim.physics.effects import CATALOGUE
+from sim.recordings.hidden import STRATA, UNUSUAL, draw
+from sim.recordings.standstill import record
 from sim.scenario import Scenario
 
 WEIGHTS = {

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose import play as player
-from commissioner.diagnose.audit import prepare
+from commissioner.diagnose.catalogue import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.fit import fit
-from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import bare_layout, from_segment_to_segment, nominal_fit
-from sim.recording import record
+from commissioner.diagnose.export import playback as player
+from commissioner.diagnose.fit.gauss_newton import fit
+from commissioner.diagnose.intake.audit import prepare
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.search.nominal import bare_layout, from_segment_to_segment, nominal_fit
+from sim.recordings.standstill import record
 from sim.scenario import Scenario
 from tests.hidden_effects.cases import class_of, other_excitation, recording_of, without_noise
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.hidden import STRATA
+from sim.recordings.hidden import STRATA
 from tests.hidden_effects import scoring
 from tests.hidden_effects.cases import Case, key_of, plan, recording_of, sealed
 

@@ -163,7 +163,9 @@ def _distributions(rows: Sequence[Row]) -> list[Line]:
     spreads = [s for s in spreads if s]
     if spreads:
         middle, high = quantiles_of_noise(spreads, (0.5, 0.95))
-        out.append(Line("the same if noise of the stated spreads alone acted", f"{middle:.2%}, {high:.1%}", len(spreads), ""))
+        out.append(
+            Line("the same if noise of the stated spreads alone acted", f"{middle:.2%}, {high:.1%}", len(spreads), "")
+        )
     if gains:
         low, middle = np.quantile(gains, [0.01, 0.5])
         text = f"{low:.4f}, {middle:.5f}"

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from sim import layout as at
-from sim.laws import leakage_excess, saturation_excess
-from sim.machine import Effect, Plant
-from sim.packing import pack
+from sim.physics import layout as at
+from sim.physics.laws import leakage_excess, saturation_excess
+from sim.physics.machine import Effect, Plant
+from sim.physics.packing import pack
 from sim.truth import leg_error_v
 
 Sizes = Mapping[str, tuple[float, float, str]]

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.detectable import detection_limits
 from commissioner.diagnose.diagnosis import diagnose
-from tests.hidden_effects.another_hand import PEAK_A, TONES_HZ, Machine, recorded
+from commissioner.diagnose.verdict.detection_limits import detection_limits
 from tests.hidden_effects.cases import class_of
+from tests.hidden_effects.generators.another_hand import PEAK_A, TONES_HZ, Machine, recorded
 
 
 def named(machine, seconds=1.0):
@@ -123,11 +123,15 @@ def test_a_recorded_link_that_sags_and_ripples_is_two_causes_with_their_sizes():
     assert set(names) == {"dc_link_sag", "dc_link_ripple"}
 
 
-@pytest.mark.parametrize(("about", "wanted"), [({}, set()), long({"iron_ohm": 900.0}, {"iron_loss"}), ({"lag_s": 1.2e-4}, {"sensor_lag"})])
+@pytest.mark.parametrize(
+    ("about", "wanted"), [({}, set()), long({"iron_ohm": 900.0}, {"iron_loss"}), ({"lag_s": 1.2e-4}, {"sensor_lag"})]
+)
 def test_a_sweep_shows_linear_causes_as_tones_do(about, wanted):
     """It had been audited as a single tone, which bars them."""
     _, names = named(Machine(sweeps=True, **about), 3.0)
-    assert set(names) == wanted or (len(names) == 1 and any(class_of(w) & found for w in wanted for found in names.values())), names
+    assert set(names) == wanted or (
+        len(names) == 1 and any(class_of(w) & found for w in wanted for found in names.values())
+    ), names
 
 
 @pytest.mark.campaign
@@ -228,7 +232,10 @@ def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
 @pytest.mark.campaign
 def test_a_cause_is_seen_from_about_its_stated_limit_on():
     limits = detection_limits(named(Machine(), 1.5)[0].found)
-    offset_a, gain = (limits[n][key]["value"] for n, key in (("sensor_offset", "offset_w_a"), ("sensor_gain_mismatch", "gain_w_over_u")))
+    offset_a, gain = (
+        limits[n][key]["value"]
+        for n, key in (("sensor_offset", "offset_w_a"), ("sensor_gain_mismatch", "gain_w_over_u"))
+    )
     for times, is_seen in ((0.5, False), (2.0, True)):
         assert ("sensor_offset" in named(Machine(offsets_a=(0.0, 0.0, times * offset_a)), 1.5)[1]) is is_seen
         assert ("sensor_gain_mismatch" in named(Machine(gains=(1.0, 1.0, 1.0 + times * gain)), 1.5)[1]) is is_seen
@@ -264,5 +271,7 @@ def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(about):
 @pytest.mark.parametrize(("step", "wanted"), [(2.3e-3, {"quantization"}), (1.4e-3, set())])
 def test_steps_coarser_than_those_of_twelve_bits_are_named(step, wanted):
     seen = recorded(Machine(noise=3e-4), 1.5)
-    u, v, w = (step * PEAK_A * np.round(i / (step * PEAK_A)) for i in (seen.current_u_a, seen.current_v_a, seen.current_w_a))
+    u, v, w = (
+        step * PEAK_A * np.round(i / (step * PEAK_A)) for i in (seen.current_u_a, seen.current_v_a, seen.current_w_a)
+    )
     assert {c.name for c in diagnose([replace(seen, current_u_a=u, current_v_a=v, current_w_a=w)]).causes} == wanted

@@ -39,13 +39,21 @@ def test_a_lag_beside_a_clock_that_drifts_is_no_delay_and_cable(seed):
 
 @pytest.mark.parametrize(
     ("stratum", "seed"),
-    [("three", 2400013), *(pytest.param(*x, marks=pytest.mark.campaign) for x in (("two", 2000034), ("four", 2400023), ("four", 2400014)))],
+    [
+        ("three", 2400013),
+        *(
+            pytest.param(*x, marks=pytest.mark.campaign)
+            for x in (("two", 2000034), ("four", 2400023), ("four", 2400014))
+        ),
+    ],
 )
 def test_a_weak_cause_that_takes_all_of_the_rest_is_named_beside_a_strong_one(stratum, seed):
     """A share of the strongest cause's gain had been taken for what its form may leave: half of each of these was `unexplained`."""
     seen, scenario = diagnosed(Case(stratum, seed), 3.0)
     named = [{c.name, *c.equivalent} for c in seen.causes]
-    assert len(named) >= 2 and all(any(class_of(name) & names for name in hidden_names(scenario)) for names in named), named
+    assert len(named) >= 2 and all(any(class_of(name) & names for name in hidden_names(scenario)) for names in named), (
+        named
+    )
     assert seen.left.sigma < 0.1
 
 

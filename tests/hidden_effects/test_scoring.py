@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.packing import pack
+from sim.physics import kernel
+from sim.physics.packing import pack
 from tests.hidden_effects import scoring
 from tests.hidden_effects.cases import WEIGHTS, Case, class_of, plan
 from tests.hidden_effects.sizes import carried_by_memory
@@ -82,7 +82,9 @@ def test_the_calibration_error_is_small_for_honest_and_large_for_boasting_confid
 def test_noise_of_one_spread_has_the_normal_laws_quantiles_and_a_wide_few_rule_the_tail():
     assert scoring.quantiles_of_noise([0.01] * 5, (0.5, 0.95)) == pytest.approx([0.006745, 0.0196], rel=1e-3)
     drawn = np.abs(np.random.default_rng(1).normal(size=(20_000, 10)) * ([0.001] * 9 + [0.1])).ravel()
-    assert scoring.quantiles_of_noise([0.001] * 9 + [0.1], (0.5, 0.95)) == pytest.approx(np.quantile(drawn, [0.5, 0.95]), rel=0.03)
+    assert scoring.quantiles_of_noise([0.001] * 9 + [0.1], (0.5, 0.95)) == pytest.approx(
+        np.quantile(drawn, [0.5, 0.95]), rel=0.03
+    )
 
 
 def test_wilson_contains_the_rate_and_narrows():

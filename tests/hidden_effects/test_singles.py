@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim.effects import CATALOGUE
+from sim.physics.effects import CATALOGUE
 from tests.hidden_effects.blind import SECONDS, diagnosed, hidden_names
 from tests.hidden_effects.cases import Case, class_of
 

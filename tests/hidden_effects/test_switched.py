@@ -3,7 +3,7 @@
 import pytest
 
 from commissioner.diagnose.diagnosis import diagnose
-from tests.hidden_effects.switched import LINK_V, PLATE, Drive, switched
+from tests.hidden_effects.generators.switched import LINK_V, PLATE, Drive, switched
 
 
 def named(drive):

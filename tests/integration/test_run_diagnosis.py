@@ -5,7 +5,7 @@ import pytest
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.report.summary import diagnosis_sentences
+from commissioner.report.run.summary import diagnosis_sentences
 from tests.support.command_line import call
 from tests.support.sim_process import SimProcess
 
@@ -48,4 +48,7 @@ def test_a_diagnosis_whose_time_is_over_does_not_say_that_nothing_fits(ended):
     document = as_document(diagnose([to_standstill(read_table(path))], go_on=lambda: False), None)
     assert not document["is_complete"]
     assert document["reason"].startswith("Not finished")
-    assert "stopped before every cause was tried" in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
+    assert (
+        "stopped before every cause was tried"
+        in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
+    )

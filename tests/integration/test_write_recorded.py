@@ -24,7 +24,17 @@ def fc302() -> Bank:
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("recorded") / "scope.parquet"
     made = call(
-        "simulate", "motor_2kw2", "--out", str(path), "--seconds", "4", "--axes", "0,60,120", "--noise-a", "0.01", "--json"
+        "simulate",
+        "motor_2kw2",
+        "--out",
+        str(path),
+        "--seconds",
+        "4",
+        "--axes",
+        "0,60,120",
+        "--noise-a",
+        "0.01",
+        "--json",
     )
     assert made.code == 0
     return path

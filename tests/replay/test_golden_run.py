@@ -10,11 +10,12 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.identify.analysis import identify
-from commissioner.procedure import excite, steps
+from commissioner.procedure import steps
+from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
-from commissioner.run import replay as replaying
-from commissioner.run.archive import RunFolder, read_blocks, read_journal
-from commissioner.run.replay import replay
+from commissioner.run.archive import replay as replaying
+from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal
+from commissioner.run.archive.replay import replay
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.sim_process import SimProcess
 
@@ -167,7 +168,9 @@ def test_a_changed_end_is_reported(fresh, tmp_path):
     assert difference is not None and difference.archived["kind"] == "run_ended"
 
 
-@pytest.mark.parametrize(("action", "key"), [("prepare", "watchdog_ms"), ("energise", "tones"), ("steer", "amplitude_scale")])
+@pytest.mark.parametrize(
+    ("action", "key"), [("prepare", "watchdog_ms"), ("energise", "tones"), ("steer", "amplitude_scale")]
+)
 def test_a_command_that_was_carried_out_otherwise_is_reported(fresh, tmp_path, action, key):
     was_changed = []
 

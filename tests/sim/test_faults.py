@@ -6,10 +6,10 @@ import time
 
 import pytest
 
-from sim.faults import DRIVE, SERVER, WIRE, FaultError, parse
 from sim.scenario import load
-from sim.server import run_in_thread
-from sim.station import Options
+from sim.wire.faults import DRIVE, SERVER, WIRE, FaultError, parse
+from sim.wire.server import run_in_thread
+from sim.wire.station import Options
 from tests.sim.client import Refused, RtuClient, Silent, TcpClient, crc_bytes, floats
 
 SCENARIO = load("default")
@@ -312,7 +312,9 @@ def test_a_fault_among_writes_counts_only_requests_that_write():
     assert [plain.hits(request, write) for request, write in ((2, None), (2, 1), (9, 2))] == [1, 1, 0]
 
 
-@pytest.mark.parametrize("text", ["nonsense", "late:x", "lost@", "lost@soon", "lost@w", "lost@w2s", "stray_before:zz", "Late", "late:1@2x"])
+@pytest.mark.parametrize(
+    "text", ["nonsense", "late:x", "lost@", "lost@soon", "lost@w", "lost@w2s", "stray_before:zz", "Late", "late:1@2x"]
+)
 def test_unclear_fault_texts_are_refused(text):
     with pytest.raises(FaultError):
         parse(text)

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim import layout as at
-from sim.drive_map import load_map
-from sim.firmware import Firmware
-from sim.machine import Plant, Sensors
-from sim.memory import Memory
-from sim.states import Answer, Setup, State, Trip
+from sim.drive.drive_map import load_map
+from sim.drive.firmware import Firmware
+from sim.drive.memory import Memory
+from sim.drive.states import Answer, Setup, State, Trip
+from sim.physics import layout as at
+from sim.physics.machine import Plant, Sensors
 from tests.sim.client import crc_bytes, floats
 
 MAP = load_map()

@@ -11,11 +11,11 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from sim import layout as at
-from sim.inductance import inverse_gamma
-from sim.kernel import all_currents, coast, play_voltages
-from sim.machine import Effect, Heating, Machine, Plant, PowerStage, Sensors
-from sim.packing import fresh_state, pack
+from sim.physics import layout as at
+from sim.physics.inductance import inverse_gamma
+from sim.physics.kernel import all_currents, coast, play_voltages
+from sim.physics.machine import Effect, Heating, Machine, Plant, PowerStage, Sensors
+from sim.physics.packing import fresh_state, pack
 from sim.truth import axis_error_v
 
 IDEAL = Plant(

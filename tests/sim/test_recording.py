@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.linalg import expm
 
-from sim import hidden
-from sim.effects import CATALOGUE
-from sim.inductance import inverse_gamma
-from sim.recording import record, write_table
+from sim.physics.effects import CATALOGUE
+from sim.physics.inductance import inverse_gamma
+from sim.recordings import hidden
+from sim.recordings.standstill import record, write_table
 from sim.scenario import build, load
 
 NAMES = [
@@ -165,9 +165,14 @@ def test_a_loss_resistance_draws_its_new_current_as_soon_as_the_voltage_steps(la
         held = u[k - back]
         exact[k] = share * (core @ (part[:2, :2] @ flux[k - back] + part[:2, 2] * held) + g * held)
     axis = np.radians(SHORT["axis_deg"])
-    along = sum(
-        columns[f"current_{name}_a"] * np.cos(axis - k * 2.0 * np.pi / 3.0) for name, k in (("u", 0), ("v", 1), ("w", -1))
-    ) * 2.0 / 3.0
+    along = (
+        sum(
+            columns[f"current_{name}_a"] * np.cos(axis - k * 2.0 * np.pi / 3.0)
+            for name, k in (("u", 0), ("v", 1), ("w", -1))
+        )
+        * 2.0
+        / 3.0
+    )
     assert np.std(g * np.diff(u)) > 0.1
     np.testing.assert_allclose(along[3:], exact[3:], atol=6e-4)
 

@@ -22,8 +22,8 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from sim.scenario import load
-from sim.server import run_in_thread
-from sim.station import Options
+from sim.wire.server import run_in_thread
+from sim.wire.station import Options
 from tests.sim.client import Client, Refused, RtuClient, Silent, TcpClient, as_float
 
 SCENARIO = load("default")

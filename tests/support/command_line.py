@@ -28,7 +28,12 @@ def call(*arguments: str, timeout_s: float = 150.0, cwd: Path | None = None) -> 
     """Run to the end. A traceback on stderr is never right. A run's closing diagnosis is only made where it is asked for."""
     is_quick = arguments[:1] == ("run",) and "--diagnosis" not in arguments
     done = subprocess.run(
-        [*COMMAND, *arguments, *(("--no-diagnosis",) if is_quick else ())], capture_output=True, text=True, timeout=timeout_s, cwd=cwd, check=False
+        [*COMMAND, *arguments, *(("--no-diagnosis",) if is_quick else ())],
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        cwd=cwd,
+        check=False,
     )
     assert "Traceback" not in done.stderr, done.stderr
     return Answer(done.returncode, done.stdout, done.stderr)

@@ -12,7 +12,7 @@ import numpy as np
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
-from sim.running_recording import load_scenario, record
+from sim.recordings.running import load_scenario, record
 from tests.campaigns.monitor import as_plate, as_recording
 
 Taken = tuple[RunningRecording, Nameplate, dict[str, Any]]

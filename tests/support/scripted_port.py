@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, RequestRefused
-from commissioner.link.port import LinkStats
+from commissioner.link.wire.port import LinkStats
 
 MAP = Path(__file__).resolve().parents[2] / "config" / "drives" / "simulated.toml"
 WORDS = {"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1}
@@ -124,12 +124,30 @@ class ScriptedDrive:
     def _power_up(self) -> None:
         identity = self.document["identity"]
         for name, value in {
-            "magic": identity["magic"], "map_version": 1, "firmware_version": 0x00010203, "serial_number": 4711,
-            "drive_type": identity["drive_type"], "rated_drive_current_a": 7.0, "control_period_s": 200_000,
-            "switching_frequency_hz": 5000.0, "interlocks": 0b11111, "dc_link_v": 560.0, "heatsink_degc": 30.0,
-            "winding_degc": float("nan"), "current_scale_a": 0.001, "voltage_scale_v": 0.02, "dc_link_scale_v": 0.05,
-            "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0,
-            "rated_speed_rpm": 1436.0, "power_factor": 0.8, "pole_pairs": 2, "session_id": 100, "store_count": 17,
+            "magic": identity["magic"],
+            "map_version": 1,
+            "firmware_version": 0x00010203,
+            "serial_number": 4711,
+            "drive_type": identity["drive_type"],
+            "rated_drive_current_a": 7.0,
+            "control_period_s": 200_000,
+            "switching_frequency_hz": 5000.0,
+            "interlocks": 0b11111,
+            "dc_link_v": 560.0,
+            "heatsink_degc": 30.0,
+            "winding_degc": float("nan"),
+            "current_scale_a": 0.001,
+            "voltage_scale_v": 0.02,
+            "dc_link_scale_v": 0.05,
+            "rated_power_w": 2200.0,
+            "rated_voltage_v": 400.0,
+            "rated_frequency_hz": 50.0,
+            "rated_current_a": 5.0,
+            "rated_speed_rpm": 1436.0,
+            "power_factor": 0.8,
+            "pole_pairs": 2,
+            "session_id": 100,
+            "store_count": 17,
         }.items():
             self.put(name, value)
         for name, value in zip(PARAMETERS, PRESENT, strict=True):
@@ -160,8 +178,11 @@ class ScriptedDrive:
             self.state = "disabled" if word & 0x80 else "fault"
             return
         follow = {
-            0x06: "ready", 0x07: "switched on" if self.state in ("ready", "enabled") else self.state,
-            0x0F: "enabled" if self.state == "switched on" else self.state, 0x02: "disabled", 0x00: "disabled",
+            0x06: "ready",
+            0x07: "switched on" if self.state in ("ready", "enabled") else self.state,
+            0x0F: "enabled" if self.state == "switched on" else self.state,
+            0x02: "disabled",
+            0x00: "disabled",
         }
         before, self.state = self.state, follow.get(word, self.state)
         if self.state == "enabled" and before != "enabled":

@@ -1,7 +1,7 @@
 """`python -m sim` as a process of its own, for tests that speak to it over a wire.
 
-    with SimProcess("--tcp", "0") as sim:
-        open_port(parse_url(sim.url), ...)
+with SimProcess("--tcp", "0") as sim:
+    open_port(parse_url(sim.url), ...)
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ class SimProcess:
     def __init__(self, *arguments: str, speed: str = "max") -> None:
         self._folder = tempfile.TemporaryDirectory()
         self.log_file = Path(self._folder.name) / "state.jsonl"
-        self._command = [
-            sys.executable, "-m", "sim", "--speed", speed, "--state-log", str(self.log_file), *arguments
-        ]
+        self._command = [sys.executable, "-m", "sim", "--speed", speed, "--state-log", str(self.log_file), *arguments]
 
     def __enter__(self) -> SimProcess:
         self._process = subprocess.Popen(
             self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL
         )
         kind, address = self._listening().split()[1:3]
-        self.url = {"tcp": f"tcp://{address}", "tls": f"tls://{address}", "rtu": f"rtu://{address}?parity=N&stop=1&baud=921600"}[kind]
+        self.url = {
+            "tcp": f"tcp://{address}",
+            "tls": f"tls://{address}",
+            "rtu": f"rtu://{address}?parity=N&stop=1&baud=921600",
+        }[kind]
         return self
 
     def __exit__(

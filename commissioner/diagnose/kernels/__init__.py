@@ -2,4 +2,4 @@
 
 from commissioner.compiled import forget_stale_kernels
 
-forget_stale_kernels(__path__[0], "kinds.py")
+forget_stale_kernels(__path__[0], "kernels/kinds.py")

@@ -36,7 +36,9 @@ def replayed(path, radius):
     z = np.zeros((radius.shape[0], 2))
     for m in range(1, path.shape[1]):
         for s in range(radius.shape[0]):
-            z[s, 0], z[s, 1] = remembered(z[s, 0], z[s, 1], path[0, m] - path[0, m - 1], path[1, m] - path[1, m - 1], radius[s])
+            z[s, 0], z[s, 1] = remembered(
+                z[s, 0], z[s, 1], path[0, m] - path[0, m - 1], path[1, m] - path[1, m - 1], radius[s]
+            )
     return z
 
 
@@ -99,6 +101,10 @@ def susceptibility(za, zb, da, db, qa, qb, radius):
         ua, ub = qa / size, qb / size
     g = keep / radius
     return (
-        f + (keep - f) * ua * ua + g * za * ua, (keep - f) * ua * ub + 0.5 * g * (za * ub + zb * ua),
-        f + (keep - f) * ub * ub + g * zb * ub, keep, 0.0, keep,
+        f + (keep - f) * ua * ua + g * za * ua,
+        (keep - f) * ua * ub + 0.5 * g * (za * ub + zb * ua),
+        f + (keep - f) * ub * ub + g * zb * ub,
+        keep,
+        0.0,
+        keep,
     )

@@ -47,9 +47,39 @@ def _leg_path(i0, i1, top, knee, intervals, mean):
 
 @kernel
 def at_samples(
-    start, stop, states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega,
-    base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top, stop_gain, stop_radius, branch_gain, branch_time,
-    working, wants_legs, at, before, now, secant, leg_mean, lost, memory,
+    start,
+    stop,
+    states,
+    stop_states,
+    voltage_a,
+    voltage_b,
+    voltage_factor,
+    link_factor,
+    phase_factor,
+    rotor_factor,
+    omega,
+    base,
+    legs,
+    legs_link,
+    iron,
+    leak,
+    legs_top,
+    legs_knee,
+    iron_top,
+    leak_top,
+    stop_gain,
+    stop_radius,
+    branch_gain,
+    branch_time,
+    working,
+    wants_legs,
+    at,
+    before,
+    now,
+    secant,
+    leg_mean,
+    lost,
+    memory,
 ):
     """(1)-(6) at samples `start` ... `stop` - 1 into columns 1 ... of `at` and rows 1 ... of the others; 0 is the sample before.
 
@@ -86,7 +116,10 @@ def at_samples(
         at[IRON_A, m], at[IRON_B, m] = pa, pb
         grown_aa = grown_ab = grown_bb = 0.0
         last = max(t - 1, 0)
-        ra, rb = (1.0 - nu) * states[last, 2] + nu * states[last, 0], (1.0 - nu) * states[last, 3] + nu * states[last, 1]
+        ra, rb = (
+            (1.0 - nu) * states[last, 2] + nu * states[last, 0],
+            (1.0 - nu) * states[last, 3] + nu * states[last, 1],
+        )
         for k, s in enumerate(working):
             f = stop_gain[s] / abs(stop_radius[s, 0])
             za, zb = stop_states[t, s, 0], stop_states[t, s, 1]
@@ -137,7 +170,11 @@ def at_samples(
         # (5): legs between the two samples, in the voltage they lose; the period begins with its own voltage
         _phases(ta, tb, now[m])
         jump = shrink * g
-        _phases(at[AMP_A, m - 1] + jump * (va - at[VOLT_A, m - 1]), at[AMP_B, m - 1] + jump * (vb - at[VOLT_B, m - 1]), before[m])
+        _phases(
+            at[AMP_A, m - 1] + jump * (va - at[VOLT_A, m - 1]),
+            at[AMP_B, m - 1] + jump * (vb - at[VOLT_B, m - 1]),
+            before[m],
+        )
         if t == 0:
             before[m] = now[m]
         if has_link and (linked < 0 or link_factor[held] != link_factor[linked]):

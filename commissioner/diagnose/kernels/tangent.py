@@ -19,10 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from commissioner.compiled import kernel
-from commissioner.diagnose import kinds
+from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels import samples as row
-from commissioner.diagnose.kernels.march import forced, marched, marched_with_memory
-from commissioner.diagnose.kernels.pushes import INTO_FLUX, pushes, through_the_circuit
+from commissioner.diagnose.kernels.forcing import INTO_FLUX, pushes, through_the_circuit
+from commissioner.diagnose.kernels.recursion import forced, marched, marched_with_memory
 from commissioner.diagnose.kernels.samples import at_samples
 from commissioner.diagnose.kernels.trajectory import SQRT3
 
@@ -61,8 +61,18 @@ def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage
         n_aa = gm * (1.0 + base[10]) + f * jaa - r_aa + h * eaa
         n_ab = gm * base[11] + f * jab - r_ab + h * eab
         n_bb = gm * (1.0 - base[10]) + f * jbb - r_bb + h * ebb
-        amp[m, 0, 0], amp[m, 0, 1], amp[m, 0, 2], amp[m, 0, 3] = shrink * s_aa, shrink * s_ab, shrink * r_aa, shrink * r_ab
-        amp[m, 1, 0], amp[m, 1, 1], amp[m, 1, 2], amp[m, 1, 3] = shrink * s_ab, shrink * s_bb, shrink * r_ab, shrink * r_bb
+        amp[m, 0, 0], amp[m, 0, 1], amp[m, 0, 2], amp[m, 0, 3] = (
+            shrink * s_aa,
+            shrink * s_ab,
+            shrink * r_aa,
+            shrink * r_ab,
+        )
+        amp[m, 1, 0], amp[m, 1, 1], amp[m, 1, 2], amp[m, 1, 3] = (
+            shrink * s_ab,
+            shrink * s_bb,
+            shrink * r_ab,
+            shrink * r_bb,
+        )
         # rotor branches at the end of the period: w' = K (... - W (S0 + beta w))
         rr = at[row.RATE, m]
         waa, wab, wbb = rr * (1.0 + base[6]), rr * base[7], rr * (1.0 - base[6])
@@ -95,7 +105,10 @@ def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage
         for r in range(4):
             for c in range(4):
                 step[m, r, c] = (
-                    back[r, 0] * whole[0, c] + back[r, 1] * whole[1, c] + back[r, 2] * whole[2, c] + back[r, 3] * whole[3, c]
+                    back[r, 0] * whole[0, c]
+                    + back[r, 1] * whole[1, c]
+                    + back[r, 2] * whole[2, c]
+                    + back[r, 3] * whole[3, c]
                 )
             for c in range(2):
                 push[r, c, m] = half * (back[r, 0] * v[0, c] + back[r, 1] * v[1, c])
@@ -107,8 +120,14 @@ def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage
 @kernel
 def _solved(v, amp, cage, half, om, back):
     """Inverse (4, 4) of I - T/2 [V amp; -cage + omega J], by the Schur complement of the rotor block."""
-    a00, a01 = 1.0 - half * (v[0, 0] * amp[0, 0] + v[0, 1] * amp[1, 0]), -half * (v[0, 0] * amp[0, 1] + v[0, 1] * amp[1, 1])
-    a10, a11 = -half * (v[1, 0] * amp[0, 0] + v[1, 1] * amp[1, 0]), 1.0 - half * (v[1, 0] * amp[0, 1] + v[1, 1] * amp[1, 1])
+    a00, a01 = (
+        1.0 - half * (v[0, 0] * amp[0, 0] + v[0, 1] * amp[1, 0]),
+        -half * (v[0, 0] * amp[0, 1] + v[0, 1] * amp[1, 1]),
+    )
+    a10, a11 = (
+        -half * (v[1, 0] * amp[0, 0] + v[1, 1] * amp[1, 0]),
+        1.0 - half * (v[1, 0] * amp[0, 1] + v[1, 1] * amp[1, 1]),
+    )
     b00, b01 = -half * (v[0, 0] * amp[0, 2] + v[0, 1] * amp[1, 2]), -half * (v[0, 0] * amp[0, 3] + v[0, 1] * amp[1, 3])
     b10, b11 = -half * (v[1, 0] * amp[0, 2] + v[1, 1] * amp[1, 2]), -half * (v[1, 0] * amp[0, 3] + v[1, 1] * amp[1, 3])
     c00, c01, c10, c11 = half * cage[0, 0], half * cage[0, 1], half * cage[1, 0], half * cage[1, 1]
@@ -133,11 +152,37 @@ def _solved(v, amp, cage, half, om, back):
 
 @kernel
 def sensitivities(
-    states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor,
-    omega_rad_per_s, channels, period,
-    base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
-    stop_gain, stop_radius, branch_gain, branch_time,
-    kind_of, indices, legs_vectors, iron_vectors, leak_vectors, start_slopes, out,
+    states,
+    stop_states,
+    voltage_a,
+    voltage_b,
+    voltage_factor,
+    link_factor,
+    phase_factor,
+    rotor_factor,
+    omega_rad_per_s,
+    channels,
+    period,
+    base,
+    legs,
+    legs_link,
+    iron,
+    leak,
+    legs_top,
+    legs_knee,
+    iron_top,
+    leak_top,
+    stop_gain,
+    stop_radius,
+    branch_gain,
+    branch_time,
+    kind_of,
+    indices,
+    legs_vectors,
+    iron_vectors,
+    leak_vectors,
+    start_slopes,
+    out,
 ):
     """Fills `out` (2, P, n): d i / d parameter at every sample, for the kinds and `indices` (P,) listed.
 
@@ -155,7 +200,11 @@ def sensitivities(
     for k, n in enumerate(bars):
         h = half / branch_time[n]
         beta += branch_gain[n] * h / (1.0 + h)
-        branch[k, 0], branch[k, 1], branch[k, 2] = branch_gain[n] * (1.0 - h) / (1.0 + h), (1.0 - h) / (1.0 + h), h / (1.0 + h)
+        branch[k, 0], branch[k, 1], branch[k, 2] = (
+            branch_gain[n] * (1.0 - h) / (1.0 + h),
+            (1.0 - h) / (1.0 + h),
+            h / (1.0 + h),
+        )
     has_memory = working.shape[0] + bars.shape[0] > 0
 
     # row 0 is the sample before the block
@@ -184,9 +233,39 @@ def sensitivities(
         # the first sample of all ends no period
         first = 2 if start == 0 else 1
         at_samples(
-            start, stop, states, stop_states, voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor,
-            omega_rad_per_s, base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top, stop_gain, stop_radius,
-            branch_gain, branch_time, working, wants_legs, at, before, now, secant, leg_mean, lost, memory,
+            start,
+            stop,
+            states,
+            stop_states,
+            voltage_a,
+            voltage_b,
+            voltage_factor,
+            link_factor,
+            phase_factor,
+            rotor_factor,
+            omega_rad_per_s,
+            base,
+            legs,
+            legs_link,
+            iron,
+            leak,
+            legs_top,
+            legs_knee,
+            iron_top,
+            leak_top,
+            stop_gain,
+            stop_radius,
+            branch_gain,
+            branch_time,
+            working,
+            wants_legs,
+            at,
+            before,
+            now,
+            secant,
+            leg_mean,
+            lost,
+            memory,
         )
         _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage, cage_push)
         for group in range(0, count, SIDE_BY_SIDE):
@@ -195,9 +274,33 @@ def sensitivities(
                 kind, here = kind_of[p], p - group
                 magnetizing[:], current[:], flux[:], terminal[here], rotor[here] = 0.0, 0.0, 0.0, 0.0, 0.0
                 pushes(
-                    kind, indices[p], start, stop, states, stop_states, voltage_a, voltage_b, link_factor, phase_factor, channels,
-                    base, branch_time, stop_radius, legs_vectors, iron_vectors, leak_vectors, at, before, now, leg_mean, lost,
-                    magnetizing, current, terminal[here], flux, rotor[here],
+                    kind,
+                    indices[p],
+                    start,
+                    stop,
+                    states,
+                    stop_states,
+                    voltage_a,
+                    voltage_b,
+                    link_factor,
+                    phase_factor,
+                    channels,
+                    base,
+                    branch_time,
+                    stop_radius,
+                    legs_vectors,
+                    iron_vectors,
+                    leak_vectors,
+                    at,
+                    before,
+                    now,
+                    leg_mean,
+                    lost,
+                    magnetizing,
+                    current,
+                    terminal[here],
+                    flux,
+                    rotor[here],
                 )
                 has_flux, has_more = kind in INTO_FLUX, kind == kinds.R_S or kind not in INTO_FLUX
                 if has_more:
@@ -212,9 +315,30 @@ def sensitivities(
                     marched(first, last, x[p], step, amp, force[here], terminal[here], out[:, p, start:stop])
             if has_memory:
                 marched_with_memory(
-                    first, last, own[group:end], nu, shrink, beta, branch, x[group:end], z[group:end], q[group:end],
-                    moved[group:end], rate[group:end], fed[group:end], step, push, amp, cage, cage_push, at, memory,
-                    force, terminal, rotor, out[:, group:end, start:stop],
+                    first,
+                    last,
+                    own[group:end],
+                    nu,
+                    shrink,
+                    beta,
+                    branch,
+                    x[group:end],
+                    z[group:end],
+                    q[group:end],
+                    moved[group:end],
+                    rate[group:end],
+                    fed[group:end],
+                    step,
+                    push,
+                    amp,
+                    cage,
+                    cage_push,
+                    at,
+                    memory,
+                    force,
+                    terminal,
+                    rotor,
+                    out[:, group:end, start:stop],
                 )
         at[:, 0] = at[:, last - 1]
         amp[0], cage[0] = amp[last - 1], cage[last - 1]

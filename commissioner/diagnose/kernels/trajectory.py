@@ -89,8 +89,28 @@ def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
 
 @inlined
 def _rates(
-    x, k, va, vb, ru, rv, rw, rr, omega, base, legs, has_legs, legs_top, legs_knee, iron, iron_top, leak, leak_top,
-    ma, mb, branch_gain, branch_time,
+    x,
+    k,
+    va,
+    vb,
+    ru,
+    rv,
+    rw,
+    rr,
+    omega,
+    base,
+    legs,
+    has_legs,
+    legs_top,
+    legs_knee,
+    iron,
+    iron_top,
+    leak,
+    leak_top,
+    ma,
+    mb,
+    branch_gain,
+    branch_time,
 ):
     """Right-hand side (1)-(7) at x into k, memory current (ma, mb) given; terminal current and the paths' derivatives."""
     gs, gm, nu, g, kappa = base[2], base[3], base[4], base[5], base[12]
@@ -131,9 +151,7 @@ def _rates(
 
 
 @inlined
-def _current_slope(
-    x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time
-):
+def _current_slope(x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time):
     """Slope of the terminal current while the voltage is held, from the rates k at x and the paths' derivatives there."""
     gs, nu, kappa = base[2], base[4], base[12]
     qa, qb = (1.0 - nu) * k[2] + nu * k[0], (1.0 - nu) * k[3] + nu * k[1]
@@ -173,10 +191,31 @@ def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, le
 
 @kernel
 def propagate(
-    voltage_a, voltage_b, voltage_factor, link_factor, phase_factor, rotor_factor, omega_rad_per_s,
-    period, substeps, crossing_substeps,
-    base, legs, legs_link, iron, leak, legs_top, legs_knee, iron_top, leak_top,
-    stop_gain, stop_radius, branch_gain, branch_time, initial_state, initial_memory,
+    voltage_a,
+    voltage_b,
+    voltage_factor,
+    link_factor,
+    phase_factor,
+    rotor_factor,
+    omega_rad_per_s,
+    period,
+    substeps,
+    crossing_substeps,
+    base,
+    legs,
+    legs_link,
+    iron,
+    leak,
+    legs_top,
+    legs_knee,
+    iron_top,
+    leak_top,
+    stop_gain,
+    stop_radius,
+    branch_gain,
+    branch_time,
+    initial_state,
+    initial_memory,
 ):
     """Trajectory of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2).
 
@@ -219,8 +258,28 @@ def propagate(
             ma, mb = _memory_current(pa, pb, pa - from_a, pb - from_b, z, stop_gain, stop_radius)
             va, vb = (last_a, last_b) if stage < 0 else (now_a, now_b)
             ia, ib, jaa, jab, jbb, eaa, eab, ebb = _rates(
-                y, k, va, vb, ru, rv, rw, rr, om, base, legs_now, has_legs, legs_top, legs_knee, iron, iron_top, leak,
-                leak_top, ma, mb, branch_gain, branch_time,
+                y,
+                k,
+                va,
+                vb,
+                ru,
+                rv,
+                rw,
+                rr,
+                om,
+                base,
+                legs_now,
+                has_legs,
+                legs_top,
+                legs_knee,
+                iron,
+                iron_top,
+                leak,
+                leak_top,
+                ma,
+                mb,
+                branch_gain,
+                branch_time,
             )
             if step == 0 and stage < 1:
                 da, db = _current_slope(
@@ -234,7 +293,18 @@ def propagate(
                     if has_legs:
                         turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
                         steps = _steps_for_legs(
-                            ia, ib, da, db, turn, period, base[2], legs_now, legs_top, legs_knee, substeps, crossing_substeps
+                            ia,
+                            ib,
+                            da,
+                            db,
+                            turn,
+                            period,
+                            base[2],
+                            legs_now,
+                            legs_top,
+                            legs_knee,
+                            substeps,
+                            crossing_substeps,
                         )
                     h = period / steps
                     stage = 0
@@ -346,8 +416,20 @@ def _resistances(base, phase_factor, a):
 
 @kernel
 def propagate_varying(
-    voltage_a, voltage_b, voltage_factor, phase_factor, rotor_factor, omega_rad_per_s, period, steps, order, whole_step,
-    base, branch_gain, branch_time, initial_state,
+    voltage_a,
+    voltage_b,
+    voltage_factor,
+    phase_factor,
+    rotor_factor,
+    omega_rad_per_s,
+    period,
+    steps,
+    order,
+    whole_step,
+    base,
+    branch_gain,
+    branch_time,
+    initial_state,
 ):
     """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
 

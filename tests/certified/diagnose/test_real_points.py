@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.diagnose.points import read_points
-from commissioner.diagnose.points_diagnosis import diagnose_points
+from commissioner.diagnose.points.diagnosis import diagnose_points
+from commissioner.diagnose.points.table import read_points
 
 DATA = Path(__file__).parents[2] / "data"
 

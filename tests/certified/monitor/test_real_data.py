@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.monitor.audit import inspect, measure_fundamental
-from commissioner.monitor.indicators import rotor_side_bands
-from commissioner.monitor.periods import pair_spectrum, slip_of
-from commissioner.monitor.supply import dominant_frequency_hz, follow_supply, space_vector
+from commissioner.monitor.intake.audit import inspect, measure_fundamental
+from commissioner.monitor.periods.periods import pair_spectrum, slip_of
+from commissioner.monitor.signals.supply import dominant_frequency_hz, follow_supply, space_vector
+from commissioner.monitor.trend.indicators import rotor_side_bands
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate, slip_at_power
+from commissioner.recordings.formats.matlab import vectors
 from commissioner.recordings.importers import read_running
-from commissioner.recordings.matlab import vectors
 from tests.support.running import refused_in
 
 DATA = Path(__file__).parents[2] / "data"

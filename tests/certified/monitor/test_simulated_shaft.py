@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.monitor.indicators import pulses, rotor_side_bands
+from commissioner.monitor.trend.indicators import pulses, rotor_side_bands
 from commissioner.motor.circuit import from_t_model
-from sim.running_recording import load_scenario, run
+from sim.recordings.running import load_scenario, run
 from tests.campaigns.monitor import draw, periods_found, play, score
 from tests.campaigns.monitor_trend import LEAKS_MM2, false_alarms, leak_table
 from tests.support.running import seen as answer
@@ -94,7 +94,7 @@ def test_parameters_are_within_three_claimed_standard_deviations() -> None:
 def test_resimulated_currents_match_and_show_wrong_parameters() -> None:
     from dataclasses import replace
 
-    from commissioner.monitor.proof import prove
+    from commissioner.monitor.machine.proof import prove
 
     seen = answer("running_compressor")
     assert seen.proof.relative_rms < 0.04

@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from commissioner.diagnose.model import Model
-from sim.hidden import draw
-from sim.recording import record, write_table
+from commissioner.diagnose.plant.model import Model
+from sim.recordings.hidden import draw
+from sim.recordings.standstill import record, write_table
 from tests.support.command_line import call, truth
 from tests.unit.diagnose.conftest import NOMINAL, setting_of
-from tests.unit.diagnose.test_extended import document_of
+from tests.unit.diagnose.export.test_model_file import document_of
 
 TYPE_TEST = "tests/data/siemens_200kw_type_test/{}.csv"
 
@@ -57,9 +57,14 @@ def test_a_recording_is_diagnosed_and_its_model_plays_what_was_measured(files, t
     assert document["verdict"] == "not_distinguishable" and document["causes"][0]["equivalent"] == ["device_drop"]
     assert any("banana" in sentence for sentence in document["audit"])
     page = (tmp_path / "report.html").read_text()
-    assert "dead time + device drop, together" in page and "http" not in page.split("</style>")[1].replace("http://www.w3.org", "")
+    assert "dead time + device drop, together" in page and "http" not in page.split("</style>")[1].replace(
+        "http://www.w3.org", ""
+    )
     again = tmp_path / "again.csv"
-    assert call("simulate", document["model_file"], "--out", str(again), "--like", str(files / "good.csv"), "--json").code == 0
+    assert (
+        call("simulate", document["model_file"], "--out", str(again), "--like", str(files / "good.csv"), "--json").code
+        == 0
+    )
     measured, played = table(files / "good.csv"), table(again)
     error = np.sqrt(np.mean([(measured[f"current_{p}_a"] - played[f"current_{p}_a"]) ** 2 for p in "uvw"]))
     assert error == pytest.approx(document["gain"]["noise_floor_a"], rel=0.05)
@@ -84,7 +89,9 @@ def test_data_that_carry_no_answer_end_with_code_3_and_the_reason(files, names, 
 
 
 def test_both_tables_of_a_type_test_are_one_document(tmp_path):
-    answer = call("diagnose", TYPE_TEST.format("locked_rotor"), TYPE_TEST.format("no_load"), "--out", str(tmp_path), "--json")
+    answer = call(
+        "diagnose", TYPE_TEST.format("locked_rotor"), TYPE_TEST.format("no_load"), "--out", str(tmp_path), "--json"
+    )
     named = {c["name"] for c in answer.json["causes"]}
     assert answer.code == 0
     assert named == {"leakage_saturation", "rotor_skin_effect", "magnetizing_saturation", "iron_loss"}
@@ -97,7 +104,11 @@ def test_a_table_that_is_refused_has_a_page_and_the_remedy(tmp_path):
     rows[0].write_text(rows[1])
     answer = call("diagnose", str(rows[0]), "--out", str(tmp_path / "out"), "--json")
     assert answer.code == 3 and answer.json["verdict"] == "refused"
-    assert answer.json["error"]["value"] == 1 and "at least 5" in answer.json["error"]["limit"] and answer.json["error"]["remedy"]
+    assert (
+        answer.json["error"]["value"] == 1
+        and "at least 5" in answer.json["error"]["limit"]
+        and answer.json["error"]["remedy"]
+    )
     assert "cannot carry an answer" in (tmp_path / "out" / "report_few.html").read_text()
     assert "expected: at least 5." in " ".join(call("diagnose", str(rows[0])).stdout.split())
 
@@ -112,8 +123,12 @@ def test_a_cell_that_is_no_number_and_a_column_that_lacks_are_named(tmp_path):
 
 def broken(document, where):
     term = document["terms"][0]
-    return {"index": document | {"terms": [term | {"index": 999}]}, "list": [document], "number": document | {
-        "nominal": document["nominal"] | {"rotor_resistance_ohm": -1.0}}, "else": {"kind": "something"}}[where]
+    return {
+        "index": document | {"terms": [term | {"index": 999}]},
+        "list": [document],
+        "number": document | {"nominal": document["nominal"] | {"rotor_resistance_ohm": -1.0}},
+        "else": {"kind": "something"},
+    }[where]
 
 
 @pytest.mark.parametrize("where", ["index", "list", "number", "else"])

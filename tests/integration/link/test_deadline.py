@@ -7,10 +7,10 @@ import time
 import pytest
 
 from commissioner.errors import ReplyTimeout
-from commissioner.link.clients import TcpClient, TlsClient
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TcpUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.clients import TcpClient, TlsClient
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TcpUrl
 
 TIMEOUT_S, PIECE_S = 0.25, 0.08
 

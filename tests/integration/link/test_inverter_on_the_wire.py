@@ -22,12 +22,12 @@ from commissioner.errors import (
     UsageError,
     WriteBackFailed,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TcpUrl, parse_url
-from sim.faults import parse
-from tests.campaigns import truth
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TcpUrl, parse_url
+from sim.wire.faults import parse
+from tests.campaigns.short_run import truth
 from tests.support.raw_servers import Bank, TcpDevice
 from tests.support.sim_process import SimProcess
 
@@ -47,8 +47,13 @@ def set_up(inverter, duration_s=0.5, **changes):
     inverter.set_watchdog(1000)
     inverter.set_limits(current_a=10.0, voltage_v=90.0, time_s=20.0)
     signal = {
-        "axis_deg": 60.0, "tones": [(10.0, 5.0, 0.0), (5.0, 30.0, 1.0)], "bias_v": 4.0, "bias_ramp_v_per_s": 40.0,
-        "scale": 0.5, "scale_ramp_per_s": 5.0, "duration_s": duration_s,
+        "axis_deg": 60.0,
+        "tones": [(10.0, 5.0, 0.0), (5.0, 30.0, 1.0)],
+        "bias_v": 4.0,
+        "bias_ramp_v_per_s": 40.0,
+        "scale": 0.5,
+        "scale_ramp_per_s": 5.0,
+        "duration_s": duration_s,
     }
     inverter.load_excitation(**signal | changes)
 
@@ -113,8 +118,21 @@ def test_parameters_are_written_stored_and_restored_over_the_wire(wire):
 
 
 FAULTS = [
-    "lost", "late:0.4", "repeated", "corrupted", "reordered", "stray_before", "lost_request", "truncated", "late:0.6",
-    "short_reply", "stray_after", "wrong_unit", "stall:0.4", "wrong_function", "wrong_transaction",
+    "lost",
+    "late:0.4",
+    "repeated",
+    "corrupted",
+    "reordered",
+    "stray_before",
+    "lost_request",
+    "truncated",
+    "late:0.6",
+    "short_reply",
+    "stray_after",
+    "wrong_unit",
+    "stall:0.4",
+    "wrong_function",
+    "wrong_transaction",
 ]
 
 
@@ -293,8 +311,12 @@ class Authority:
     def _build(self, subject, key, addresses, *, is_authority):
         now = datetime.datetime.now(datetime.UTC)
         builder = (
-            x509.CertificateBuilder().subject_name(subject).issuer_name(self.subject).public_key(key.public_key())
-            .serial_number(x509.random_serial_number()).not_valid_before(now - datetime.timedelta(days=1))
+            x509.CertificateBuilder()
+            .subject_name(subject)
+            .issuer_name(self.subject)
+            .public_key(key.public_key())
+            .serial_number(x509.random_serial_number())
+            .not_valid_before(now - datetime.timedelta(days=1))
             .not_valid_after(now + datetime.timedelta(days=2))
             .add_extension(x509.BasicConstraints(ca=is_authority, path_length=None), critical=True)
             .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)

@@ -7,14 +7,14 @@ import pytest
 from pymodbus.client import ModbusSerialClient
 
 from commissioner.errors import LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
-from commissioner.link.debts import LATEST_S, Debts
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.trust import WATCH_S
-from commissioner.link.url import RtuUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.debts import LATEST_S, Debts
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.trust import WATCH_S
+from commissioner.link.wire.url import RtuUrl
 from sim.scenario import load
-from sim.server import run_in_thread
-from sim.station import Options
+from sim.wire.server import run_in_thread
+from sim.wire.station import Options
 from tests.support.raw_servers import Bank, RtuDevice, rtu_frame
 
 BAUD = 921600

@@ -9,9 +9,9 @@ import serial
 from pymodbus.client import ModbusSerialClient
 
 from commissioner.errors import LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import RtuUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.url import RtuUrl
 from tests.support.raw_servers import Bank, RtuDevice, rtu_frame
 
 BAUD = 921600

@@ -9,9 +9,9 @@ import pytest
 from pymodbus import exceptions as pymodbus_exceptions
 
 from commissioner.errors import LinkError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import ModbusPort, open_port
-from commissioner.link.url import TcpUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.url import TcpUrl
 from tests.support.raw_servers import Bank, TcpDevice
 
 PROFILE = load_profile("simulated")
@@ -188,7 +188,8 @@ PYMODBUS_ERRORS = [
 
 def test_the_list_of_pymodbus_errors_is_complete():
     defined = {
-        value for value in vars(pymodbus_exceptions).values()
+        value
+        for value in vars(pymodbus_exceptions).values()
         if isinstance(value, type) and issubclass(value, pymodbus_exceptions.ModbusException)
     }
     assert defined - {pymodbus_exceptions.ModbusException} == set(PYMODBUS_ERRORS)
@@ -227,9 +228,9 @@ def test_errors_that_pymodbus_lets_through_become_ours(kind, monkeypatch):
 LISTEN_TO_NOBODY = """
 import sys
 from commissioner.errors import ReplyTimeout
-from commissioner.link.drive_file import load_profile
-from commissioner.link.modbus import open_port
-from commissioner.link.url import TcpUrl
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TcpUrl
 
 port = open_port(TcpUrl("127.0.0.1", int(sys.argv[1])), load_profile("simulated"), reply_timeout_s=0.05)
 try:

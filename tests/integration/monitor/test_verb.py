@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from commissioner.recordings.table import write_table
-from sim.running_recording import load_scenario, record
+from sim.recordings.running import load_scenario, record
 
 DATA = Path(__file__).parents[2] / "data"
 COLUMNS = ["time_s", "shaft_angle_rad", "speed_rad_per_s", "electromagnetic_torque_nm", "load_torque_nm"]

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from commissioner.identify.coordinates import ud_factors
-from commissioner.identify.excitation import separated
+from commissioner.identify.excite.tones import separated
+from commissioner.identify.observer.coordinates import ud_factors
 from commissioner.motor.circuit import Gamma, InverseGamma, from_t_model, to_t_model
 from commissioner.motor.standstill import from_pulse_transfer, to_pulse_transfer
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from commissioner.motor.space_vector import axis_current_a
@@ -78,7 +78,5 @@ def test_the_current_along_an_axis_is_found_on_every_axis_whatever_runs_across_i
 @given(AXES)
 def test_a_turn_of_a_third_with_the_phases_renamed_changes_nothing(axis_deg):
     u, v, w = phases(CURRENT_A[:50], 0.7, axis_deg)
-    np.testing.assert_allclose(
-        axis_current_a(w, u, v, axis_deg + 120.0), axis_current_a(u, v, w, axis_deg), atol=1e-9
-    )
+    np.testing.assert_allclose(axis_current_a(w, u, v, axis_deg + 120.0), axis_current_a(u, v, w, axis_deg), atol=1e-9)
     assert axis_current_a(u, v, w, axis_deg + 360.0) == pytest.approx(axis_current_a(u, v, w, axis_deg), abs=1e-9)

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from commissioner.errors import CommissionerError, ConfigurationError, DataRefused, UsageError
-from commissioner.link.drive_file import load_profile
-from commissioner.recordings import baseline, bounds, matlab, plate, table
+from commissioner.link.files.drive_file import load_profile
+from commissioner.recordings import baseline, bounds, plate, table
+from commissioner.recordings.formats import matlab
 from commissioner.recordings.importers import import_table
 from commissioner.recordings.table import read_table
 from commissioner.settings import load_motor
@@ -161,7 +162,7 @@ def test_a_packed_mdf_is_held_to_what_it_may_unpack_to(monkeypatch):
 def test_a_foreign_text_above_its_limit_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "scope.csv"
     path.write_text("t;ia;ib\n" + "0,1;2,0;3,0\n" * 1000)
-    monkeypatch.setattr("commissioner.recordings.foreign_csv.MAX_FOREIGN_BYTES", 1000)
+    monkeypatch.setattr("commissioner.recordings.formats.foreign_csv.MAX_FOREIGN_BYTES", 1000)
     with pytest.raises(DataRefused):
         import_table(path)
 
@@ -175,7 +176,10 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
 
 
 @FEW
-@given(st.binary(max_size=400), st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms", ".mf4", ".cfg", ".cff"]))
+@given(
+    st.binary(max_size=400),
+    st.sampled_from([".csv", ".csv.gz", ".parquet", ".mat", ".txt", ".tdms", ".mf4", ".cfg", ".cff"]),
+)
 def test_random_bytes_give_a_typed_error_in_every_importer(tmp_path, data, ending):
     path = tmp_path / f"r{ending}"
     path.write_bytes(data)
@@ -195,7 +199,9 @@ def matlab_files():
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.booleans(), st.integers(0, 10**6), st.integers(1, 255), st.booleans())
-def test_a_damaged_matlab_file_gives_a_typed_error_or_a_recording(tmp_path, matlab_files, compressed, place, flip, is_cut):
+def test_a_damaged_matlab_file_gives_a_typed_error_or_a_recording(
+    tmp_path, matlab_files, compressed, place, flip, is_cut
+):
     data = matlab_files[compressed]
     place %= len(data)
     path = tmp_path / "r.mat"
@@ -231,7 +237,9 @@ def test_matlab_arrays_come_as_scipy_wrote_them(tmp_path, compressed, kind):
     assert {name for name in found if name[0] in "tz"} == set()
 
 
-CELLS = st.sampled_from(["t", "ia", "fs", "0", "1,5", "2.5", "-1", "inf", "nan", "", "x", "mA", "(V)", '"', "\x00", "# fs: 0"])
+CELLS = st.sampled_from(
+    ["t", "ia", "fs", "0", "1,5", "2.5", "-1", "inf", "nan", "", "x", "mA", "(V)", '"', "\x00", "# fs: 0"]
+)
 
 
 @FEW
@@ -251,7 +259,7 @@ HOSTILE_TOML = {
     "inline keys": "\n".join(f"k{n} = {{{'.'.join('a' * 480)} = 1}}" for n in range(250)),
     "a huge file": "#" * 250_001,
     "no text": "\udcff",
-    "code": 'rated_power_w = "__import__(\'os\').system(\'true\')"',
+    "code": "rated_power_w = \"__import__('os').system('true')\"",
 }
 
 
@@ -273,7 +281,9 @@ def test_random_bytes_as_toml_are_a_configuration_error(tmp_path, data):
         assert isinstance(typed(lambda act=read: act(str(path))), ConfigurationError)
 
 
-@pytest.mark.parametrize("text", ["[" * 200_000, "1" * 10_000, "{}", json.dumps({"parameters": [], "version": 1}), "\x00"])
+@pytest.mark.parametrize(
+    "text", ["[" * 200_000, "1" * 10_000, "{}", json.dumps({"parameters": [], "version": 1}), "\x00"]
+)
 @pytest.mark.parametrize("read", [plate.start_from, baseline.read])
 def test_hostile_json_is_a_configuration_error(tmp_path, text, read):
     path = tmp_path / "stranger.json"

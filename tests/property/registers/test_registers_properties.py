@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.link.rtu import find_answers
-from commissioner.link.url import parse_url
+from commissioner.link.wire.rtu import find_answers
+from commissioner.link.wire.url import parse_url
 from commissioner.registers.codec import crc16_bytes, decode_item, encode_item
 from commissioner.registers.profile import WORDS_PER_ELEMENT, Item, WindowLayout, plan_spans
 from commissioner.registers.status import DriveState, decode_state
@@ -25,12 +25,17 @@ from commissioner.registers.window import (
 from tests.support.scripted_port import crc16
 
 HEADER = (
-    ("session_id", "u16"), ("first_index", "u32"), ("count", "u16"), ("channel_mask", "u16"), ("flags", "u16"),
-    ("dc_link_raw", "i16"), ("crc16", "u16"),
+    ("session_id", "u16"),
+    ("first_index", "u32"),
+    ("count", "u16"),
+    ("channel_mask", "u16"),
+    ("flags", "u16"),
+    ("dc_link_raw", "i16"),
+    ("crc16", "u16"),
 )
-LAYOUT = WindowLayout(256, HEADER, 117, {n: 1 << k for k, n in enumerate(
-    ("running", "clipped", "overrun", "voltage_clamped", "ended")
-)})
+LAYOUT = WindowLayout(
+    256, HEADER, 117, {n: 1 << k for k, n in enumerate(("running", "clipped", "overrun", "voltage_clamped", "ended"))}
+)
 WORD = st.integers(0, 0xFFFF)
 KINDS = st.sampled_from(["u16", "i16", "u32", "i32", "f32"])
 ORDERS = st.sampled_from(["big", "little"])
@@ -102,8 +107,12 @@ def test_random_words_are_never_samples(words):
 
 
 @given(
-    mask=MASKS, index=st.integers(0, 2**31), gap=st.integers(0, 5000), count=st.integers(0, 29),
-    flags=st.integers(0, 31), seed=st.integers(0, 2**32 - 1),
+    mask=MASKS,
+    index=st.integers(0, 2**31),
+    gap=st.integers(0, 5000),
+    count=st.integers(0, 29),
+    flags=st.integers(0, 31),
+    seed=st.integers(0, 2**32 - 1),
 )
 def test_a_window_gives_back_the_samples_that_went_in(mask, index, gap, count, flags, seed):
     rows = np.random.default_rng(seed).integers(-32768, 32768, (count, mask.bit_count()))

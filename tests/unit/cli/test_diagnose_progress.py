@@ -1,6 +1,6 @@
 """The search's own lines become words; what was named and taken back is remembered."""
 
-from commissioner.cli.diagnose_progress import Progress
+from commissioner.cli.screens.diagnosis_progress import Progress
 
 
 def test_the_searchs_arithmetic_becomes_words():
@@ -15,6 +15,10 @@ def test_the_searchs_arithmetic_becomes_words():
 
 def test_what_was_named_and_taken_back_is_remembered():
     told = Progress(is_quiet=True)
-    for line in ("accepted dead_time: 2 times the noise", "accepted remanence: 1 times the noise", "  dropped remanence"):
+    for line in (
+        "accepted dead_time: 2 times the noise",
+        "accepted remanence: 1 times the noise",
+        "  dropped remanence",
+    ):
         told(line)
     assert told.withdrawn({"dead_time"}) == ["remanence"]

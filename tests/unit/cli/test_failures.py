@@ -69,7 +69,9 @@ def archive(tmp_path):
 
 @pytest.mark.parametrize("name", ["request.json", "snapshot.json"])
 @pytest.mark.parametrize("content", ["nonsense", "{}", "[1]", '{"url": 5, "profile": "simulated", "nameplate": 7}'])
-@pytest.mark.parametrize("verb", [("runs", "show"), ("runs", "report"), ("runs", "export"), ("replay",), ("restore", "--yes")])
+@pytest.mark.parametrize(
+    "verb", [("runs", "show"), ("runs", "report"), ("runs", "export"), ("replay",), ("restore", "--yes")]
+)
 def test_a_damaged_archive_is_refused_by_name(capsys, archive, name, content, verb):
     (archive / name).write_text(content)
     target = [archive / "x.csv"] if verb == ("runs", "export") else []
@@ -98,7 +100,9 @@ def test_a_call_that_cannot_be_right_is_a_usage_error(capsys, arguments):
 def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     """The verb waits at the pipe that it was given for its input."""
     os.mkfifo(tmp_path / "pipe")
-    script = COMMAND[-1].replace("main()", "import commissioner.cli.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()")
+    script = COMMAND[-1].replace(
+        "main()", "import commissioner.cli.verbs.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()"
+    )
     call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
     try:
@@ -125,7 +129,13 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
         ("check", "--drive", "tcp://127.0.0.1:1", "--password=hunter2"),
         ("check", "hunter2", "--api-token", "hunter2"),
         ("hunter2", "--pwd=hunter2"),
-        ("check", "--drive", "tls://127.0.0.1:1?cert=/etc/hostname&k%65y=/home/hunter2/key.pem", "--motor", "motor_2kw2"),
+        (
+            "check",
+            "--drive",
+            "tls://127.0.0.1:1?cert=/etc/hostname&k%65y=/home/hunter2/key.pem",
+            "--motor",
+            "motor_2kw2",
+        ),
         ("check", "--motor", "bob:hunter2@127.0.0.1:1", "--drive", "tcp://127.0.0.1:1"),
         ("identify", "tcp://bob:hunter2@127.0.0.1:1", "--motor", "motor_2kw2"),
     ],
@@ -160,6 +170,10 @@ def test_the_file_about_a_defect_holds_no_password_either(capsys, monkeypatch, t
 
 def test_what_is_no_secret_is_shown_as_it_was():
     hide = Secrets(["check", "--drive", "tcp://bob:e@127.0.0.1:1", "--motor", "C:/a@b.toml"]).hide
-    assert hide({"what": ["the drive tcp://bob:e@127.0.0.1:1", 3.0, None]}) == {"what": ["the drive tcp://***@127.0.0.1:1", 3.0, None]}
+    assert hide({"what": ["the drive tcp://bob:e@127.0.0.1:1", 3.0, None]}) == {
+        "what": ["the drive tcp://***@127.0.0.1:1", 3.0, None]
+    }
     assert hide("every e stays") == "every *** stays"
-    assert Secrets(["check", "--drive", "tcp://127.0.0.1:1"]).hide("check tcp://127.0.0.1:1") == "check tcp://127.0.0.1:1"
+    assert (
+        Secrets(["check", "--drive", "tcp://127.0.0.1:1"]).hide("check tcp://127.0.0.1:1") == "check tcp://127.0.0.1:1"
+    )

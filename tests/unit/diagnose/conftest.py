@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.audit import prepare
-from commissioner.diagnose.channels import add_channels
-from commissioner.diagnose.effects import Setting
-from commissioner.diagnose.model import Model
-from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.nominal import layout_for
-from commissioner.diagnose.plant import predict
+from commissioner.diagnose.catalogue import Setting
+from commissioner.diagnose.catalogue.regressors import add_channels
+from commissioner.diagnose.intake.audit import prepare
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.plant.model import Model
+from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.search.nominal import layout_for
 from commissioner.records import StandstillRecording
 
 NOMINAL = (3.7, 2.2, 0.021, 0.3)

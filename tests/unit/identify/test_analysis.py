@@ -120,7 +120,7 @@ def test_default_drive_recording_from_the_simulator_meets_the_issues_target():
 
     The winding warms by 1 % over these 64 s, so that the cold resistance of the key is compared with the first axis.
     """
-    from sim.recording import record
+    from sim.recordings.standstill import record
     from sim.scenario import load
 
     columns, metadata, truth = record(load("rich"), 3)

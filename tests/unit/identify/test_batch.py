@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.identify.batch import Segment
-from commissioner.identify.bound import cramer_rao
-from commissioner.identify.fit import fit_segments
-from commissioner.identify.leg_law import LegLaw
-from commissioner.identify.model import SHARED, ModelChoice, start_theta
-from commissioner.identify.problem import Problem
-from commissioner.identify.resistance import knee_shape
-from commissioner.identify.whiteness import whiteness
+from commissioner.identify.batch.bound import cramer_rao
+from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.model import SHARED, ModelChoice, start_theta
+from commissioner.identify.batch.problem import Problem
+from commissioner.identify.batch.segments import Segment
+from commissioner.identify.batch.whiteness import whiteness
+from commissioner.identify.inverter.leg_law import LegLaw
+from commissioner.identify.inverter.staircase import knee_shape
 from commissioner.motor.circuit import Gamma, InverseGamma
 from commissioner.motor.space_vector import phase_cosines
 from tests.support.standstill import linear_response, multitone, saturating_block

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from commissioner.errors import UsageError
-from commissioner.identify.compensation import Compensation
-from commissioner.identify.coordinates import filter_poles, positive_real_margin
-from commissioner.identify.observer import ParallelObserver
+from commissioner.identify.inverter.compensation import Compensation
+from commissioner.identify.observer.coordinates import filter_poles, positive_real_margin
+from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from tests.support.standstill import linear_response, multitone, usable_motors

@@ -6,7 +6,7 @@ import tomllib
 import pytest
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.link.drive_file import DRIVES_FOLDER, build, known_drives, load_profile
+from commissioner.link.files.drive_file import DRIVES_FOLDER, build, known_drives, load_profile
 
 SIMULATED = tomllib.loads((DRIVES_FOLDER / "simulated.toml").read_text("utf-8"))
 MISSING = object()

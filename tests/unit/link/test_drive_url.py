@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from commissioner.errors import UsageError
-from commissioner.link.url import RtuUrl, TcpUrl, TlsUrl, parse_url, without_secrets
+from commissioner.link.wire.url import RtuUrl, TcpUrl, TlsUrl, parse_url, without_secrets
 
 
 @pytest.mark.parametrize(
@@ -44,11 +44,33 @@ def test_tls_files_must_exist_and_come_in_pairs(tmp_path):
 @pytest.mark.parametrize(
     "text",
     [
-        "", "drive", "http://drive", "tcp:drive", "tcp://", "tcp://:502", "tcp://drive:0", "tcp://drive:70000",
-        "tcp://drive:x", "tcp://drive/path", "tcp://user:pw@drive", "tcp://drive#1", "tcp://drive?device=0",
-        "tcp://drive?device=248", "tcp://drive?device=one", "tcp://drive?device=", "tcp://drive?device=1&device=2",
-        "tcp://drive?baud=9600", "tcp://drive?device", "tcp://[::1", "rtu://ttyUSB0", "rtu:///", "rtu:///dev/x?baud=12345",
-        "rtu:///dev/x?parity=M", "rtu:///dev/x?stop=3", "rtu:///dev/x?host=1", "tls://drive?device=1&device=1",
+        "",
+        "drive",
+        "http://drive",
+        "tcp:drive",
+        "tcp://",
+        "tcp://:502",
+        "tcp://drive:0",
+        "tcp://drive:70000",
+        "tcp://drive:x",
+        "tcp://drive/path",
+        "tcp://user:pw@drive",
+        "tcp://drive#1",
+        "tcp://drive?device=0",
+        "tcp://drive?device=248",
+        "tcp://drive?device=one",
+        "tcp://drive?device=",
+        "tcp://drive?device=1&device=2",
+        "tcp://drive?baud=9600",
+        "tcp://drive?device",
+        "tcp://[::1",
+        "rtu://ttyUSB0",
+        "rtu:///",
+        "rtu:///dev/x?baud=12345",
+        "rtu:///dev/x?parity=M",
+        "rtu:///dev/x?stop=3",
+        "rtu:///dev/x?host=1",
+        "tls://drive?device=1&device=1",
         "tcp://drive?device=١",
     ],
 )

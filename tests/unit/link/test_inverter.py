@@ -13,9 +13,9 @@ from commissioner.errors import (
     RequestRefused,
     UsageError,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import Action
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import Action
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from tests.support.scripted_port import ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -40,8 +40,13 @@ class Bench:
         self.inverter.set_watchdog(500)
         self.inverter.set_limits(current_a=8.0, voltage_v=90.0, time_s=60.0)
         signal = {
-            "axis_deg": 60.0, "tones": [(10.0, 1.0, 0.0), (5.0, 3.0, 1.5)], "bias_v": 0.0, "bias_ramp_v_per_s": 10.0,
-            "scale": 0.1, "scale_ramp_per_s": 0.5, "duration_s": 10.0,
+            "axis_deg": 60.0,
+            "tones": [(10.0, 1.0, 0.0), (5.0, 3.0, 1.5)],
+            "bias_v": 0.0,
+            "bias_ramp_v_per_s": 10.0,
+            "scale": 0.1,
+            "scale_ramp_per_s": 0.5,
+            "duration_s": 10.0,
         }
         self.inverter.load_excitation(**signal | changes)
 
@@ -65,7 +70,10 @@ def test_identity_is_read_in_si(bench):
 @pytest.mark.parametrize(
     ("item", "value"),
     [
-        ("magic", 1), ("map_version", 2), ("drive_type", "OTHER"), ("firmware_version", 0x00020000),
+        ("magic", 1),
+        ("map_version", 2),
+        ("drive_type", "OTHER"),
+        ("firmware_version", 0x00020000),
         ("firmware_version", 0x0000FFFF),
     ],
 )
@@ -91,7 +99,12 @@ def test_the_nameplate_comes_by_the_contracts_keys(bench):
     plate = bench.inverter.read_nameplate()
     assert plate["rated_current_a"] == 5.0
     assert set(plate) == {
-        "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
+        "rated_power_w",
+        "rated_voltage_v",
+        "rated_frequency_hz",
+        "rated_current_a",
+        "rated_speed_rpm",
+        "power_factor",
         "pole_pairs",
     }
 
@@ -310,7 +323,8 @@ def test_steering_is_journalled_first_and_read_back(bench):
     bench.inverter.set_bias(-3.0)
     assert (bench.drive.get("amplitude_scale"), bench.drive.get("dc_bias_v")) == (0.5, -3.0)
     assert [values for action, values, _ in bench.journal if action is Action.STEER] == [
-        {"amplitude_scale": 0.5}, {"dc_bias_v": -3.0},
+        {"amplitude_scale": 0.5},
+        {"dc_bias_v": -3.0},
     ]
     bench.drive.deaf_to.add("amplitude_scale")
     with pytest.raises(DriveFault, match="acknowledged amplitude_scale"):

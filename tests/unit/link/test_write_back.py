@@ -10,9 +10,9 @@ from commissioner.errors import (
     UsageError,
     WriteBackFailed,
 )
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import Action
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.facts import Action
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.circuit import InverseGamma
 from commissioner.settings import load_motor
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
@@ -28,8 +28,11 @@ class Bench:
         self.now = 0.0
         self.journal = []
         self.inverter = Inverter(
-            self.drive, PROFILE, lambda i: self.journal.append((i.action, dict(i.values), len(self.drive.log))),
-            sleep=self.sleep, clock=lambda: self.now,
+            self.drive,
+            PROFILE,
+            lambda i: self.journal.append((i.action, dict(i.values), len(self.drive.log))),
+            sleep=self.sleep,
+            clock=lambda: self.now,
         )
         self.snapshot = self.inverter.snapshot()
 
@@ -100,7 +103,9 @@ def test_a_journal_that_cannot_write_stops_before_the_commit(bench):
 @pytest.mark.parametrize(
     ("item", "value"),
     [
-        ("serial_number", 4712), ("firmware_version", 0x00010204), ("rotor_resistance", 2.1),
+        ("serial_number", 4712),
+        ("firmware_version", 0x00010204),
+        ("rotor_resistance", 2.1),
         ("stored_rotor_resistance", 2.1),
     ],
 )
@@ -308,7 +313,7 @@ class Registers:
     """A commercial drive: nothing but registers; parameters survive only while `is_storing`."""
 
     def __init__(self) -> None:
-        from commissioner.link.port import LinkStats
+        from commissioner.link.wire.port import LinkStats
 
         self.words = [0] * 0x10000
         self.stats, self.read_retries, self.reply_timeout_s = LinkStats(), 0, 0.1

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.monitor.audit import inspect
-from commissioner.monitor.levels import clipped_share
+from commissioner.monitor.intake.audit import inspect
+from commissioner.monitor.intake.levels import clipped_share
 from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording
 from tests.support.running import refused_in, rewired, seen_in, taken, taken_with, without

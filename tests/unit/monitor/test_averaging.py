@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.monitor.averaging import Comb, free_orders, separate
-from commissioner.monitor.supply import TurningFrame
+from commissioner.monitor.signals.averaging import Comb, free_orders, separate
+from commissioner.monitor.signals.supply import TurningFrame
 
 PERIOD_S = 1 / 1500
 

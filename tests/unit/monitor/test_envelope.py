@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.monitor.envelope import shares
-from commissioner.monitor.sensors import GAIN_STD, evened, trust_of
-from commissioner.monitor.supply import follow_supply, space_vector
+from commissioner.monitor.intake.sensors import GAIN_STD, evened, trust_of
+from commissioner.monitor.signals.envelope import shares
+from commissioner.monitor.signals.supply import follow_supply, space_vector
 from tests.campaigns.monitor import as_plate, as_recording
 from tests.support.running import refused_in
 
@@ -78,7 +78,7 @@ def test_gains_are_evened_by_the_sum_that_must_be_zero() -> None:
 @pytest.mark.parametrize("pairs", [1, 3])
 def test_plate_of_another_pole_count_is_noticed(pairs: int) -> None:
     """Speed and poles of the plate agree with each other, not with the motor."""
-    from sim.running_recording import load_scenario, record
+    from sim.recordings.running import load_scenario, record
 
     scenario = load_scenario("running_leak")
     scenario["recording"]["duration_s"] = 8.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.monitor.averaging import Lines
-from commissioner.monitor.estimate import band_weights, speed_lines
-from commissioner.monitor.fit import PRIOR_FROM_NAMEPLATE, Start, fit, pose
-from commissioner.monitor.inversion import SpeedLines, complex_speed, rotor_state, torque_of, torus
+from commissioner.monitor.machine.estimate import band_weights, speed_lines
+from commissioner.monitor.machine.fit import PRIOR_FROM_NAMEPLATE, Start, fit, pose
+from commissioner.monitor.machine.inversion import SpeedLines, complex_speed, rotor_state, torque_of, torus
+from commissioner.monitor.signals.averaging import Lines
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import (
     TCircuit,

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from commissioner.monitor.findings import Finding
-from commissioner.monitor.fit import PRIOR_FROM_NAMEPLATE, Start
-from commissioner.monitor.pairing_by_slip import better_order
+from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.loads.pairing_by_slip import better_order
+from commissioner.monitor.machine.fit import PRIOR_FROM_NAMEPLATE, Start
+from commissioner.monitor.periods.steadiness import too_little
 from commissioner.monitor.result import as_document
-from commissioner.monitor.steadiness import too_little
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
 from commissioner.records import RunningRecording

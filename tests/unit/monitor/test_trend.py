@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.monitor.trend import Entry, History, State, compare, judge
+from commissioner.monitor.trend.trend import Entry, History, State, compare, judge
 from commissioner.recordings.baseline import read, update
 
 

@@ -8,6 +8,7 @@ from commissioner.errors import Aborted, CheckFailed
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
+from commissioner.procedure.energised.closing_bias import SECONDS
 from commissioner.procedure.findings import (
     AxisFinished,
     BiasChosen,
@@ -17,7 +18,6 @@ from commissioner.procedure.findings import (
     StateEntered,
     VerdictReached,
 )
-from commissioner.procedure.under_bias import SECONDS
 from commissioner.safety import commands as ask
 from commissioner.settings import load_motor, load_procedure
 from tests.support.scripted_drive import BLOCK, INTERLOCKS, PERIOD_S, Machine, ScriptedDrive

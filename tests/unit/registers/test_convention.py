@@ -28,11 +28,17 @@ def test_each_circuit_shows_the_terminals_the_same_impedance(omega):
     _, r_r, l_sigma, l_m = CIRCUIT.as_tuple()
     inverse_gamma = impedance_of_t(omega, l_sigma, 0.0, l_m, r_r)
     t = impedance_of_t(
-        omega, value("stator_leakage_inductance", "t_per_phase"), value("rotor_leakage_inductance", "t_per_phase"),
-        value("magnetizing_inductance", "t_per_phase"), value("rotor_resistance", "t_per_phase"),
+        omega,
+        value("stator_leakage_inductance", "t_per_phase"),
+        value("rotor_leakage_inductance", "t_per_phase"),
+        value("magnetizing_inductance", "t_per_phase"),
+        value("rotor_resistance", "t_per_phase"),
     )
     gamma = impedance_of_t(
-        omega, 0.0, value("leakage_inductance", "gamma_per_phase"), value("magnetizing_inductance", "gamma_per_phase"),
+        omega,
+        0.0,
+        value("leakage_inductance", "gamma_per_phase"),
+        value("magnetizing_inductance", "gamma_per_phase"),
         value("rotor_resistance", "gamma_per_phase"),
     )
     assert t == pytest.approx(inverse_gamma, rel=1e-12)

@@ -52,5 +52,7 @@ def test_named_bits_are_states_and_running_outranks_all(word, state):
 
 def test_interlocks_are_named_claims():
     assert decode_bits(0b101, {"sto_released": 0, "remote_control": 1, "supply_ok": 2}) == {
-        "sto_released": True, "remote_control": False, "supply_ok": True,
+        "sto_released": True,
+        "remote_control": False,
+        "supply_ok": True,
     }

@@ -24,7 +24,12 @@ HEADER = tuple(
     for name, _, kind in (
         entry.partition(":")
         for entry in (
-            "session_id:u16", "first_index:u32", "count:u16", "channel_mask:u16", "flags:u16", "dc_link_raw:i16",
+            "session_id:u16",
+            "first_index:u32",
+            "count:u16",
+            "channel_mask:u16",
+            "flags:u16",
+            "dc_link_raw:i16",
             "crc16:u16",
         )
     )

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.alike import look_alikes
 from commissioner.diagnose.document import refused_document
-from commissioner.diagnose.model import NO_DICTIONARY, Model, Term
-from commissioner.diagnose.noise import Noise
-from commissioner.diagnose.record import Facts, Record, Segment
-from commissioner.diagnose.refusals import refused
-from commissioner.diagnose.residuals import residuals
-from commissioner.diagnose.screen import Score, Screening
-from commissioner.diagnose.trial import Normal
-from commissioner.report import diagnose_figures as figures
-from commissioner.report.diagnose_numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
-from commissioner.report.diagnose_words import headline, next_promise, next_sentence
+from commissioner.diagnose.fit.normal_equations import Normal
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.intake.record import Facts, Record, Segment
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.diagnose.plant.model import NO_DICTIONARY, Model, Term
+from commissioner.diagnose.search.screening import Score, Screening
+from commissioner.diagnose.verdict.collinearity import look_alikes
+from commissioner.diagnose.verdict.residuals import residuals
+from commissioner.report.diagnosis import figures
+from commissioner.report.diagnosis.numbers import limit_words, number, part_word, percent, quantity, quantity_name, sure
+from commissioner.report.diagnosis.words import headline, next_promise, next_sentence
 from commissioner.report.page import picture
 
 PERIOD, SAMPLES, SIGMA = 2.5e-4, 4000, 0.01
@@ -38,7 +38,14 @@ def test_a_size_has_the_digits_of_its_interval(entry, words):
 
 def test_a_sizes_name_keeps_the_phase_and_loses_the_unit():
     keys = ("offset_v_a", "half_current_a", "gain_w_over_u", "amplitude_50_hz_a", "drift_u_a_per_min", "voltage_v")
-    assert [quantity_name(k) for k in keys] == ["offset v", "half current", "w against u", "amplitude 50 Hz", "drift u", "voltage"]
+    assert [quantity_name(k) for k in keys] == [
+        "offset v",
+        "half current",
+        "w against u",
+        "amplitude 50 Hz",
+        "drift u",
+        "voltage",
+    ]
 
 
 def test_numbers_have_no_tails_and_nothing_is_certain():
@@ -49,7 +56,10 @@ def test_numbers_have_no_tails_and_nothing_is_certain():
 
 
 def test_a_detection_limit_is_read_in_the_unit_of_its_size():
-    limits = {"sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}}, "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}}}
+    limits = {
+        "sensor_offset": {"u_a": {"value": 7.1e-5, "unit": "A"}},
+        "dc_link_sag": {"sag": {"value": 0.0012, "unit": "1"}},
+    }
     document = {"detection_limits": limits}
     assert limit_words(document, "sensor_offset") == "71 µA"
     assert limit_words(document, "dc_link_sag") == "0.12 %"
@@ -64,7 +74,9 @@ def test_a_next_experiment_promises_only_what_was_predicted():
 
 
 def test_a_refusal_has_a_headline():
-    assert "cannot carry" in headline(refused_document(refused("too short", 3, "at least 5", "record longer"), "recording"))
+    assert "cannot carry" in headline(
+        refused_document(refused("too short", 3, "at least 5", "record longer"), "recording")
+    )
 
 
 def screening(gram):
@@ -95,7 +107,7 @@ def seen():
 
 def seen_by(sensors):
     """Residuals of a true and of a wrong model (R_R 20 % off) on a multisine with white noise and one masked stretch."""
-    from commissioner.diagnose.plant import predict
+    from commissioner.diagnose.plant.prediction import predict
 
     time = PERIOD * np.arange(SAMPLES)
     voltage = sum(5.0 * np.sin(2 * np.pi * f * time + k) for k, f in enumerate(TONES))
@@ -150,7 +162,7 @@ def test_without_causes_only_the_error_as_it_is_is_drawn(seen, has_causes):
 
 
 def test_dense_tones_leave_excited_lines_and_others(seen):
-    from commissioner.diagnose.split import class_bins
+    from commissioner.diagnose.intake.line_classes import class_bins
 
     bins = class_bins(np.arange(1.0, 60.0, 2.0), SAMPLES, PERIOD)
     assert set(bins) == {"excited"} and bins["excited"].size == 30

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.audit import Audit
+from commissioner.diagnose.catalogue import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis, Verdict
 from commissioner.diagnose.document import as_document, refused_document
-from commissioner.diagnose.effects import CATALOGUE
-from commissioner.diagnose.experiment import DECIDES, next_experiment, procedure, what_decides
-from commissioner.diagnose.record import Facts
-from commissioner.diagnose.refusals import refused
-from commissioner.report import diagnose_sections as sections
-from commissioner.report.diagnose_names import (
+from commissioner.diagnose.intake.audit import Audit
+from commissioner.diagnose.intake.record import Facts
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.diagnose.verdict.experiment import DECIDES, next_experiment, procedure, what_decides
+from commissioner.report.diagnosis import sections
+from commissioner.report.diagnosis.names import (
     class_name,
     main_name,
     main_quantity,
@@ -24,9 +24,9 @@ from commissioner.report.diagnose_names import (
     spoken,
     sure_words,
 )
-from commissioner.report.diagnose_page import page_of
-from commissioner.report.diagnose_plain import PLAIN
-from commissioner.report.diagnose_words import actions, headline, meaning, remarks, tone
+from commissioner.report.diagnosis.page import page_of
+from commissioner.report.diagnosis.plain import PLAIN
+from commissioner.report.diagnosis.words import actions, headline, meaning, remarks, tone
 from commissioner.report.page import Page, Table, render
 
 FACTS = Facts(2e-4, 5.0, 1500.0, 0.8, 5.0, 5000.0, 540.0, 3)
@@ -38,20 +38,47 @@ def cause(name, sizes=None, equivalent=(), share=0.8, strength=19.0, confidence=
     """One entry of the document's `causes`."""
     parameters = {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in (sizes or {}).items()}
     return {
-        "name": name, "title": "", "parameters": parameters, "gain_share": share, "confidence": confidence, "equivalent": list(equivalent),
-        "strength_over_noise": strength, "delta_chi2": 1e6, "alternatives": {}, "found_by": "fit",
+        "name": name,
+        "title": "",
+        "parameters": parameters,
+        "gain_share": share,
+        "confidence": confidence,
+        "equivalent": list(equivalent),
+        "strength_over_noise": strength,
+        "delta_chi2": 1e6,
+        "alternatives": {},
+        "found_by": "fit",
     }
 
 
 def document(verdict, causes=(), **more):
     """What `diagnose` writes, as far as the words need it."""
-    gain = {"held_out": 0.9999, "rmse_before_a": 0.33, "rmse_after_a": 0.0104, "noise_floor_a": 0.0103, "explained_share": 0.9999,
-            "structured_error_over_noise": 11.3}
+    gain = {
+        "held_out": 0.9999,
+        "rmse_before_a": 0.33,
+        "rmse_after_a": 0.0104,
+        "noise_floor_a": 0.0103,
+        "explained_share": 0.9999,
+        "structured_error_over_noise": 11.3,
+    }
     limits = {name: {} for name in ("sensor_offset", "sensor_lag", "leakage_saturation")}
     return {
-        "verdict": verdict, "reason": "a reason with sensor_offset", "kind": "recording", "causes": list(causes), "gain": gain,
-        "remarks": [], "audit": [], "next_experiment": None, "parameters_before": {}, "parameters_after": {}, "uncertain": [],
-        "detection_limits": limits, "cannot_tell": [], "line_levels_db": {}, "dc_link_v": 540.0, **more,
+        "verdict": verdict,
+        "reason": "a reason with sensor_offset",
+        "kind": "recording",
+        "causes": list(causes),
+        "gain": gain,
+        "remarks": [],
+        "audit": [],
+        "next_experiment": None,
+        "parameters_before": {},
+        "parameters_after": {},
+        "uncertain": [],
+        "detection_limits": limits,
+        "cannot_tell": [],
+        "line_levels_db": {},
+        "dc_link_v": 540.0,
+        **more,
     }
 
 
@@ -69,7 +96,11 @@ def test_a_leg_voltage_is_named_as_what_it_is_and_as_normal():
 def test_legs_that_lose_unlike_voltages_are_not_called_normal(v, w, said):
     legs = cause("dead_time", LOST | {"unequal_v": (v, 0.01, "1"), "unequal_w": (w, 0.01, "1")}, ["device_drop"])
     words = headline(document("not_distinguishable", [legs]))
-    assert ("normal" not in words and f"one is {said} their mean: check its gate driver" in words) if said else "That is normal" in words
+    assert (
+        ("normal" not in words and f"one is {said} their mean: check its gate driver" in words)
+        if said
+        else "That is normal" in words
+    )
 
 
 def test_much_leg_voltage_is_not_called_normal():
@@ -92,8 +123,14 @@ def test_a_tie_has_the_name_certainty_and_size_of_the_class(one, name, certain, 
 
 
 def test_of_several_directions_the_largest_size_leads_under_its_own_name():
-    broken_bar = cause("resistance_anisotropy", {"stator_anisotropy": (1e-5, 3e-5, "1"), "rotor_anisotropy": (0.0096, 1e-4, "1")})
-    assert (main_name(broken_bar), main_size(broken_bar), main_quantity(broken_bar)) == ("rotor anisotropy", "0.96 %", "0.960 ± 0.020 %")
+    broken_bar = cause(
+        "resistance_anisotropy", {"stator_anisotropy": (1e-5, 3e-5, "1"), "rotor_anisotropy": (0.0096, 1e-4, "1")}
+    )
+    assert (main_name(broken_bar), main_size(broken_bar), main_quantity(broken_bar)) == (
+        "rotor anisotropy",
+        "0.96 %",
+        "0.960 ± 0.020 %",
+    )
     assert (main_name(LEGS), main_size(LEGS)) == ("lost per leg", "7.9 V")
     unlike = cause("iron_loss", {"conductance_ms": (0.3, 0.01, "mS")}, ["rotor_skin_effect"])
     assert (main_name(unlike), main_size(unlike), main_quantity(unlike)) == ("", "", "-")
@@ -121,7 +158,11 @@ def test_an_unexplained_error_keeps_what_is_known_beside_it():
 
 
 def test_what_is_uncertain_or_behind_a_class_does_not_stand_among_the_absent():
-    seen = document("not_distinguishable", [LATE], uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"], "is_seen": True}])
+    seen = document(
+        "not_distinguishable",
+        [LATE],
+        uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"], "is_seen": True}],
+    )
     absent = [row[0] for row in sections.not_found(seen).parts[0].rows]
     assert absent == ["leakage saturation"]
     assert "inverter off" in sections.uncertain_names(seen)[0].parts[0].rows[0][2]
@@ -130,8 +171,12 @@ def test_what_is_uncertain_or_behind_a_class_does_not_stand_among_the_absent():
 def test_parameters_are_given_without_interval_and_not_for_the_drive():
     value = {"value": 0.32, "std": 0.001}
     saturated = cause("magnetizing_saturation", {"extra_current_a": (0.6, 0.01, "A")})
-    seen = document("explained", [saturated], parameters_before={"magnetizing_inductance_h": {"value": 0.16, "std": 0.01}},
-                    parameters_after={"magnetizing_inductance_h": value})
+    seen = document(
+        "explained",
+        [saturated],
+        parameters_before={"magnetizing_inductance_h": {"value": 0.16, "std": 0.01}},
+        parameters_after={"magnetizing_inductance_h": value},
+    )
     words, table = sections.parameters(seen).parts
     assert "do not enter these in a drive" in words and "unsaturated" in words
     assert isinstance(table, Table) and table.rows[0][1:] == ("160.0 mH", "320.0 mH", "-50.0 %")
@@ -180,9 +225,17 @@ def test_the_procedure_for_the_legs_has_the_drives_own_numbers():
 
 
 def test_what_was_seen_stands_apart_from_what_could_only_hide():
-    both = [{"name": n, "why": "w", "decides": "d", "is_seen": is_seen} for n, is_seen in (("iron_loss", False), ("sensor_lag", True))]
-    titles = {s.title: s.parts[0].rows[0][0] for s in sections.uncertain_names(document("explained", [LEGS], uncertain=both))}
-    assert titles == {"Seen, but the name is uncertain": "sensor lag", "Not seen, but could hide behind a named cause": "iron loss"}
+    both = [
+        {"name": n, "why": "w", "decides": "d", "is_seen": is_seen}
+        for n, is_seen in (("iron_loss", False), ("sensor_lag", True))
+    ]
+    titles = {
+        s.title: s.parts[0].rows[0][0] for s in sections.uncertain_names(document("explained", [LEGS], uncertain=both))
+    }
+    assert titles == {
+        "Seen, but the name is uncertain": "sensor lag",
+        "Not seen, but could hide behind a named cause": "iron loss",
+    }
 
 
 def test_nobody_is_asked_to_record_the_link_that_is_recorded():
@@ -190,14 +243,23 @@ def test_nobody_is_asked_to_record_the_link_that_is_recorded():
     record = SimpleNamespace(segments=(segment,))
     assert "column dc_link_v" in what_decides("dc_link_sag", record)
     segment.link_swing = np.zeros(3)
-    assert "half the level" in what_decides("dc_link_sag", record) and "column" not in what_decides("dc_link_ripple", record)
+    assert "half the level" in what_decides("dc_link_sag", record) and "column" not in what_decides(
+        "dc_link_ripple", record
+    )
 
 
 def test_a_refusal_and_a_null_are_said_plainly():
     data = refused_document(refused("sensor_offset too large", 3.0, "at most 2", "turn it off"), "recording")
-    assert "cannot carry" in headline(data) and meaning(data) == ["sensor offset too large; turn it off", "Seen: 3.00; expected: at most 2."]
+    assert "cannot carry" in headline(data) and meaning(data) == [
+        "sensor offset too large; turn it off",
+        "Seen: 3.00; expected: at most 2.",
+    ]
     assert data["error"] == {
-        "kind": "DataRefused", "what": "sensor_offset too large", "step": "diagnose", "value": 3.0, "limit": "at most 2",
+        "kind": "DataRefused",
+        "what": "sensor_offset too large",
+        "step": "diagnose",
+        "value": 3.0,
+        "limit": "at most 2",
         "remedy": "turn it off",
     }
     null = document("nothing_significant")

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from commissioner.errors import WriteBackFailed
-from commissioner.link.drive_file import load_profile
-from commissioner.link.facts import DisarmReport
+from commissioner.link.drive.facts import DisarmReport
+from commissioner.link.files.drive_file import load_profile
 from commissioner.procedure.findings import RunEnded
 from commissioner.run import commission
-from commissioner.run.archive import RunFolder
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
 from commissioner.safety import commands as ask

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.cli.archive import restore_run
+from commissioner.cli.verbs.archive import restore_run
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError, WriteBackFailed
-from commissioner.link.drive_file import load_profile
-from commissioner.link.inverter import Inverter
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock
 from commissioner.run import restore as restoring
-from commissioner.run.archive import RunFolder, read_blocks
-from commissioner.run.catalogue import summarise
+from commissioner.run.archive.catalogue import summarise
+from commissioner.run.archive.folder import RunFolder, read_blocks
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 from commissioner.errors import Aborted, DriveFault, ReplyTimeout
-from commissioner.link.facts import DisarmReport, WriteReport
+from commissioner.link.drive.facts import DisarmReport, WriteReport
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
-from commissioner.run.archive import RunFolder
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
 from commissioner.safety import commands as ask

@@ -1,0 +1,172 @@
+"""What goes to the terminal: one JSON document, or words and tables for a person."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from commissioner.errors import Aborted, CommissionerError, UsageError
+from commissioner.report.run.summary import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
+from commissioner.run.archive.folder import plain
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+def emit(document: object) -> None:
+    """The one JSON document of `--json`."""
+    sys.stdout.write(json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def require_yes(yes: bool, *, as_json: bool) -> None:
+    """UsageError where a question would have to be asked and nobody can be."""
+    if as_json and not yes:
+        raise UsageError(
+            "nobody can be asked with --json", step="confirm", value="--json without --yes", limit="--yes",
+            remedy="add --yes once you have made sure that the drive may be energised or written",
+        )  # fmt: skip
+
+
+def confirm(question: str, *, otherwise: str) -> None:
+    """Aborted unless a person says yes; `otherwise` says what a no leaves behind."""
+    import typer
+
+    if not typer.confirm(question):
+        raise Aborted(otherwise, step="confirm", value="no", limit="yes", remedy="start again when ready")
+
+
+@contextmanager
+def busy(doing: str) -> Iterator[None]:
+    """A moving bar and the time gone by on stderr, while something takes longer than a person likes to wait."""
+    columns = (TextColumn("    {task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        progress.add_task(doing, total=None)
+        yield
+
+
+def failure(error: CommissionerError) -> None:
+    """What happened, where, value, limit, remedy: a line each."""
+    err.print(f"[bold red]{escape(printable(error.what))}[/]")
+    for name, text in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
+        if text not in (None, ""):
+            err.print(f"  [dim]{name:<7}[/]{escape(printable(shown(text)))}")
+
+
+def printable(text: str) -> str:
+    """Without the control characters that a stranger's file may hold: they could steer the terminal."""
+    return "".join(character if character.isprintable() or character == "\n" else "?" for character in text)
+
+
+def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:
+    """A rich table; `right` lists the columns that hold numbers."""
+    made = Table(
+        title=title or None, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
+    )
+    for index, name in enumerate(header):
+        made.add_column(name, justify="right" if index in set(right) else "left", no_wrap=index == 0)
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def shown(value: object) -> str:
+    """A value as a person reads it: four digits, no tails."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def quantity(value: float, std: float, unit: str) -> str:
+    """`3.702 +- 0.011 ohm`, rounded to two digits of the standard error."""
+    if not (math.isfinite(std) and std > 0):
+        return f"{value:.4g} {unit}"
+    digits = max(0, 1 - math.floor(math.log10(std)))
+    return f"{value:.{digits}f} ± {std:.{digits}f} {unit}"
+
+
+def kept(is_stored: bool) -> str:
+    """How lasting a write is, in words."""
+    return (
+        "read back and stored" if is_stored else "read back, not stored: save at the drive or it is lost at power-off"
+    )
+
+
+def wear(count: int, fraction: float) -> str:
+    """How much of the drive's memory is used up."""
+    return f"{count} writes of the drive's memory so far, {fraction:.3%} of its life"
+
+
+_MARKS = {
+    "commissioned": "[green]✓ commissioned[/]",
+    ACCEPTED: f"[yellow]✓ {ACCEPTED}[/]",
+    RESTORED_SINCE: f"[yellow]✓ {RESTORED_SINCE}[/]",
+    "rejected": "[yellow]✗ rejected[/]",
+    "aborted": "[yellow]■ aborted[/]",
+    "faulted": "[red]✗ faulted[/]",
+}
+ROWS = (
+    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
+    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
+    ("leakage_inductance_h", "leakage inductance L_σ", 1e3, "mH"),
+    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
+    ("rotor_time_constant_s", "rotor time constant", 1e3, "ms"),
+)
+
+
+def outcome_mark(standing: str) -> str:
+    """The outcome in its colour; a run that was cut off is red."""
+    return _MARKS.get(standing, f"[red]? {standing}[/]")
+
+
+def result(document: Mapping[str, Any], standing_now: str = "") -> None:
+    """A run's result as the technician reads it; `standing_now` where something has happened since."""
+    out.print()
+    out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
+    error = document.get("error")
+    if error:
+        for name in ("step", "value", "limit", "remedy"):
+            if error.get(name) not in (None, ""):
+                out.print(f"  [dim]{name:<7}[/]{escape(shown(error[name]))}")
+    if document.get("parameters"):
+        out.print(
+            table(
+                "",
+                ("", "value", "std error", "in the drive before", "change", "written"),
+                _rows(document, "restored" if standing_now == RESTORED_SINCE else "yes"),
+                right=(1, 2, 3, 4),
+            )
+        )
+        for remark in (*finding_sentences(document), *document.get("remarks", ())):
+            out.print(f"  [dim]•[/] {escape(remark)}")
+        if standing(document) == ACCEPTED:
+            out.print(
+                "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"
+            )
+    out.print(f"  energised {document['energised_s']:.1f} s in all")
+
+
+def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:
+    before = document.get("before") or {}
+    written = {row["field"] for row in document.get("written", ())}
+    for name, words, factor, unit in ROWS:
+        quantity_ = document["parameters"].get(name)
+        if quantity_ is None:
+            continue
+        value, std = quantity_["value"], quantity_["std"]
+        old = before.get(name)
+        yield (
+            words,
+            f"{factor * value:.4g} {unit}",
+            f"{100 * std / abs(value):.2f} %",
+            "" if old is None else f"{factor * old:.4g} {unit}",
+            "" if not old else f"{100 * (value / old - 1):+.1f} %",
+            done if name in written else "",
+        )

@@ -1,0 +1,1 @@
+"""One verb a file: its options in, its screen and exit code out."""

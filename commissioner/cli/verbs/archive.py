@@ -1,0 +1,60 @@
+"""`commissioner restore` and `commissioner replay`: what an archived run is good for afterwards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commissioner.cli.screens import screen
+from commissioner.errors import DataRefused
+from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.late_report import mark_restored
+from commissioner.run.archive.replay import replay
+from commissioner.run.restore import restore
+
+
+def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool) -> None:
+    """Write the run's snapshot back, after asking."""
+    screen.require_yes(yes, as_json=as_json)
+    summary = find_run(runs, run)
+    if not yes:
+        screen.out.print(
+            f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
+            "stored. Make sure that it is the same drive."
+        )
+        screen.confirm("Write?", otherwise="nothing was written")
+    with screen.busy("writing and reading back"):
+        done = restore(summary, drive)
+    mark_restored(summary)
+    if as_json:
+        screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
+        return
+    rows = [(w.name, f"{w.before:.5g}", f"{w.after:.5g}", f"{w.read_back:.5g}") for w in done.written]
+    if rows:
+        screen.out.print(screen.table("", ("parameter", "before", "written", "read back"), rows, right=(1, 2, 3)))
+    screen.out.print(
+        f"[green]snapshot restored, {screen.kept(done.is_stored)}[/]"
+        if rows
+        else "the drive held the snapshot's values already"
+    )
+    if done.wear_fraction is not None:
+        screen.out.print(screen.wear(done.store_count, done.wear_fraction))
+
+
+def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
+    """Decide the run again from its archive; exit 3 where a decision comes out otherwise."""
+    summary = find_run(runs, run)
+    with screen.busy("deciding again"):
+        done = replay(Path(summary.folder))
+    if as_json:
+        screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
+                     "difference": done.difference})  # fmt: skip
+        if not done.is_identical:
+            raise SystemExit(DataRefused.exit_code)
+        return
+    if done.difference is not None:
+        raise DataRefused(
+            f"decision {done.difference.number} of {summary.run} comes out otherwise", step="replay",
+            value=done.difference.replayed, limit=done.difference.archived,
+            remedy="the run was made by another version of commissioner, or its folder was changed",
+        )  # fmt: skip
+    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]")

@@ -1,0 +1,1 @@
+"""The extended model as files: what this product plays, and what the simulated inverter reads."""

@@ -1,0 +1,182 @@
+"""A model on a record: trajectories, whitened residuals and normal equations, gathered segment by segment.
+
+Only chi2, Gram matrices and, until they are asked for, the trajectories leave a segment: sensitivities never do, and
+leave-one-segment-out estimates are a subtraction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
+
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.intake.record import Record, each_segment
+from commissioner.diagnose.plant.model import Layout, Model, Term
+from commissioner.diagnose.plant.prediction import Path, predict, trajectory
+
+Array = NDArray[np.float64]
+HELD_SAMPLES = 400_000
+"""Of a record whose trajectories are held: a quarter of a gigabyte at the most."""
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Whitened normal equations per segment: `gram` (s, P, P), `slope` (s, P), `chi2` (s,), `count` (s,) samples."""
+
+    gram: Array
+    slope: Array
+    chi2: Array
+    count: Array
+
+    @property
+    def total_gram(self) -> Array:
+        total: Array = self.gram.sum(axis=0)
+        return total
+
+    @property
+    def total_slope(self) -> Array:
+        total: Array = self.slope.sum(axis=0)
+        return total
+
+    @property
+    def total_chi2(self) -> float:
+        return float(self.chi2.sum())
+
+    @property
+    def unexplained(self) -> float:
+        """Chi2 above what the noise makes, which is 1 for every sample."""
+        return self.total_chi2 - float(self.count.sum())
+
+
+def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: float) -> Array:
+    """`(..., phases, n)` residual or sensitivities -> `(..., m)` with unit noise variance; masked samples drop out."""
+    if noise.is_white:
+        scaled = signal / noise.sigma_a[:, None]
+        if not is_good.all():
+            scaled = scaled[..., is_good]
+        return np.ascontiguousarray(scaled.reshape(*signal.shape[:-2], -1))
+    # zeros to a length of small factors: a prime one takes five times as long
+    n = next_fast_len(signal.shape[-1], real=True)
+    weights = noise.weights(n, period_s)
+    masked = np.where(is_good, signal, 0.0) if not is_good.all() else signal
+    spectrum = rfft(masked, n, axis=-1)
+    scale = np.full(weights.shape[1], np.sqrt(2.0 / n))
+    scale[0] = np.sqrt(1.0 / n)
+    if n % 2 == 0:
+        scale[-1] = np.sqrt(1.0 / n)
+    spectrum *= scale / weights
+    # real and imaginary parts side by side
+    return np.asarray(spectrum.view(np.float64).reshape(*signal.shape[:-2], -1))
+
+
+class Trial:
+    """A model on a record: its chi2 from the trajectories alone, and the derivatives for the four and `wanted` once they are asked for.
+
+    The trajectories of a long record are not held between the two: there derivatives come with the chi2.
+    """
+
+    def __init__(self, model: Model, record: Record, layout: Layout, wanted: Sequence[Term], noise: Noise) -> None:
+        self._model, self._record, self._layout, self._wanted, self._noise = model, record, layout, wanted, noise
+        self._size = 4 + len(wanted)
+        self._paths: list[Path] = []
+        self._prior = layout.penalty(wanted)
+        known = {(t.effect, t.symbol): x for t, x in zip(model.terms, model.theta[4:], strict=True)}
+        self._theta = np.array([0.0] * 4 + [known.get((t.effect, t.symbol), 0.0) for t in wanted])
+
+    @cached_property
+    def chi2(self) -> float:
+        if self._wanted and self._record.samples > HELD_SAMPLES:
+            return self._normal.total_chi2
+        paths, chi2 = zip(*each_segment(self._chi2_of, self._record), strict=True)
+        self._paths = list(paths) if self._wanted else []
+        return float(sum(chi2)) + float(self._theta @ self._prior @ self._theta)
+
+    @cached_property
+    def _normal(self) -> Normal:
+        return self._gathered(1)
+
+    def _here(self, k: int) -> list[int]:
+        return [c for c, term in enumerate(self._wanted) if term.segment in (-1, self._record.segments[k].uid)]
+
+    def _chi2_of(self, k: int) -> tuple[Path, float]:
+        here = [self._wanted[c] for c in self._here(k)]
+        # a trial step may be far too long, and the setting of the caller's thread does not hold in another
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            path = trajectory(self._model, self._record, k, self._layout, here)
+            segment = self._record.segments[k]
+            left = segment.currents_a - predict(self._model, self._record, k, self._layout, path=path).currents_a
+            white = whiten(left, segment.is_good, self._noise, self._record.facts.sample_period_s)
+            return path, float(white @ white)
+
+    def normal(self, block: int = 1) -> Normal:
+        """Gram matrix and slope of the whitened residual, one block per segment.
+
+        `block` > 1 averages so many neighbouring samples first (white noise only): a screening needs no more bandwidth
+        than the excitation has.
+        """
+        return self._normal if block == 1 else self._gathered(block)
+
+    def _gathered(self, block: int) -> Normal:
+        def of_segment(k: int) -> tuple[Array, Array, float, int]:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                here, segment = self._here(k), self._record.segments[k]
+                path = self._paths[k] if self._paths else None
+                seen = predict(self._model, self._record, k, self._layout, [self._wanted[c] for c in here], path)
+                product = self._product(seen.jacobian, segment.currents_a - seen.currents_a, segment.is_good, block)
+            rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
+            gram, slope = np.zeros((self._size, self._size)), np.zeros(self._size)
+            gram[np.ix_(rows, rows)] = product[:-1, :-1]
+            slope[rows] = product[:-1, -1]
+            return gram, slope, float(product[-1, -1]), segment.good_count * self._record.facts.phases
+
+        grams, slopes, chi2, counts = (
+            list(column) for column in zip(*each_segment(of_segment, self._record), strict=True)
+        )
+        if self._prior.any():
+            grams.append(self._prior)
+            slopes.append(-self._prior @ self._theta)
+            chi2.append(float(self._theta @ self._prior @ self._theta))
+            counts.append(0)
+        return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
+
+    def _product(self, jacobian: Array, residual: Array, good: NDArray[np.bool_], block: int) -> Array:
+        """Whitened Gram matrix of all directions and, last, the residual: of white noise phase by phase, never copied whole."""
+        noise, size = self._noise, jacobian.shape[0] + 1
+        total = np.zeros((size, size))
+        if noise.is_white:
+            for phase, sigma_a in enumerate(noise.sigma_a):
+                directions, left, kept = jacobian[:, phase], residual[phase], good
+                if block > 1:
+                    directions, left, kept = _averaged(directions, block), _averaged(left, block), _whole(good, block)
+                if not kept.all():
+                    directions, left = directions[:, kept], left[kept]
+                _add_products(directions, left, float(sigma_a) ** -2.0, total)
+        else:
+            period = self._record.facts.sample_period_s
+            directions, left = (whiten(x, good, noise, period) for x in (jacobian, residual[None]))
+            _add_products(directions, left[0], 1.0, total)
+        return total
+
+
+def _add_products(directions: Array, residual: Array, weight: float, total: Array) -> None:
+    total[:-1, :-1] += weight * (directions @ directions.T)
+    total[:-1, -1] += weight * (directions @ residual)
+    total[-1, -1] += weight * float(residual @ residual)
+
+
+def _averaged(signal: Array, block: int) -> Array:
+    """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
+    n = signal.shape[-1] // block * block
+    summed: Array = signal[..., :n].reshape(*signal.shape[:-1], -1, block) @ np.full(block, 1.0 / np.sqrt(block))
+    return summed
+
+
+def _whole(good: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
+    """Blocks whose every sample is good."""
+    whole: NDArray[np.bool_] = np.asarray(good[: good.size // block * block].reshape(-1, block).all(axis=1))
+    return whole

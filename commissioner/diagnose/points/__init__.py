@@ -1,0 +1,1 @@
+"""Steady test points, locked rotor or no load: the table, its circuits, their diagnosis."""

@@ -1,0 +1,182 @@
+"""Steady-state test points (locked rotor, no load) as data: what a table must hold, and which test it is.
+
+Per point the terminal impedance is R + jX with R = P / (3 I^2) and |Z| = V / (sqrt(3) I) (IEC 60034-28, IEEE 112).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.errors import DataRefused
+from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES
+
+Array = NDArray[np.float64]
+LEAST_POINTS, MOST_POINTS = 5, 300
+LEAST_SPREAD, LEAST_FLUX_SPREAD = 1.3, 1.15
+"""Largest over smallest current (locked rotor) and flux (no load) from which on a circuit can be seen to bend."""
+LEAST_POWER_FACTOR = 0.005
+"""A large motor at no load has 0.03; kilowatts read as watts make a thousandth of any."""
+NO_LOAD_SLOPE = -0.5
+"""d ln R / d ln V of R = P/(3 I^2): about 0 with a locked rotor, between -1 and -2 at no load."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Steady-state points of one test: `(n,)` each, line values rms, three-phase power; `resistance_ohm` per star phase."""
+
+    name: str
+    frequency_hz: Array
+    voltage_line_v: Array
+    current_line_a: Array
+    power_w: Array
+    resistance_ohm: Array | None
+    is_locked: bool
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        return int(self.current_line_a.shape[0])
+
+    @property
+    def omega(self) -> Array:
+        return np.asarray(2.0 * np.pi * self.frequency_hz)
+
+    @property
+    def phase_voltage_v(self) -> Array:
+        return np.asarray(self.voltage_line_v / np.sqrt(3.0))
+
+    def without(self, k: int) -> Points:
+        keep = np.arange(self.count) != k
+        return self._at(keep)
+
+    def only(self, k: int) -> Points:
+        return self._at(np.arange(self.count) == k)
+
+    def _at(self, keep: NDArray[np.bool_]) -> Points:
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[keep],
+            voltage_line_v=self.voltage_line_v[keep],
+            current_line_a=self.current_line_a[keep],
+            power_w=self.power_w[keep],
+            resistance_ohm=None if self.resistance_ohm is None else self.resistance_ohm[keep],
+        )
+
+
+def is_points_table(columns: Sequence[str]) -> bool:
+    """Whether the names are meant to be a points table's: most of what one needs, and no time."""
+    return "time_s" not in columns and sum(name in columns for name in POINT_COLUMNS) >= 2
+
+
+def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused:
+    """The points of a table, rows that are copies taken once, or why they cannot be used."""
+    if missing := [c for c in POINT_COLUMNS if c not in columns]:
+        return refused(
+            f"a table of test points needs the column {missing[0]}",
+            ", ".join(columns),
+            ", ".join(POINT_COLUMNS),
+            f"add or rename: {', '.join(missing)}",
+        )
+    between = next((c for c in POINT_RESISTANCES if c in columns), None)
+    names = (*POINT_COLUMNS, *([between] if between else []))
+    for column in names:
+        values = np.asarray(columns[column], dtype=float)
+        wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
+        if wrong.size:
+            return refused(
+                f"{column} is {values[wrong[0]]:g} in row {wrong[0] + 1}",
+                float(values[wrong[0]]),
+                "positive numbers in every row",
+                "correct the cell or leave the row out",
+            )
+    rows = np.stack([np.asarray(columns[c], dtype=float) for c in names], axis=1)
+    _, first = np.unique(rows, axis=0, return_index=True)
+    copies, rows = rows.shape[0] - first.size, rows[np.sort(first)]
+    f, v, i, p = rows[:, :4].T
+    is_locked = _is_locked(f, v, i, p, name)
+    if (refusal := _not_usable(f, v, i, p, is_locked=is_locked)) is not None:
+        return refusal
+    remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
+    if between is None:
+        remarks.append(
+            "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point): windings that "
+            "warm up or cool down during the test count as the rotor's resistance or as loss."
+        )
+    return Points(name, f, v, i, p, 0.5 * rows[:, 4] if between else None, is_locked, tuple(remarks))
+
+
+def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> DataRefused | None:
+    if f.size < LEAST_POINTS:
+        return refused(
+            f"{f.size} different points cannot carry an answer",
+            f.size,
+            f"at least {LEAST_POINTS}",
+            "measure at more voltages",
+        )
+    if f.size > MOST_POINTS:
+        return refused(
+            f"{f.size} points are no test by hand",
+            f.size,
+            f"at most {MOST_POINTS}",
+            "give the steady points, each once; a recording over time needs the column time_s",
+        )
+    factor = p / (np.sqrt(3.0) * v * i)
+    if factor.max() > 1.0:
+        row = int(np.argmax(factor))
+        return refused(
+            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A exceeds the apparent power {p[row] / factor[row]:.6g} VA",
+            float(factor[row]),
+            "a power factor of at most 1",
+            "give line-to-line volts, line amperes and the watts of all three phases",
+        )
+    if factor.min() < LEAST_POWER_FACTOR:
+        row = int(np.argmin(factor))
+        return refused(
+            f"the power {p[row]:.6g} W at {v[row]:g} V and {i[row]:g} A is a power factor of {factor[row]:.2g}",
+            float(factor[row]),
+            f"at least {LEAST_POWER_FACTOR}",
+            "check the units: volts, amperes and watts, with a decimal point",
+        )
+    if _loaded(f, v, i):
+        return refused(
+            "the current changes at constant voltage and frequency: points of a loaded motor, not of a locked or idle one",
+            float(np.ptp(i)),
+            "currents that follow the voltage",
+            "give the points of a locked-rotor or a no-load test",
+        )
+    what, values, least = ("current", i, LEAST_SPREAD) if is_locked else ("flux", v / f, LEAST_FLUX_SPREAD)
+    spread = float(values.max() / values.min())
+    if spread < least and not (is_locked and np.unique(f).size > 1):
+        return refused(
+            f"the largest {what} is only {spread:.3g} times the smallest: nothing can be seen to bend",
+            spread,
+            f"at least {least}",
+            "measure over a wider range of voltage",
+        )
+    return None
+
+
+def _is_locked(f: Array, v: Array, i: Array, p: Array, name: str) -> bool:
+    lowered = name.lower().replace("-", "_").replace(" ", "_")
+    if "no_load" in lowered or "noload" in lowered:
+        return False
+    if "locked" in lowered or "short_circuit" in lowered:
+        return True
+    slopes = [_slope(p[k] / i[k] ** 2, v[k]) for k in (f == one for one in np.unique(f)) if np.ptp(np.log(v[k])) > 0.05]
+    return float(np.median(slopes or [0.0])) > NO_LOAD_SLOPE
+
+
+def _slope(y: Array, x: Array) -> float:
+    """d ln y / d ln x by least squares."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def _loaded(f: Array, v: Array, i: Array) -> bool:
+    """At one voltage and frequency the current changes by a quarter and more: a shaft that is loaded, not tested."""
+    same = [(f == one) & (np.abs(v / np.median(v[f == one]) - 1.0) < 0.02) for one in np.unique(f)]
+    return any(int(k.sum()) >= 3 and float(np.ptp(np.log(i[k]))) > 0.22 for k in same)

@@ -1,0 +1,292 @@
+"""Causes as they are named: size, strength, confidence, what else would do as well, and those kept back."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.fit.gauss_newton import on_part
+from commissioner.diagnose.fit.lost_samples import Loss
+from commissioner.diagnose.intake.audit import Audit
+from commissioner.diagnose.intake.noise import Noise
+from commissioner.diagnose.search.acceptance import SAME_ORDER, shows
+from commissioner.diagnose.search.search import EXPLORED, Found
+from commissioner.diagnose.verdict import calibration
+from commissioner.diagnose.verdict.evidence import (
+    TIE_CHI2,
+    Dropped,
+    alternatives,
+    claim_features,
+    confidence,
+    setting_for,
+    sizes_with_spread,
+)
+from commissioner.diagnose.verdict.lack_of_fit import Leftover
+
+MOSTLY_EXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.95
+COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
+"""Named as a cause: steps beyond a share of the rated peak current (12 bits over 3.7 times that, either way) that make a hundredth of the
+
+noise power.
+"""
+TRUNCATION_SLACK = 0.15
+MUCH_LEFT_SIGMA, NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.3, 0.99, 0.2, 0.9
+"""Where more than this is left, a cause that takes so much of what is not another's is named with so much confidence, unless a rival
+
+that takes its place loses less than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
+"""
+ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
+LEAST_CONFIDENCE = 0.5
+"""Below it a name is more likely wrong than right, and is not given."""
+IMITATED = frozenset({("sensor_offset", "sensor_drift"), ("sensor_gain_mismatch", "sensor_nonlinearity")})
+"""Simple causes, each with one of many numbers that has it as a limit."""
+DELAY_OR_LAG_TIE = 1e-5
+SAME_ORDER_TIE = 2e-3
+NEARLY_ALL, LEFT_TIE = 0.001, 0.1
+"""A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
+the unknown rest may favour either."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause. `sizes`: name -> (value, std, unit); `strength_sigma` rms contribution over the noise rms."""
+
+    name: str
+    title: str
+    sizes: Mapping[str, tuple[float, float, str]]
+    gain_share: float
+    strength_sigma: float
+    delta_chi2: float
+    confidence: float
+    equivalent: tuple[str, ...] = ()
+    rivals: Mapping[str, float] = field(default_factory=dict)
+    features: tuple[float, ...] = ()
+    from_audit: bool = False
+
+
+def causes_of(
+    found: Found, rest: Leftover, trust: float, audit: Audit, noise: Noise, excluded: Sequence[str]
+) -> tuple[list[Cause], tuple[Cause, ...]]:
+    """Causes that are named, and those that were fitted but are more likely wrong than right as names.
+
+    `trust`: factor on every confidence (see `doubt`).
+    """
+    refitted = _refitted_without(
+        found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest, trust)]
+    )
+    without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
+    causes = [_cause(found, name, rest, without[name], noise, excluded, trust) for name in found.accepted]
+    causes = _without_truncation(_with_open_ties(causes, without), audit)
+    losses = () if rest.from_bursts_sigma > 0.0 and not found.accepted else found.losses
+    causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
+    unsure = tuple(
+        c
+        for c in causes
+        if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest))
+    )
+    return [c for c in causes if c not in unsure], unsure
+
+
+def explained_share(found: Found, rest: Leftover, left_sigma: float) -> float:
+    """Share of the structured error power that is not among what is left (`left_sigma`, causes not named included)."""
+    count = float(found.fit.normal.count.sum())
+    structured = max(found.nominal.chi2 - found.fit.chi2, 0.0) + rest.sigma**2 * count
+    return 1.0 - min(left_sigma**2 * count / max(structured, left_sigma**2 * count, 1.0), 1.0)
+
+
+def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
+    """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
+    return rest.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+
+
+def _may_be_named(found: Found, name: str, rest: Leftover, trust: float) -> bool:
+    """Whether the name is likely enough: else its alternatives need not be sought."""
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    sure = trust * confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
+    is_likely = sure >= LEAST_CONFIDENCE or _is_dominant(found.gains[name], rest, count)
+    return is_likely and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+
+
+def _is_dominant(gain: float, rest: Leftover, count: float) -> bool:
+    """Whether so much is left that nothing like it was among what the confidence learned from, and yet one cause alone takes nearly all of
+
+    the error that is not another's: then it is there, whatever else is.
+    """
+    return MUCH_LEFT_SIGMA**2 * count < rest.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
+
+
+def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
+    """Fits without each of the causes `asked` about, on the first part of every segment where that shows them as well."""
+    if not asked:
+        return {}
+    record, layout = found.record, found.layout
+    out: dict[str, Dropped] = {}
+    for samples in (*EXPLORED, record.samples):
+        if len(out) == len(asked):
+            break
+        fitted, part = on_part(found.fit, record, layout, noise, samples)
+        share = part.samples / record.samples
+        shown = [n for n in asked if n not in out and (part is record or shows(fitted, share, n, found.gains[n]))]
+        if shown:
+            setting = setting_for(found.setting, part)
+            out |= alternatives(fitted, found.accepted, part, layout, setting, noise, record.samples, excluded, shown)
+    return out
+
+
+def _cause(
+    found: Found,
+    name: str,
+    rest: Leftover,
+    without: Dropped,
+    noise: Noise,
+    excluded: Sequence[str],
+    trust: float,
+) -> Cause:
+    count = float(found.fit.normal.count.sum())
+    total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
+    # where the way to a cause bends, the loss foretold at its end falls short of a fit's
+    gain = total if found.accepted == (name,) else max(found.gains[name], min(without.loss, total))
+    fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
+    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
+    close = tuple(
+        n
+        for n, r in without.rivals.items()
+        if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
+    )
+    features = claim_features(found.fit, found.accepted, name, rest, total)
+    sure = confidence(features, calibration.WEIGHTS) * trust
+    if _is_dominant(gain, rest, count) and all(r.loss > LEAST_LOST_TO_A_RIVAL * gain for r in without.rivals.values()):
+        sure = max(sure, DOMINANT_CONFIDENCE * trust)
+    if not noise.is_known:
+        sure *= calibration.UNKNOWN_NOISE_FACTOR
+    strength = float(np.sqrt(gain / count))
+    if strength < calibration.TRACE_SIGMA:
+        sure *= calibration.TRACE_FACTOR
+    return Cause(
+        name,
+        CATALOGUE[name].title,
+        sizes_with_spread(found.fit, name, found.setting),
+        min(gain / total, 1.0),
+        strength,
+        gain,
+        sure,
+        tuple(c for c in dict.fromkeys((*fixed, *close)) if c not in excluded),
+        {n: r.loss for n, r in without.rivals.items()},
+        tuple(features),
+    )
+
+
+def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> list[Cause]:
+    """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one, or if they have another form: either
+
+    may be true.
+    """
+    out = []
+    for cause in causes:
+        tied = [
+            without[c.name].rivals[n]
+            for c in causes
+            if c is not cause
+            for n in c.equivalent
+            if n in without[c.name].rivals
+        ]
+        tied += without[cause.name].forms
+        sizes = {}
+        for key, (value, spread, unit) in cause.sizes.items():
+            moved = [0.5 * r.moved.get(cause.name, {}).get(key, 0.0) for r in tied]
+            sizes[key] = (value, float(np.linalg.norm([spread, max(np.abs(moved), default=0.0)])), unit)
+        out.append(replace(cause, sizes=sizes))
+    return out
+
+
+def _share_open(name: str, rival: str) -> float:
+    """Share of a gain within which two causes are the same to the terminals, whatever fits better: networks of the same
+
+    order; a delay and a lag, whose currents are taken as straight between the samples.
+    """
+    shares = {SAME_ORDER: SAME_ORDER_TIE, frozenset({"sampling_delay", "sensor_lag"}): DELAY_OR_LAG_TIE}
+    return shares.get(frozenset({name, rival}), 0.0)
+
+
+def _more_numbers(found: Found, name: str, rival: str) -> float:
+    """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
+
+    has settled at once, a sensor's bend that has.
+    """
+    if (name, rival) not in IMITATED:
+        return 0.0
+    mine = sum(t.effect == name for t in found.fit.model.terms)
+    return float(np.log(found.fit.normal.count.sum())) * (len(CATALOGUE[rival].terms(found.setting)) - mine)
+
+
+def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
+    """A converter that cuts off instead of rounding shifts every channel by half a step: that is quantization, no offset."""
+    out = []
+    for cause in causes:
+        offsets = [value for value, _, _ in cause.sizes.values()]
+        halves = 0.5 * np.array(audit.step_a)
+        if cause.name == "sensor_offset" and len(offsets) == halves.size and halves.min() > 0.0:
+            ratio = np.array(offsets) / halves
+            if np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0):
+                step = {"step_a": (float(halves.max()) * 2.0, 0.0, "A")}
+                out.append(
+                    replace(
+                        cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()
+                    )
+                )
+                continue
+        out.append(cause)
+    return out
+
+
+def _audit_causes(
+    audit: Audit, found: Found, noise: Noise, named: Collection[str], losses: Sequence[Loss]
+) -> list[Cause]:
+    """Causes that leave no waveform: coarse converter steps, clipped and missing samples. `losses` without a gap in time: none where
+
+    errors come and go that samples put right do not take away.
+    """
+    out = []
+    step = max(audit.step_a, default=0.0)
+    is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
+    if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
+        out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
+    if audit.clipped and "clipping" not in named:
+        out.append(
+            _plain(
+                "clipping",
+                {"limit_a": (audit.clipped["limit_a"], 0.0, "A"), "samples": (audit.clipped["samples"], 0.0, "1")},
+            )
+        )
+    if audit.holes or losses:
+        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in losses)
+        out.append(
+            _plain(
+                "lost_samples",
+                {
+                    "samples": (float(marked + unmarked), 0.0, "1"),
+                    "without_gap_in_time": (float(unmarked), 0.0, "1"),
+                },
+            )
+        )
+    return out
+
+
+def doubt(rest: Leftover, share: float) -> float:
+    """Factor on every confidence where what is left is small, yet more than noise makes around the tones or in a state, and a
+
+    larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
+    """
+    is_trace = (
+        max(rest.from_tones_sigma, rest.from_states_sigma, rest.from_alien_sigma) > 0.0
+        and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+    )
+    return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
+
+
+def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
+    return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)

@@ -1,0 +1,156 @@
+"""Batch nonlinear least squares over segments: shared machine, inverter and iron, each segment's own initial flux.
+
+Levenberg-Marquardt on the output error. Covariance: inverse information times the residual variance, widened where
+scores of stretches of the record scatter more than a white residual would make them (block sandwich; P. J. Huber 1967,
+H. White, Econometrica 48, 1980).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, Matrix, ModelChoice, start_theta
+from commissioner.identify.batch.problem import Evaluation, Problem
+from commissioner.identify.batch.segments import BatchFit, Segment
+from commissioner.motor.circuit import InverseGamma
+
+WIDEST = 50.0
+"""A circuit value may move by this factor from its start: data that want more do not determine it."""
+
+
+def fit_segments(
+    segments: Sequence[Segment],
+    sample_period_s: float,
+    start: InverseGamma,
+    model: ModelChoice | None = None,
+    theta_start: Matrix | None = None,
+    max_iterations: int = 40,
+    tolerance: float = 1e-4,
+    own_start: Matrix | None = None,
+) -> BatchFit:
+    """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`; `own_start` (segments, 3) is what
+    each segment begins with where an earlier fit knows it, else zero.
+
+    Stops when what steps shrinking as the last two did would still add is below `tolerance` standard errors of every
+    shared parameter (or the step below 1e-10 of its value); `has_converged` says whether that was reached.
+    """
+    choice = model or ModelChoice()
+    problem = Problem(segments, sample_period_s, choice)
+    theta = start_theta(start, choice) if theta_start is None else theta_start.copy()
+    problem.bounds = (theta[:CIRCUIT] / WIDEST, theta[:CIRCUIT] * WIDEST)
+    problem.plateau_v = max(float(np.max(np.abs(theta[choice.leg_slice]), initial=0.0)), 1e-3)
+    own = np.zeros((len(segments), OWN)) if own_start is None else own_start.copy()
+    present = problem.evaluate(theta, own)
+    if not present.is_finite:
+        raise DataRefused(
+            "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
+            remedy="check that the nameplate belongs to the motor",
+        )  # fmt: skip
+    damping, converged, iterations, last_size = 1e-4, False, 0, 0.0
+    spare: Evaluation | None = None
+    for _ in range(max_iterations):
+        iterations += 1
+        step = _step(problem, present, theta, damping)
+        new_theta, new_own = _apply(problem, theta, own, step)
+        trial = problem.evaluate(new_theta, new_own, over=spare)
+        if trial.is_finite and trial.squares <= present.squares * (1.0 + 1e-13):
+            size = _size_in_std(problem, step, present, theta)
+            shrinks = min(size / last_size, 1.0) if last_size > 0.0 and damping <= 1e-4 else 1.0
+            small = size * (shrinks if shrinks < 0.1 else 1.0) < tolerance
+            last_size = size
+            flat = present.squares - trial.squares <= 1e-12 * present.squares
+            theta, own, present, spare = new_theta, new_own, trial, present
+            damping = max(damping * 0.1, 1e-12)
+            if small or (flat and damping <= 1e-8):
+                converged = True
+                break
+        else:
+            spare = trial
+            if damping > 1e8:
+                break
+            damping = max(damping, 1e-8) * 20.0
+            if _size_in_std(problem, step, present, theta) < tolerance:
+                converged = True
+                break
+    return _result(problem, theta, own, present, iterations, converged)
+
+
+def _step(problem: Problem, at: Evaluation, theta: Matrix, damping: float) -> Matrix:
+    free = np.flatnonzero(problem.free)
+    information = at.information[np.ix_(free, free)]
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    normal = information / np.outer(scale, scale)
+    normal[np.diag_indices_from(normal)] += damping + 1e-12
+    step = np.zeros(problem.total)
+    step[free] = np.linalg.solve(normal, at.score[free] / scale) / scale
+    relative = float(np.max(np.abs(step[:CIRCUIT]) / theta[:CIRCUIT]))
+    leg = problem.model.leg_slice
+    if problem.model.leg_size:
+        relative = max(relative, float(np.max(np.abs(step[leg]))) / max(float(np.max(np.abs(theta[leg]))), 1e-2))
+    return np.asarray(step * min(1.0, 0.5 / max(relative, 1e-300)))
+
+
+def _apply(problem: Problem, theta: Matrix, own: Matrix, step: Matrix) -> tuple[Matrix, Matrix]:
+    new_theta = theta + step[: problem.model.size]
+    new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *problem.bounds)
+    if problem.model.leg is not None:
+        part = problem.model.leg_slice
+        new_theta[part] = problem.model.leg.admissible(new_theta[part])
+    new_theta[DELAY] = float(np.clip(new_theta[DELAY], -problem.period_s, 2.0 * problem.period_s))
+    new_own = own + step[problem.model.size :].reshape(own.shape)
+    if not problem.model.with_drift:
+        new_own[:, 0] = new_own[0, 0]
+    return new_theta, new_own
+
+
+def _size_in_std(problem: Problem, step: Matrix, at: Evaluation, theta: Matrix) -> float:
+    """The largest step of a shared parameter in its standard errors; steps below rounding count as none."""
+    sigma2 = at.squares / max(problem.samples, 1)
+    shared = np.flatnonzero(problem.model.free_shared)
+    steps = np.abs(step[shared])
+    in_std = steps * np.sqrt(np.diag(at.information)[shared] / max(sigma2, 1e-300))
+    return float(np.max(in_std[steps >= 1e-10 * np.abs(theta[shared])], initial=0.0))
+
+
+def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterations: int, converged: bool) -> BatchFit:
+    free = np.flatnonzero(problem.free)
+    information = at.information[np.ix_(free, free)]
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    normal = information / np.outer(scale, scale)
+    inverse = np.linalg.pinv(normal, rcond=1e-14) / np.outer(scale, scale)
+    sigma2 = at.squares / max(problem.samples - free.size, 1)
+    white = sigma2 * inverse
+    scores = np.vstack(at.block_scores)[:, free]
+    sandwich = inverse @ (scores.T @ scores) @ inverse
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        ratio = np.sqrt(np.maximum(np.nan_to_num(np.diag(sandwich) / np.diag(white), nan=1.0), 1.0))
+    # With few blocks the sandwich itself scatters: only what a white residual would not show counts.
+    blocks = max(int(np.sum(np.any(scores != 0.0, axis=1))), 1)
+    doubt = 1.0 + 2.0 / math.sqrt(2.0 * blocks)
+    widen = np.where(ratio > doubt, ratio, 1.0)
+    covariance = np.zeros((problem.total, problem.total))
+    with np.errstate(over="ignore", invalid="ignore"):
+        covariance[np.ix_(free, free)] = white * np.outer(widen, widen)
+    shared = problem.model.size
+    fit = BatchFit(
+        model=problem.model,
+        theta=theta,
+        covariance=covariance[:shared, :shared],
+        sum_of_squares=at.squares,
+        samples=problem.samples,
+        free_parameters=int(free.size),
+        residuals=tuple(at.residuals),
+        stator_flux_wb=tuple(at.flux),
+        own=own,
+        iterations=iterations,
+        has_converged=converged,
+        condition=float(np.linalg.cond(normal)),
+        sample_period_s=problem.period_s,
+        sandwich_ratio=float(np.max(ratio[:CIRCUIT])),
+    )
+    fit.covariance[0, 0] += fit.leg_doubt_ohm**2
+    return fit

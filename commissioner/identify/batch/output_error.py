@@ -1,0 +1,333 @@
+"""Compiled output-error simulation of one segment with its exact sensitivities, for the batch fit.
+
+Gamma circuit at standstill, everything nonlinear in it taken as extra voltage on the stator flux:
+
+    d psi_s/dt = u - R_s i_lin - F(i) - R_s g(psi_s)
+    d psi_R/dt = R_r (psi_s - psi_R) / L_l
+    i_lin = psi_s / L_0 + (psi_s - psi_R) / L_l,    i = i_lin + g(psi_s)
+
+g(psi) is the magnetizing current beyond psi / L_0, F(i) the inverter's voltage error along the axis, both linear in
+their coefficients. Linear part exact for held u. Of F counts its mean over the step, the current taken as straight from
+end to end and solved for implicitly (A-stable: currents caught at zero do not chatter); where a current passes zero, and
+F with it from one end to the other, the step is a part of the period. One value of F per period at 5 kHz moved L_sigma by
+0.1 %. Sensitivities differentiate this very scheme. Order of the parameters: R_s, R_r, L_l, L_0, delay, g_1..g_m,
+F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Exponents = NDArray[np.int64]
+
+CIRCUIT = 4
+DELAY = 4
+SHARED = 5
+OWN = 3
+PARTS = 4
+"""Steps of a period in which the current passes zero."""
+_SOLVED = 1e-12
+_MOST_STEPS = 40
+_ROWS = 256
+"""Weighted sensitivities gathered before they are multiplied."""
+
+
+@njit(cache=True)
+def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
+    """(cell, fraction inside it, rows beyond the table) of the size of a current."""
+    at = abs(i) * per_a
+    if at >= rows - 1:
+        return rows - 2, 1.0, at - (rows - 1)
+    cell = int(at)
+    return cell, at - cell, 0.0
+
+
+@njit(cache=True, inline="always")
+def _mean_loss(
+    table: Array,
+    integral: Array,
+    per_a: float,
+    i0: float,
+    i1: float,
+    at0: tuple[int, float, float],
+    at1: tuple[int, float, float],
+) -> tuple[float, float, float]:
+    """(mean of F over the currents i0 ... i1, its derivatives by i0 and by i1), `at0` and `at1` where they lie in the table.
+
+    F is odd and constant beyond the table. Within a cell it is straight; further apart areas are counted from the cells' edges,
+    since a difference of integrals from zero would lose the digits that the implicit step is solved for.
+    """
+    (cell0, in0, out0), (cell1, in1, out1) = at0, at1
+    rise0, rise1 = table[cell0 + 1] - table[cell0], table[cell1 + 1] - table[cell1]
+    f0, f1 = table[cell0] + in0 * rise0, table[cell1] + in1 * rise1
+    sign0, sign1 = (1.0 if i0 >= 0.0 else -1.0), (1.0 if i1 >= 0.0 else -1.0)
+    if sign0 != sign1:
+        area = integral[cell1] + 0.5 * in1 * (table[cell1] + f1) + out1 * f1
+        area -= integral[cell0] + 0.5 * in0 * (table[cell0] + f0) + out0 * f0
+    elif cell0 == cell1 and (out0 > 0.0) == (out1 > 0.0):
+        slope = 0.0 if out0 > 0.0 else 0.5 * rise0 * per_a
+        return 0.5 * sign0 * (f0 + f1), slope, slope
+    elif cell1 + in1 + out1 > cell0 + in0 + out0:
+        area = 0.5 * (1.0 - in0) * (f0 + table[cell0 + 1]) + integral[cell1] - integral[cell0 + 1]
+        area += 0.5 * in1 * (table[cell1] + f1) + (out1 - out0) * f1
+    else:
+        area = 0.5 * (1.0 - in1) * (f1 + table[cell1 + 1]) + integral[cell0] - integral[cell1 + 1]
+        area = -area - 0.5 * in0 * (table[cell0] + f0) - (out0 - out1) * f0
+    apart = i1 - i0
+    mean = area / (apart * per_a)
+    return mean, (mean - sign0 * f0) / apart, (sign1 * f1 - mean) / apart
+
+
+@njit(cache=True)
+def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
+    """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
+    relative = flux / flux_scale
+    even, reached, g, slope = 1.0, 1, 0.0, 0.0
+    for m in range(exponents.size):
+        while reached < exponents[m]:
+            even *= relative * relative
+            reached += 2
+        power[m] = even * relative
+        g += theta[SHARED + m] * power[m]
+        slope += theta[SHARED + m] * reached * even / flux_scale
+    return g, slope
+
+
+@njit(cache=True, inline="always")
+def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
+    """Share of this part of the period in which the voltage before still acts, and its derivative by `delay` (in periods)."""
+    late, d_late = delay * parts - part, float(parts)
+    if 0.0 <= delay <= 1.0 and parts > 1:
+        if late < 0.0 or late > 1.0:
+            late, d_late = (0.0 if late < 0.0 else 1.0), 0.0
+    elif parts > 1:
+        late, d_late = delay, 1.0
+    return late, d_late
+
+
+@njit(cache=True, inline="always")
+def _current_at_end(
+    theta: Array,
+    exponents: Exponents,
+    flux_scale: float,
+    table: Array,
+    integral: Array,
+    per_a: float,
+    free: float,
+    c1: float,
+    beta: float,
+    b1: float,
+    i0: float,
+    guess: float,
+    within: float,
+    power: Array,
+) -> tuple[float, float, float, float, float, float]:
+    """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
+
+    inside what is known to hold the root.
+    """
+    at0 = _locate(table.size, per_a, i0)
+    i, low, high = guess, -np.inf, np.inf
+    mean, by_i0, by_i1, g, slope_g = 0.0, 0.0, 0.0, 0.0, 0.0
+    for _ in range(_MOST_STEPS):
+        mean, by_i0, by_i1 = _mean_loss(table, integral, per_a, i0, i, at0, _locate(table.size, per_a, i))
+        g, slope_g = _extra(theta, exponents, flux_scale, c1 - b1 * mean, power)
+        missed = i - free + beta * mean - g
+        if abs(missed) <= within:
+            break
+        if missed > 0.0:
+            high = i
+        else:
+            low = i
+        i -= missed / (1.0 + (beta + slope_g * b1) * by_i1)
+        if not low < i < high:
+            i = 0.5 * (low + high)
+    return i, mean, by_i0, by_i1, g, slope_g
+
+
+@njit(cache=True, inline="always")
+def _push_of_loss(
+    basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array
+) -> None:
+    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on."""
+    at0, at = _locate(basis.shape[0], per_a, i0), _locate(basis.shape[0], per_a, i)
+    for c in range(basis.shape[1]):
+        push[first + c] = -_mean_loss(basis[:, c], basis_integral[:, c], per_a, i0, i, at0, at)[0]
+
+
+@njit(cache=True, inline="always")
+def _add_rows(rows: Array, missed: Array, information: Array, score: Array, block_score: Array) -> None:
+    """Weighted sensitivities (rows, p) and residuals (rows,) into the normal equations."""
+    information += np.dot(rows.T, rows)
+    added = np.dot(missed, rows)
+    score += added
+    block_score += added
+
+
+@njit(cache=True, inline="always")
+def _add_directly(
+    x1: float, x2: float, l_l: float, l_0: float, power: Array, first_g: int, to_i: Array, to_g: Array
+) -> None:
+    """Derivatives of the current, and of the iron's extra one, by the parameters at constant fluxes."""
+    to_i[2], to_i[3] = (x2 - x1) / (l_l * l_l), -x1 / (l_0 * l_0)
+    for m in range(power.size - 1):
+        to_g[first_g + m] = to_i[first_g + m] = power[m]
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def simulate(
+    u: Array,
+    y: Array,
+    weight: Array,
+    passes_zero: NDArray[np.bool_],
+    u_before: float,
+    ad: Array,
+    b1: Array,
+    b2: Array,
+    dad: Array,
+    db1: Array,
+    db2: Array,
+    theta: Array,
+    exponents: Exponents,
+    flux_scale: float,
+    basis: Array,
+    basis_integral: Array,
+    current_span: float,
+    own: Array,
+    delay: float,
+    wanted: Array,
+    information: Array,
+    score: Array,
+    block: int,
+    block_scores: Array,
+    residual: Array,
+    flux: Array,
+) -> float:
+    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J and J^T W e added to `information`,
+    `score`.
+
+    First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
+    `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
+    `basis` (rows, k) tabulates the coefficients' F over current 0 ... current_span, `basis_integral` its integral in rows. `passes_zero` (n,): the period
+    from this sample on is done in parts. `wanted` (p,) is 1 where a sensitivity is to be carried. `block_scores`
+    (blocks, p) collects J^T W e by stretches of `block` samples. `weight` is 0 for samples that were lost. Returns sum
+    W e^2, infinite where the model runs away.
+    """
+    p = wanted.size
+    k_f, extra_powers = basis.shape[1], exponents.size
+    first_g, first_f = SHARED, SHARED + extra_powers
+    first_own = first_f + k_f
+    per_a = (basis.shape[0] - 1) / current_span
+    r_s, l_l, l_0 = theta[0], theta[2], theta[3]
+    h_s, h_r = 1.0 / l_0 + 1.0 / l_l, -1.0 / l_l
+    table, integral = np.zeros(basis.shape[0]), np.zeros(basis.shape[0])
+    for c in range(k_f):
+        table += theta[first_f + c] * basis[:, c]
+        integral += theta[first_f + c] * basis_integral[:, c]
+    furthest = np.max(np.abs(table))
+
+    x1, x2 = own[1], own[2]
+    s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
+    dg, dg_last = np.zeros(p), np.zeros(p)
+    pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
+    power = np.zeros(extra_powers + 1)
+    s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
+    g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
+    g_last = g
+    i = h_s * x1 + h_r * x2 + g
+    _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
+    for j in range(p):
+        si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j] + to_i[j]
+        dg[j] = slope_g * s1[j] + to_g[j]
+    dg_last[:] = dg
+    rows, missed, gathered = np.zeros((_ROWS, p)), np.zeros(_ROWS), 0
+    total, v_last, last_parts = 0.0, u_before, 1
+    mean, by_i0, by_i1 = 0.0, 0.0, 0.0
+    for k in range(u.size):
+        e = y[k] - i - own[0]
+        residual[k], flux[k] = e, x1
+        w = weight[k]
+        if w > 0.0:
+            total += w * e * e
+            root = np.sqrt(w)
+            for j in range(p):
+                rows[gathered, j] = root * si[j]
+            rows[gathered, first_own] = root * wanted[first_own]
+            missed[gathered] = root * e
+            gathered += 1
+        if gathered == _ROWS or (k + 1) % block == 0 or k == u.size - 1:
+            _add_rows(rows[:gathered], missed[:gathered], information, score, block_scores[k // block])
+            gathered = 0
+        if k == u.size - 1:
+            break
+        jump = u[k] - v_last
+        v_last = u[k]
+        parts, h = (PARTS, 1) if passes_zero[k] else (1, 0)
+        beta = h_s * b1[h, 0] + h_r * b1[h, 1]
+        a11, a12, a21, a22, b11, b12 = ad[h, 0, 0], ad[h, 0, 1], ad[h, 1, 0], ad[h, 1, 1], b1[h, 0], b1[h, 1]
+        for part in range(parts):
+            # A late step inside: its mean, and its first moment as a centred ramp of that moment.
+            late, d_late = _late_share(delay, part, parts)
+            tilt, steep = 6.0 * late * (1.0 - late) * jump, 6.0 * (1.0 - 2.0 * late) * jump
+            ahead = 0.5 * last_parts / parts
+            last_parts = parts
+            extra = g + ahead * (g - g_last)
+            held = u[k] - late * jump - 0.5 * tilt - r_s * extra
+            c1 = a11 * x1 + a12 * x2 + b11 * held + b2[h, 0] * tilt
+            c2 = a21 * x1 + a22 * x2 + b12 * held + b2[h, 1] * tilt
+            g_last = g
+
+            # The current at the end, sought from where the loss of the step before would leave it.
+            i0 = i
+            if k_f > 0:
+                free, within = h_s * c1 + h_r * c2, _SOLVED * (current_span + beta * furthest)
+                i, mean, by_i0, by_i1, g, slope_g = _current_at_end(
+                    theta,
+                    exponents,
+                    flux_scale,
+                    table,
+                    integral,
+                    per_a,
+                    free,
+                    c1,
+                    beta,
+                    b11,
+                    i0,
+                    free - beta * mean + g,
+                    within,
+                    power,
+                )
+            if not np.isfinite(i):
+                return np.inf
+            old1, old2 = x1, x2
+            x1, x2 = c1 - b11 * mean, c2 - b12 * mean
+            if k_f == 0:
+                g, slope_g = _extra(theta, exponents, flux_scale, x1, power)
+                i = h_s * x1 + h_r * x2 + g
+            held -= mean
+
+            # What the parameters add themselves, then every sensitivity; of its own loss the new current's part.
+            pushed[0], pushed[DELAY] = -extra, -(jump + 0.5 * steep) * d_late
+            if k_f > 0:
+                _push_of_loss(basis, basis_integral, per_a, i0, i, first_f, pushed)
+            for j in range(CIRCUIT):
+                to_s1[j] = dad[h, j, 0, 0] * old1 + dad[h, j, 0, 1] * old2 + db1[h, j, 0] * held + db2[h, j, 0] * tilt
+                to_s2[j] = dad[h, j, 1, 0] * old1 + dad[h, j, 1, 1] * old2 + db1[h, j, 1] * held + db2[h, j, 1] * tilt
+            to_s1[DELAY], to_s2[DELAY] = b2[h, 0] * steep * d_late, b2[h, 1] * steep * d_late
+            _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
+            scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
+            h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
+            for j in range(p):
+                push = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+                dg_last[j] = dg[j]
+                d1 = a11 * s1[j] + a12 * s2[j] + b11 * push + to_s1[j]
+                d2 = a21 * s1[j] + a22 * s2[j] + b12 * push + to_s2[j]
+                moved = (h_g * d1 + h_r * d2 + to_i[j]) * scale * wanted[j]
+                si[j] = moved
+                s1[j] = d1 - back1 * moved
+                s2[j] = d2 - back2 * moved
+                dg[j] = slope_g * s1[j] + to_g[j]
+    return total

@@ -1,0 +1,1 @@
+"""From fits to one motor: each axis, all axes, the inverter's law fitted to the samples."""

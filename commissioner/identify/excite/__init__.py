@@ -1,0 +1,1 @@
+"""What to drive, and how much of it: tones, amplitude, flux guard, closing bias."""

@@ -1,0 +1,59 @@
+"""What a longer test would buy: noise falls with the square root of the time, everything else stays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.identify.excite.tones import DesignedExcitation
+from commissioner.motor.circuit import InverseGamma
+
+SYMBOLS = ("R_s", "R_R", "L_σ", "L_M")
+TIMES = 2.0
+
+
+@dataclass(frozen=True)
+class LongerTest:
+    """Relative standard errors of (R_s, R_R, L_sigma, L_M) now and after tests of `seconds` each."""
+
+    seconds: float
+    now: tuple[float, ...]
+    then: tuple[float, ...]
+
+    @property
+    def sentence(self) -> str:
+        """For the technician; says so where time would not help."""
+        gains = [
+            f"{name} {100 * a:.2g} to {100 * b:.2g} %"
+            for name, a, b in zip(SYMBOLS, self.now, self.then, strict=True)
+            if b < 0.95 * a
+        ]
+        if not gains:
+            return (
+                f"a longer test would buy nothing: {self.seconds:.3g} s of tones on each axis instead of "
+                f"{self.seconds / TIMES:.3g} s leave the same standard errors"
+            )
+        return f"{self.seconds:.3g} s of tones on each axis would bring the standard errors from " + ", ".join(gains)
+
+
+def longer_test(
+    parameters: InverseGamma,
+    std: Sequence[float],
+    tests: Sequence[DesignedExcitation],
+    noise_a: Sequence[float],
+) -> LongerTest:
+    """Tests of `TIMES` the length: s^2 -> s^2 - n^2 + n^2 / TIMES.
+
+    s: standard errors now; n: what sensor noise `noise_a` (rms, one per test) leaves over all `tests` together by the
+    design's Fisher information. The rest of s (inverter, iron, axes) does not shrink with time.
+    """
+    information = sum(
+        np.square(np.array(test.noise_a) / (seen_a * np.array(test.relative_std)))
+        for test, seen_a in zip(tests, noise_a, strict=True)
+    )
+    now = np.array(std) / np.array(parameters.as_tuple())
+    noise = np.minimum(1.0 / np.sqrt(information), now)
+    then = np.sqrt(np.square(now) - np.square(noise) * (1.0 - 1.0 / TIMES))
+    return LongerTest(TIMES * tests[-1].seconds, tuple(map(float, now)), tuple(map(float, then)))

@@ -1,0 +1,1 @@
+"""May this recording carry an answer? Rows, currents, stretches, plate."""

@@ -1,0 +1,133 @@
+"""Can these currents be a motor's at rest, excited along the named axis? Direction, power, converter's range, sum."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from commissioner.identify.intake.stretches import Stretch, refused
+from commissioner.records import Signal, StandstillRecording
+
+LARGEST_CROSS_CURRENT, NOTED_CROSS_CURRENT = 0.12, 0.04
+"""Of the current, what may flow across the axis in step with it, and from where on the result says so: 7 and 2 degrees.
+Sensors a few per cent apart and an anisotropic machine make 0.03."""
+LARGEST_SUM = 0.06
+"""Of the current, what the three phases may add up to in step with one of them: sensors differ by a few per cent."""
+LARGEST_ROTATION = 0.7
+LEAST_POWER_FACTOR = 0.01
+
+
+def require_current(stretch: Stretch) -> None:
+    rms = float(np.std(stretch.current_a)) + abs(float(np.mean(stretch.current_a)))
+    if rms <= 0.0:
+        raise refused(
+            f"segment {stretch.segment} carries no current",
+            "0 A",
+            "a current along the axis",
+            "check the current channels and that the drive was enabled",
+        )
+
+
+def require_on_axis(stretch: Stretch) -> None:
+    """Current must flow where the voltage points: compare what follows the voltage along and across the axis."""
+    along = float(np.sqrt(np.mean(stretch.current_a**2)))
+    across = float(np.sqrt(np.mean((stretch.cross_a - np.mean(stretch.cross_a)) ** 2)))
+    matched = abs(float(np.mean(stretch.cross_a * stretch.current_a))) / max(along, 1e-12)
+    if stretch.kind != "staircase" and across > LARGEST_ROTATION * along and matched < LARGEST_CROSS_CURRENT * along:
+        raise refused(
+            f"segment {stretch.segment}: the current rotates",
+            f"{across:.3g} A rms across the axis, {along:.3g} A along it, unrelated",
+            f"at most {LARGEST_ROTATION:.0%} of the current across the axis",
+            "record with the motor at rest and one axis excited; a running motor is for `commissioner monitor`",
+        )
+    if (stretch.kind != "staircase" and matched > LARGEST_CROSS_CURRENT * along) or across > 2.0 * along:
+        raise refused(
+            f"segment {stretch.segment}: the current does not flow along the named axis",
+            f"axis_deg {stretch.axis_deg:g}, current along {direction_deg(stretch):.1f} deg (modulo 180)",
+            f"at most {LARGEST_CROSS_CURRENT:.0%} of the current across the axis",
+            "correct axis_deg, or the order of the phases",
+        )
+
+
+def direction_deg(stretch: Stretch) -> float:
+    """Where the current flows, modulo 180 degrees."""
+    moment = np.mean((stretch.current_a + 1j * stretch.cross_a) ** 2)
+    return (stretch.axis_deg + math.degrees(0.5 * float(np.angle(moment)))) % 180.0
+
+
+def besides_the_axis(stretch: Stretch) -> str | None:
+    """What to say of a current that flows a little beside the named axis; None where it does not."""
+    deviation = (direction_deg(stretch) - stretch.axis_deg + 90.0) % 180.0 - 90.0
+    if stretch.kind == "staircase" or abs(math.tan(math.radians(deviation))) < NOTED_CROSS_CURRENT:
+        return None
+    share = 1.0 - math.cos(math.radians(deviation))
+    return (
+        f"segment {stretch.segment}: the current flows {deviation:+.1f} deg beside axis_deg {stretch.axis_deg:g}; if that "
+        f"is the axis' error, all values are {share:.1%} too large"
+    )
+
+
+def require_power(stretch: Stretch) -> None:
+    """A machine at standstill only takes power in."""
+    rms = float(np.sqrt(np.mean(stretch.voltage_v**2) * np.mean(stretch.current_a**2)))
+    power = float(np.mean(stretch.voltage_v * stretch.current_a))
+    if power < LEAST_POWER_FACTOR * rms:
+        raise refused(
+            f"segment {stretch.segment}: the current does not follow the voltage",
+            f"power factor {power / rms:.2f}",
+            f"above {LEAST_POWER_FACTOR}",
+            "check the sign of the current sensors, the order of the phases, axis_deg and the alignment in time",
+        )
+
+
+def require_unclipped(recording: StandstillRecording) -> None:
+    moving = np.zeros(recording.time_s.size, dtype=bool)
+    moving[1:] = np.abs(np.diff(recording.voltage_axis_v)) > 0.0
+    for name in ("current_u_a", "current_v_a", "current_w_a"):
+        values = getattr(recording, name)
+        if values is None:
+            continue
+        for sign in (1.0, -1.0):
+            piled = _piled_up(sign * values[moving])
+            if piled is not None:
+                raise refused(
+                    f"{name} is clipped",
+                    f"{piled} samples at {sign * float(np.max(sign * values)):.4g} A",
+                    "samples inside the sensor's range",
+                    "lower the amplitude or widen the sensor's range, and record again",
+                )
+
+
+def require_balanced(recording: StandstillRecording) -> None:
+    """A star point carries no current: where the three phases do not cancel, one channel is limited or wrongly scaled."""
+    if recording.current_w_a is None:
+        return
+    phases = [i - np.mean(i) for i in (recording.current_u_a, recording.current_v_a, recording.current_w_a)]
+    total = phases[0] + phases[1] + phases[2]
+    largest = max(float(np.mean(i * i)) for i in phases)
+    noise = [float(np.var(np.diff(i, 2))) / 6.0 for i in phases]
+    shares = [
+        max(abs(float(np.mean(total * i))) - n, 0.0) / max(largest, 1e-300) for i, n in zip(phases, noise, strict=True)
+    ]
+    if max(shares) > LARGEST_SUM:
+        raise refused(
+            "the phase currents do not add up to zero",
+            f"{max(shares):.0%} of the current is left, in step with phase {'uvw'[int(np.argmax(shares))]}",
+            f"at most {LARGEST_SUM:.0%}",
+            "look for a clipped or wrongly scaled current channel; two sound phases are enough, leave the third out",
+        )
+
+
+def _piled_up(values: Signal) -> int | None:
+    """How many samples sit at the largest value, if more than its neighbourhood makes plausible."""
+    if values.size < 100:
+        return None
+    top = float(np.max(values))
+    if top <= 0.0:
+        return None
+    levels = np.unique(values)
+    quantum = float(np.min(np.diff(levels))) if levels.size > 1 else top
+    at_top = int(np.sum(values >= top - 0.01 * quantum - 1e-9 * top))
+    near = int(np.sum(values >= top - max(0.05 * top, 10.0 * quantum)))
+    return at_top if at_top >= 8 and at_top > 0.45 * near and near < values.size // 2 else None

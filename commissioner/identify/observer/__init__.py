@@ -1,0 +1,1 @@
+"""The parallel adaptive observer and what runs beside it, sample by sample."""

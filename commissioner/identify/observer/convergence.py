@@ -1,0 +1,52 @@
+"""Has the online estimate settled? A verdict with its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from commissioner.identify.observer.observer import BlockEstimate
+
+NAMES = ("stator resistance", "rotor resistance", "leakage inductance", "magnetizing inductance")
+
+
+@dataclass(frozen=True)
+class Settling:
+    """`drift` is each parameter's relative change over the window, `relative_std` its standard error, both `(4,)`."""
+
+    has_settled: bool
+    drift: tuple[float, float, float, float]
+    relative_std: tuple[float, float, float, float]
+    reason: str
+
+
+def settled(
+    history: Sequence[tuple[float, BlockEstimate]], window_s: float, allowed_std: tuple[float, float, float, float]
+) -> Settling:
+    """Judge (time, estimate) pairs: every relative standard error within `allowed_std`, and no parameter has moved in
+    the last `window_s` by more than three of its standard errors or a third of what is allowed."""
+    nothing = (float("inf"),) * 4
+    if not history:
+        return Settling(False, nothing, nothing, "no estimate yet")
+    now, last = history[-1]
+    since = next((e for t, e in reversed(history) if now - t >= window_s), None)
+    values = last.parameters.as_tuple()
+    std = tuple(s / v for s, v in zip(last.std, values, strict=True))
+    if since is None:
+        return Settling(False, nothing, _four(std), f"less than {window_s:g} s of estimates")
+    drift = tuple(abs(a / b - 1.0) for a, b in zip(since.parameters.as_tuple(), values, strict=True))
+    for name, moved, s, allowed in zip(NAMES, drift, std, allowed_std, strict=True):
+        if s > allowed:
+            return Settling(False, _four(drift), _four(std), f"{name}: standard error {s:.2%}, allowed {allowed:.2%}")
+        if moved > max(3.0 * s, allowed / 3.0):
+            return Settling(
+                False, _four(drift), _four(std), f"{name}: moved {moved:.2%} in {window_s:g} s, error {s:.2%}"
+            )
+    return Settling(
+        True, _four(drift), _four(std), "all four parameters within their allowed standard errors and at rest"
+    )
+
+
+def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
+    a, b, c, d = values
+    return a, b, c, d

@@ -1,0 +1,1 @@
+"""A drive behind a port: items, readiness, write-back, de-energising."""

@@ -1,0 +1,84 @@
+"""Items of the drive file read and written by name, over as few requests as their registers allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from commissioner.errors import DriveFault
+from commissioner.link.wire.port import Port, Words
+from commissioner.registers.codec import Value, decode_span, encode_item, encode_span
+from commissioner.registers.profile import DriveProfile, Span, plan_spans
+
+
+class Items:
+    """The drive's items over a port. A value that was written is believed when it has been read back."""
+
+    def __init__(self, port: Port, profile: DriveProfile) -> None:
+        self.port = port
+        self.profile = profile
+
+    def read(self, names: Iterable[str]) -> dict[str, Value]:
+        """The named items' values; items the drive file does not describe are left out."""
+        known = [self.profile.items[name] for name in names if name in self.profile.items]
+        values: dict[str, Value] = {}
+        for span in plan_spans(known, self.profile.link.max_read_registers):
+            values |= decode_span(span, self.port.read(span.address, span.count))
+        return values
+
+    def read_number(self, name: str) -> float:
+        """One numeric item. Raises UsageError where the file does not describe it."""
+        return number(self.read([self.profile.item(name).name])[name])
+
+    def write(self, values: Mapping[str, Value]) -> None:
+        """Write without looking: for commands, whose effect is seen in the status."""
+        for span in self._spans(values):
+            self.port.write(span.address, encode_span(span, values))
+
+    def write_verified(self, values: Mapping[str, Value], step: str) -> None:
+        """Write and read back. DriveFault: the drive acknowledged and holds something else."""
+        spans = self._spans(values)
+        for span in spans:
+            self.port.write(span.address, encode_span(span, values))
+        for span in spans:
+            self._compare(span, self.port.read(span.address, span.count), values, step)
+
+    def exchange_verified(self, values: Mapping[str, Value], step: str) -> None:
+        """As `write_verified`, each span in one transaction: for values that are steered live."""
+        for span in self._spans(values):
+            words = encode_span(span, values)
+            seen = self.port.exchange(span.address, words, span.address, span.count)
+            self._compare(span, seen, values, step)
+
+    def same_words(self, name: str, first: Value, second: Value) -> bool:
+        """True where both values are the same in the drive's own resolution."""
+        item = self.profile.item(name)
+        return encode_item(item, first) == encode_item(item, second)
+
+    def _spans(self, values: Mapping[str, Value]) -> tuple[Span, ...]:
+        items = [self.profile.item(name) for name in values]
+        return plan_spans(items, self.profile.link.max_write_registers)
+
+    def _compare(self, span: Span, seen: Words, values: Mapping[str, Value], step: str) -> None:
+        wanted = encode_span(span, values)
+        if seen == wanted:
+            return
+        read = decode_span(span, seen)
+        name = next(i.name for i in span.items if not _same(i.address - span.address, i.words, seen, wanted))
+        raise DriveFault(
+            f"the drive acknowledged {name} = {values[name]} and holds {read[name]}",
+            step=step,
+            value=read[name],
+            limit=values[name],
+            remedy="check that the drive file fits the firmware and that no other master writes",
+        )
+
+
+def number(value: Value) -> float:
+    """The value as a number; a text or an array where a number was meant is a mistake of the drive file."""
+    if isinstance(value, int | float):
+        return value
+    raise TypeError(f"a number was expected, not {value!r}")
+
+
+def _same(start: int, count: int, seen: Words, wanted: Words) -> bool:
+    return seen[start : start + count] == wanted[start : start + count]

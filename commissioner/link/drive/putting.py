@@ -1,0 +1,120 @@
+"""The two ways in which drives take motor parameters: staged and committed at once, or register by register."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from commissioner.errors import DriveFault
+from commissioner.link.drive.facts import Action, Intent, Journal
+from commissioner.link.drive.parameter_sets import ParameterSets, Values
+from commissioner.registers.codec import Value
+from commissioner.registers.convention import staged_words_crc
+
+BUSY, DONE = 1, 2
+RESULT_DEADLINE_S = 5.0
+POLL_S = 0.01
+COMMIT_RESULTS = {
+    0: "nothing happened",
+    1: "still busy",
+    3: "check sum wrong",
+    4: "value out of the drive's range",
+    5: "not stopped",
+}
+STORE_RESULTS = {0: "nothing happened", 1: "still busy", 3: "the memory failed", 5: "not stopped"}
+
+
+class Staged:
+    """Values are staged, looked at, and taken into use by one commit with a check sum; stored by another command."""
+
+    def __init__(
+        self, sets: ParameterSets, journal: Journal, sleep: Callable[[float], None], clock: Callable[[], float]
+    ) -> None:
+        self._sets, self._items, self._commands = sets, sets.items, sets.profile.commands
+        self._journal, self._sleep, self._clock = journal, sleep, clock
+        self._has_asked_to_commit = False
+
+    def put_in_use(self, target: Values, *, store: bool) -> None:
+        self._stage(target)
+        values: dict[str, Value] = {"commit": self._commands["commit"]}
+        self._journal(Intent(Action.COMMIT, values))
+        self._has_asked_to_commit = True
+        self._items.write(values)
+        self._await_result("commit_result", COMMIT_RESULTS, "commit")
+
+    def put_in_memory(self, target: Values) -> None:
+        values: dict[str, Value] = {"store": self._commands["store"]}
+        self._journal(Intent(Action.STORE, values))
+        self._items.write(values)
+        self._await_result("store_result", STORE_RESULTS, "store")
+        self._sets.verify(target, self._sets.stored(), "read back the stored values")
+
+    def take_back(self, values: Values) -> None:
+        """A commit that is still under way can after this only bring `values` into use."""
+        if self._has_asked_to_commit:
+            self._stage(values)
+
+    def let_jobs_end(self) -> None:
+        """A commit or store whose answer was lost may still be at work: what is read before it ends is not the end."""
+        end = self._clock() + RESULT_DEADLINE_S
+        jobs = ("commit_result", "store_result")
+        while BUSY in self._items.read(jobs).values() and self._clock() < end:
+            self._sleep(POLL_S)
+
+    def _stage(self, target: Values) -> None:
+        """Staged registers that differ, then the check sum over all of them; read back together."""
+        staged: dict[str, Value] = {f"staged_{name}": target[name] for name in self._sets.group.order}
+        crc_name = self._sets.group.staged_crc
+        assert crc_name is not None
+        held = self._items.read(staged)
+        differing = {name: v for name, v in staged.items() if not self._items.same_words(name, held[name], v)}
+        crc: dict[str, Value] = {crc_name: staged_words_crc(target, self._sets.profile)}
+        self._journal(Intent(Action.STAGE, differing | crc))
+        self._items.write(differing)
+        self._items.write(crc)
+        seen = self._items.read([*staged, crc_name])
+        self._sets.verify(staged | crc, seen, "read back the staged values")
+
+    def _await_result(self, item: str, meanings: Mapping[int, str], step: str) -> None:
+        end = self._clock() + RESULT_DEADLINE_S
+        result = int(self._items.read_number(item))
+        while result == BUSY and self._clock() < end:
+            self._sleep(POLL_S)
+            result = int(self._items.read_number(item))
+        if result != DONE:
+            raise DriveFault(
+                f"the drive did not {step}: {meanings.get(result, 'unknown result')}",
+                step=step,
+                value=result,
+                limit=DONE,
+                remedy="check the values against the drive's ranges and that it is stopped",
+            )
+
+
+class Direct:
+    """Each value takes effect as it is written; what stores it stands in the drive file."""
+
+    def __init__(self, sets: ParameterSets, journal: Journal) -> None:
+        self._sets, self._items, self._journal = sets, sets.items, journal
+
+    def put_in_use(self, target: Values, *, store: bool) -> None:
+        differing: dict[str, Value] = dict(self._sets.differing(target, self._sets.in_use()))
+        self._journal(Intent(Action.COMMIT, differing))
+        if self._sets.store.coil is not None:
+            self._items.port.write_coil(self._sets.store.coil, store)
+        for name in self._sets.group.order:
+            if name in differing:
+                self._items.write({name: differing[name]})
+
+    def put_in_memory(self, target: Values) -> None:
+        writes = self._sets.store.writes
+        if not writes:
+            return
+        self._journal(Intent(Action.STORE, {f"register {address}": value for address, value in writes}))
+        for address, value in writes:
+            self._items.port.write(address, [value])
+
+    def take_back(self, values: Values) -> None:
+        """Nothing is under way."""
+
+    def let_jobs_end(self) -> None:
+        """There are none."""

@@ -1,0 +1,182 @@
+"""Motor parameters into the drive: put in use, look, store, look; the snapshot back where anything differs.
+
+At every instant the set in use of a drive with staging is the old one or the new one. A drive without it takes the values
+one by one; there the report of a failure names what it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from commissioner.errors import CheckFailed, CommissionerError, DriveError, IdentityMismatch, WriteBackFailed
+from commissioner.link.drive.facts import Journal, WriteReport
+from commissioner.link.drive.items import Items
+from commissioner.link.drive.parameter_sets import ParameterSets, Values
+from commissioner.link.drive.putting import Direct, Staged
+from commissioner.link.drive.reading import read_identity, read_status
+from commissioner.records import DriveIdentity, ParameterSnapshot, WrittenParameter
+
+
+class WriteBack:
+    """One write-back or restore on one drive."""
+
+    def __init__(
+        self, items: Items, journal: Journal, *, sleep: Callable[[float], None], clock: Callable[[], float]
+    ) -> None:
+        self._items, self._profile = items, items.profile
+        self._sets = ParameterSets(items)
+        self._sleep = sleep
+        is_staged = items.profile.parameters is not None and items.profile.parameters.is_staged
+        self._way = Staged(self._sets, journal, sleep, clock) if is_staged else Direct(self._sets, journal)
+
+    def snapshot(self) -> ParameterSnapshot:
+        """What the drive holds once its jobs are done. `stored` is empty where the drive cannot show that set."""
+        self._way.let_jobs_end()
+        return ParameterSnapshot(
+            identity=read_identity(self._items),
+            in_use=self._sets.in_use(),
+            stored=self._sets.stored(),
+            store_count=self._sets.store_count(),
+        )
+
+    def write(self, values: Values, snapshot: ParameterSnapshot, *, store: bool) -> WriteReport:
+        """`values` in use, and stored if asked. Nothing is written where the drive is not as in the snapshot."""
+        target = self._sets.complete(values, snapshot.in_use)
+        present = self._check_present(snapshot, snapshot.in_use, snapshot.stored)
+        self._check_stopped()
+        if store:
+            self._check_endurance(present.store_count, writes=1)
+        try:
+            self._bring(target, store=store)
+            return self._report(target, present, is_stored=store and self._sets.can_store)
+        except DriveError as error:
+            raise self._after_failure(error, snapshot) from error
+
+    def restore(self, snapshot: ParameterSnapshot, expected: Values | None) -> WriteReport:
+        """The snapshot's sets in use and stored. WriteBackFailed where the drive does not hold them afterwards."""
+        present = self._check_present(snapshot, expected, None)
+        self._check_stopped()
+        try:
+            is_stored = self._bring_back(snapshot)
+            return self._report(snapshot.in_use, present, is_stored=is_stored)
+        except DriveError as error:
+            raise WriteBackFailed(
+                f"the snapshot could not be restored: {error.what}",
+                step="restore",
+                value=error.value,
+                limit=error.limit,
+                remedy="run restore again; until then the drive's parameters are not known",
+            ) from error
+
+    def _check_present(
+        self, snapshot: ParameterSnapshot, in_use: Values | None, stored: Values | None
+    ) -> ParameterSnapshot:
+        present = self.snapshot()
+        theirs, ours = _key(present.identity), _key(snapshot.identity)
+        if theirs != ours:
+            raise _changed("the drive is not the one of the snapshot", theirs, ours)
+        for wanted, held, which in ((in_use, present.in_use, "in use"), (stored, present.stored, "stored")):
+            for name in wanted or {}:
+                assert wanted is not None
+                if name not in held or not self._items.same_words(name, held[name], wanted[name]):
+                    raise _changed(f"{name} {which} is not the expected one", held.get(name), wanted[name])
+        return present
+
+    def _check_stopped(self) -> None:
+        if "status_word" not in self._profile.items:
+            return
+        status = read_status(self._items)
+        if status.is_energised:
+            raise CheckFailed(
+                "the drive's output is not blocked",
+                step="write parameters",
+                value=status.state,
+                limit="a stopped drive",
+                remedy="stop the motor first",
+            )
+
+    def _check_endurance(self, count: int, writes: int) -> None:
+        store = self._profile.store
+        if store and store.endurance_writes and count + writes > store.endurance_writes:
+            raise CheckFailed(
+                "the drive's parameter memory is worn out",
+                step="store",
+                value=count,
+                limit=f"{store.endurance_writes} writes",
+                remedy="write without storing, or replace the drive's memory",
+            )
+
+    # --- act ----------------------------------------------------------------------------------------------------
+    def _bring(self, target: Values, *, store: bool) -> None:
+        """`target` in use and, if asked, stored; verified; only what differs."""
+        has_changed = bool(self._sets.differing(target, self._sets.in_use()))
+        if has_changed:
+            self._way.put_in_use(target, store=store)
+            self._sleep(self._sets.group.settle_s)
+            self._sets.verify(target, self._sets.in_use(), "read back the values in use")
+        is_unstored = (
+            bool(self._sets.differing(target, self._sets.stored())) if self._sets.group.is_staged else has_changed
+        )
+        if store and is_unstored:
+            self._way.put_in_memory(target)
+
+    def _bring_back(self, snapshot: ParameterSnapshot) -> bool:
+        """Both sets of the snapshot; the stored one first where they differ, for a store takes what is in use. True
+        where what is in use will outlast a power-off, as far as the drive file can tell."""
+        has_to_store = bool(snapshot.stored) and bool(self._sets.differing(snapshot.stored, self._sets.stored()))
+        if has_to_store:
+            self._check_endurance(self._sets.store_count(), writes=1)
+            self._bring(snapshot.stored, store=True)
+        stores_while_writing = not self._sets.group.is_staged and self._sets.can_store
+        self._bring(snapshot.in_use, store=stores_while_writing)
+        return self._sets.group.is_staged or stores_while_writing
+
+    # --- after --------------------------------------------------------------------------------------------------
+    def _after_failure(self, error: DriveError, snapshot: ParameterSnapshot) -> WriteBackFailed:
+        try:
+            self._way.take_back(snapshot.in_use)
+            self._way.let_jobs_end()
+            self._bring_back(snapshot)
+            outcome, was_restored = "the values found before are in the drive again, verified", True
+        except CommissionerError as second:
+            outcome, was_restored = f"the values found before could not be verified: {second.what}", False
+        failed = WriteBackFailed(
+            f"writing back failed: {error.what}; {outcome}",
+            step=error.step,
+            value=error.value,
+            limit=error.limit,
+            remedy=error.remedy if was_restored else "run restore before the drive is used",
+        )
+        failed.was_restored = was_restored
+        return failed
+
+    def _report(self, target: Values, before: ParameterSnapshot, *, is_stored: bool) -> WriteReport:
+        after = self._sets.in_use()
+        rows = tuple(
+            WrittenParameter(name, self._profile.item(name).address, before.in_use[name], target[name], after[name])
+            for name in self._sets.differing(target, before.in_use)
+        )
+        store = self._profile.store
+        return WriteReport(
+            written=rows,
+            is_stored=is_stored,
+            store_count_before=before.store_count,
+            store_count_after=self._sets.store_count(),
+            endurance_writes=store.endurance_writes if store else None,
+        )
+
+
+def _key(identity: DriveIdentity) -> DriveIdentity:
+    """What must not change between snapshot and write: type, serial number, firmware, map."""
+    return replace(identity, rated_drive_current_a=0.0, control_period_s=0.0, switching_frequency_hz=0.0)
+
+
+def _changed(what: str, seen: object, wanted: object) -> IdentityMismatch:
+    return IdentityMismatch(
+        what,
+        step="compare with the snapshot",
+        value=seen,
+        limit=wanted,
+        remedy="someone or something changed the drive meanwhile; take a new snapshot by running again",
+    )

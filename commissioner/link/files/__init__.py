@@ -1,0 +1,1 @@
+"""Drive files: what may stand in them, and what they mean."""

@@ -1,0 +1,164 @@
+"""`config/drives/*.toml` -> DriveProfile. Strict: what is unknown, of a wrong type or missing is named, not guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+import commissioner
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.link.files.schema import (
+    DriveFile,
+    ItemTable,
+    LinkTable,
+    ParametersTable,
+    StoreTable,
+    WatchdogTable,
+    WindowTable,
+    explained,
+)
+from commissioner.registers.convention import CONVENTIONS, QUANTITIES
+from commissioner.registers.profile import (
+    WINDOW_FLAGS,
+    DriveLimits,
+    DriveProfile,
+    Identity,
+    Item,
+    LinkLimits,
+    ParameterGroup,
+    Store,
+    Watchdog,
+    WindowLayout,
+    check_consistency,
+)
+from commissioner.registers.status import STATUS_BITS
+from commissioner.settings import read_toml
+
+DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"
+
+
+def load_profile(name_or_path: str | Path) -> DriveProfile:
+    """The drive named in `config/drives`, or in a file. UsageError: no such drive; ConfigurationError: bad file."""
+    path = _locate(str(name_or_path))
+    return build(read_toml(path), str(path))
+
+
+def build(document: Mapping[str, Any], file: str) -> DriveProfile:
+    """The profile in a parsed document. Raises ConfigurationError naming file, key, value and what would be right."""
+    try:
+        model = DriveFile.model_validate(dict(document))
+    except ValidationError as error:
+        raise explained(error, file) from error
+    return check_consistency(_profile(model, file))
+
+
+def known_drives() -> tuple[str, ...]:
+    """Names that `load_profile` takes."""
+    return tuple(sorted(path.stem for path in DRIVES_FOLDER.glob("*.toml")))
+
+
+def _locate(name_or_path: str) -> Path:
+    if name_or_path.endswith(".toml") or "/" in name_or_path:
+        return Path(name_or_path)
+    if name_or_path in known_drives():
+        return DRIVES_FOLDER / f"{name_or_path}.toml"
+    raise UsageError(
+        f"there is no drive named {name_or_path!r}",
+        step="read configuration",
+        value=name_or_path,
+        limit="one of: " + ", ".join(known_drives()),
+        remedy="give one of these names or the path of a .toml file",
+    )
+
+
+def _profile(model: DriveFile, file: str) -> DriveProfile:
+    return DriveProfile(
+        file=file,
+        name=model.drive.name,
+        kind=model.drive.kind,
+        capabilities=frozenset(model.drive.capabilities),
+        status_decoder=model.drive.status_decoder,
+        link=_link(model.link),
+        identity=Identity(**model.identity.model_dump()),
+        items={name: _item(name, table, model.link, file) for name, table in model.items.items()},
+        watchdog=_watchdog(model.watchdog) if model.watchdog else None,
+        window=_window(model.window, file) if model.window else None,
+        parameters=_parameters(model.parameters) if model.parameters else None,
+        store=_store(model.store) if model.store else None,
+        commands={name: word for name, word in model.commands.model_dump().items() if word is not None},
+        status_bits=_status_bits(model, file),
+        interlock_bits=model.interlock_bits,
+        faults=_by_code(model.faults, "faults", file),
+        exceptions=_by_code(model.exceptions, "exceptions", file),
+        limits=DriveLimits(**model.limits.model_dump()),
+        unknown=model.unknown,
+    )
+
+
+def _link(table: LinkTable) -> LinkLimits:
+    return LinkLimits(**table.model_dump(exclude={"address_base", "word_order"}))
+
+
+def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
+    key = f"items.{name}"
+    if table.address < link.address_base:
+        raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
+    for what, value, known in (("convention", table.convention, CONVENTIONS), ("quantity", table.quantity, QUANTITIES)):
+        if value and value not in known:
+            raise ConfigurationError(
+                file=file, key=f"{key}.{what}", value=value, expected="one of: " + ", ".join(sorted(known))
+            )
+    return Item(
+        name=name,
+        address=table.address - link.address_base,
+        is_volatile=table.volatile,
+        minimum=table.min,
+        maximum=table.max,
+        word_order=table.word_order or link.word_order,
+        **table.model_dump(
+            include={"type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop"}
+        ),
+    )
+
+
+def _watchdog(table: WatchdogTable) -> Watchdog:
+    return Watchdog(register=table.register_name, **table.model_dump(exclude={"register_name"}))
+
+
+def _window(table: WindowTable, file: str) -> WindowLayout:
+    header = tuple((name, kind) for name, kind in (entry.split(":") for entry in table.header))
+    if len(set(header)) != len(header) or header[-1][0] != "crc16":
+        raise ConfigurationError(
+            file=file, key="window.header", value=table.header, expected="each of the seven fields once, crc16 last"
+        )
+    flags = {name: getattr(table, f"flag_{name}") for name in WINDOW_FLAGS}
+    return WindowLayout(table.address, header, table.data_registers, flags)
+
+
+def _parameters(table: ParametersTable) -> ParameterGroup:
+    return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s)
+
+
+def _store(table: StoreTable) -> Store:
+    return Store(table.endurance_writes, tuple((a, v) for a, v in table.writes), table.coil)
+
+
+def _status_bits(model: DriveFile, file: str) -> dict[str, int]:
+    missing = [name for name in STATUS_BITS if name not in model.status_bits]
+    if model.drive.status_decoder == "bits" and missing:
+        raise ConfigurationError(
+            file=file, key=f"status_bits.{missing[0]}", value=None, expected="the bit's number in status_word, 0 ... 15"
+        )
+    return model.status_bits
+
+
+def _by_code(table: Mapping[str, str], section: str, file: str) -> dict[int, str]:
+    try:
+        return {int(code, 0): text for code, text in table.items()}
+    except ValueError as error:
+        raise ConfigurationError(
+            file=file, key=section, value=", ".join(table), expected="codes as whole numbers: 5 or 0x05"
+        ) from error

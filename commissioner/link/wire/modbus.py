@@ -1,0 +1,339 @@
+"""The port over pymodbus 3.15: every reply checked, every exception mapped, no write repeated.
+
+A request on a closed connection opens it, once, within `connect_timeout_s`: there is no back-off and no reconnection
+behind the caller's back. What may be believed is decided in `link.trust`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import NoReturn, TypeVar
+
+from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
+from pymodbus.pdu import ModbusPDU
+
+from commissioner.errors import CommissionerError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
+from commissioner.link.wire.clients import SerialClient, make_client
+from commissioner.link.wire.debts import Shape
+from commissioner.link.wire.port import LinkStats, Words
+from commissioner.link.wire.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, SerialTrust, Trust
+from commissioner.link.wire.url import DriveUrl, RtuUrl
+from commissioner.registers.profile import DriveProfile
+
+READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x03, 0x05, 0x06, 0x10, 0x17
+COIL_ON = 0xFF00
+ILLEGAL_FUNCTION = 1
+
+EXCEPTION_MEANINGS = {
+    1: "illegal function",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "device failure",
+    5: "acknowledged, still at work",
+    6: "device busy",
+    8: "memory parity error",
+    10: "gateway path unavailable",
+    11: "gateway target did not answer",
+}
+"""MODBUS Application Protocol Specification V1.1b3, section 7."""
+
+Result = TypeVar("Result")
+
+
+class ModbusPort:
+    """A `Port` on a pymodbus client."""
+
+    def __init__(
+        self,
+        url: DriveUrl,
+        profile: DriveProfile,
+        *,
+        reply_timeout_s: float,
+        connect_timeout_s: float,
+        sleep: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.stats = LinkStats()
+        self.read_retries = 1
+        self.reply_timeout_s = reply_timeout_s
+        self._connect_timeout_s = connect_timeout_s
+        self._url, self._profile = url, profile
+        self._exceptions = EXCEPTION_MEANINGS | dict(profile.exceptions)
+        self._device = url.device or profile.link.device_id
+        self._client = make_client(url, self._device)
+        self._has_exchange = profile.link.has_read_write_multiple
+        self._token = time.time_ns() & 0xFFFF
+        self._sleep, self._clock = sleep, clock
+        self._trust = self._make_trust()
+
+    # --- the port -------------------------------------------------------------------------------------------------
+    def read(self, address: int, count: int) -> Words:
+        for _ in range(self.read_retries):
+            try:
+                return self._trusted(lambda: self._ask_apart(address, count))
+            except (ReplyTimeout, ReplyMismatch):
+                continue
+        return self._trusted(lambda: self._ask_apart(address, count))
+
+    def write(self, address: int, values: Sequence[int]) -> None:
+        self._trusted(lambda: self._ask_write(address, list(values)))
+        if self._profile.link.write_pause_s:
+            self._sleep(self._profile.link.write_pause_s)
+
+    def exchange(
+        self, write_address: int, values: Sequence[int], read_address: int, count: int, *, proves_itself: bool = False
+    ) -> Words:
+        if self._has_exchange:
+            try:
+                return self._trusted(
+                    lambda: self._ask_exchange(write_address, list(values), read_address, count), not proves_itself
+                )
+            except RequestRefused as refused:
+                if refused.value != ILLEGAL_FUNCTION:
+                    raise
+                self._has_exchange = False
+        self.write(write_address, values)
+        return self._trusted(lambda: self._ask_apart(read_address, count), not proves_itself)
+
+    def write_coil(self, address: int, value: bool) -> None:
+        self._trusted(lambda: self._ask_write_coil(address, value))
+
+    def doubt(self) -> None:
+        self._trust.doubt_content()
+
+    def close(self) -> None:
+        with suppress(Exception):  # closing what is gone may fail
+            self._client.close()  # type: ignore[no-untyped-call]
+
+    def connect(self) -> None:
+        """Open the wire. Raises LinkUnreachable with the reason."""
+        self._client.comm_params.timeout_connect = self._connect_timeout_s
+        try:
+            self._client.connect()
+        except Exception as error:  # pyserial lets termios errors through
+            raise LinkUnreachable(
+                f"no connection to {self._url}",
+                step="connect",
+                value=str(error),
+                limit=f"a connection within {self._connect_timeout_s:g} s",
+                remedy="check that the drive is powered, the cable, the address and that no other master holds it",
+            ) from error
+        self.stats.connections += 1
+
+    # --- one request each -------------------------------------------------------------------------------------------
+    def _ask_read(self, address: int, count: int) -> Words:
+        what = f"read {count} registers at {address}"
+        reply = self._transact(
+            (READ, 2 * count),
+            what,
+            lambda: self._client.read_holding_registers(address, count=count, device_id=self._device),
+        )
+        return self._words(reply, count, what)
+
+    def _ask_apart(self, address: int, count: int) -> Words:
+        """As `_ask_read`; by the other function, with a token to write, where an answer of the same shape is owed: even
+        alone and with the line in step that one could stand in our answer's place while ours is late itself."""
+        echo = self._profile.items.get("echo")
+        if echo is None or not self._has_exchange or not self._trust.is_owed((READ, 2 * count)):
+            return self._ask_read(address, count)
+        if self._trust.is_owed((EXCHANGE, 2 * count)):
+            return self._ask_read(address, count)
+        try:
+            return self._ask_exchange(echo.address, [self._next_token()], address, count)
+        except RequestRefused as refused:
+            if refused.value != ILLEGAL_FUNCTION:
+                raise
+            self._has_exchange = False
+        return self._ask_read(address, count)
+
+    def _ask_write(self, address: int, values: list[int]) -> None:
+        what = f"write {len(values)} registers at {address}"
+        reply = self._transact(
+            (WRITE, address, len(values)),
+            what,
+            lambda: self._client.write_registers(address, values, device_id=self._device),
+        )
+        self._expect(what, (reply.address, reply.count), (address, len(values)))
+
+    def _ask_write_one(self, address: int, value: int) -> None:
+        what = f"write register {address}"
+        reply = self._transact(
+            (WRITE_ONE, address, value),
+            what,
+            lambda: self._client.write_register(address, value, device_id=self._device),
+        )
+        self._expect(what, (reply.address, tuple(reply.registers)), (address, (value,)))
+
+    def _ask_write_coil(self, address: int, value: bool) -> None:
+        what = f"write coil {address}"
+        reply = self._transact(
+            (WRITE_COIL, address, COIL_ON * value),
+            what,
+            lambda: self._client.write_coil(address, value, device_id=self._device),
+        )
+        self._expect(what, (reply.address, reply.bits[:1]), (address, [value]))
+
+    def _ask_exchange(self, write_address: int, values: list[int], read_address: int, count: int) -> Words:
+        what = f"write {len(values)} registers at {write_address} and read {count} at {read_address}"
+        reply = self._transact(
+            (EXCHANGE, 2 * count),
+            what,
+            lambda: self._client.readwrite_registers(
+                read_address=read_address,
+                read_count=count,
+                write_address=write_address,
+                values=values,
+                device_id=self._device,
+            ),
+        )
+        return self._words(reply, count, what)
+
+    # --- trust --------------------------------------------------------------------------------------------------------
+    def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True) -> Result:
+        if not self._client.connected:
+            self.connect()
+        self._checked("bring the line into step", self._trust.ready)
+        try:
+            answer = ask()
+        except RequestRefused:  # an old refusal may come late like any other answer
+            self._checked("prove the refusal", self._trust.confirm)
+            raise
+        if needs_proof:
+            self._checked("prove the answer", self._trust.confirm)
+        return answer
+
+    def _checked(self, what: str, check: Callable[[], None]) -> None:
+        """Draining touches the wire as well: an adapter pulled out in the middle of it is a broken connection."""
+        try:
+            check()
+        except CommissionerError:
+            raise
+        except Exception as error:
+            self._broke(what, error)
+
+    def _make_trust(self) -> Trust:
+        if not isinstance(self._client, SerialClient):
+            return ConnectionTrust(self._client)
+        assert isinstance(self._url, RtuUrl)
+        return SerialTrust(
+            self._client,
+            self._url,
+            turnaround_s=self._profile.link.turnaround_s,
+            prove=self._prove,
+            stats=self.stats,
+            sleep=self._sleep,
+            clock=self._clock,
+        )
+
+    def _prove(self) -> None:
+        """A fresh token through the echo register; without one, reads of different length. Raises LinkError."""
+        echo = self._profile.items.get("echo")
+        if echo is not None:
+            token = self._next_token()
+            self._ask_write_one(echo.address, token)
+            self._expect("read the echo register", self._ask_read(echo.address, 1), (token,))
+            return
+        by_words = {item.words: item for item in self._profile.items.values() if "r" in item.access}
+        for item in by_words.values():
+            self._ask_read(item.address, item.words)
+
+    def _next_token(self) -> int:
+        self._token = (self._token * 25173 + 13849) & 0xFFFF
+        return self._token
+
+    # --- one transaction ----------------------------------------------------------------------------------------------
+    def _transact(self, shape: Shape, what: str, send: Callable[[], ModbusPDU]) -> ModbusPDU:
+        """`shape`: by which the answer would be taken for another's, `link.debts`; the function comes first."""
+        self._trust.asked(shape)
+        self._client.comm_params.timeout_connect = self.reply_timeout_s
+        self.stats.requests += 1
+        start = self._clock()
+        try:
+            reply = send()
+        except ModbusException as error:
+            self._failed(what, error)
+        except Exception as error:  # sockets, pyserial and termios have no common base
+            self._broke(what, error)
+        except BaseException:
+            self._trust.doubt()
+            raise
+        self.stats.latencies_s.append(self._clock() - start)
+        self._expect(what, (reply.dev_id, reply.function_code & 0x7F), (self._device, shape[0]))
+        if reply.isError():
+            self._refused(what, reply.exception_code)
+        return reply
+
+    def _words(self, reply: ModbusPDU, count: int, what: str) -> Words:
+        self._expect(what, f"{len(reply.registers)} registers", f"{count} registers")
+        return tuple(reply.registers)
+
+    def _expect(self, what: str, seen: object, wanted: object) -> None:
+        if seen == wanted:
+            return
+        self.stats.mismatches += 1
+        self._trust.doubt()
+        raise ReplyMismatch(
+            f"the answer to '{what}' is not its answer",
+            step=what,
+            value=seen,
+            limit=wanted,
+            remedy="an answer to another request or a damaged one; check cable, device number and other masters",
+        )
+
+    def _failed(self, what: str, error: ModbusException) -> NoReturn:
+        if isinstance(error, ConnectionException):
+            self._broke(what, error)
+        if isinstance(error, ModbusIOException) and "No response received" in str(error):
+            self._timed_out(what, f"nothing in {self.reply_timeout_s:g} s", error)
+        self.stats.mismatches += 1
+        self._trust.doubt()
+        raise ReplyMismatch(
+            f"the answer to '{what}' cannot be read",
+            step=what,
+            value=str(error),
+            limit="a Modbus answer",
+            remedy="check cable, baud rate and that the device speaks Modbus",
+        ) from error
+
+    def _broke(self, what: str, error: Exception) -> NoReturn:
+        with suppress(Exception):  # closing what is gone may fail as well
+            self._client.close()  # type: ignore[no-untyped-call]
+        self._client.socket = None
+        self._timed_out(what, f"the connection broke: {error}", error)
+
+    def _timed_out(self, what: str, value: str, error: Exception) -> NoReturn:
+        self.stats.timeouts += 1
+        self._trust.doubt()
+        raise ReplyTimeout(
+            f"no answer to '{what}'",
+            step=what,
+            value=value,
+            limit=f"an answer within {self.reply_timeout_s:g} s",
+            remedy="check the drive's supply, the cable and the device number",
+        ) from error
+
+    def _refused(self, what: str, code: int) -> NoReturn:
+        self.stats.refusals += 1
+        meaning = self._exceptions.get(code, "a code the drive file does not explain")
+        raise RequestRefused(
+            f"the drive refused to {what}: exception {code}, {meaning}",
+            step=what,
+            value=code,
+            limit="a request the drive allows now",
+            remedy=f"the drive says: {meaning}",
+        )
+
+
+def open_port(
+    url: DriveUrl, profile: DriveProfile, *, reply_timeout_s: float = 0.5, connect_timeout_s: float = 2.0
+) -> ModbusPort:
+    """A connected port. `reply_timeout_s` is on top of the time the longest frames take on a serial line.
+
+    Raises LinkUnreachable where nothing answers, UsageError where a TLS file cannot be used.
+    """
+    wire_s = 2 * MAX_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
+    port = ModbusPort(url, profile, reply_timeout_s=reply_timeout_s + wire_s, connect_timeout_s=connect_timeout_s)
+    port.connect()
+    return port

@@ -1,0 +1,1 @@
+"""May this running recording carry an answer? Channels, clock, levels, sensors, findings."""

@@ -1,0 +1,133 @@
+"""May this recording carry an answer? Time, levels, clipping, sequence, pairing, steadiness: named findings, or a refusal.
+
+Findings are values; `Finding.stops` marks those after which there is no torque curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from commissioner.monitor.intake import channels, clock, columns, levels
+from commissioner.monitor.intake.findings import Audited, Finding, Fundamental
+from commissioner.monitor.intake.sensors import evened, trust_of
+from commissioner.monitor.signals.supply import (
+    SupplyAngle,
+    Vector,
+    dominant_frequency_hz,
+    follow_supply,
+    harmonic_phasor,
+    phase_voltages,
+    space_vector,
+)
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.running import TCircuit
+from commissioner.records import RunningRecording, Signal
+
+HOPELESS = frozenset({"time_order", "dead_channel", "sample_rate"})
+"""After these not even the fundamental means anything; after other refusals it is still reported."""
+
+
+def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_deg: float | None = None) -> Audited:
+    """Everything that can be said about the recording before any verdict; never raises on bad data.
+
+    `lag_deg`: the order of the channels is known to be that of this lag of the currents.
+    """
+    findings: list[Finding] = []
+    recording, exchanged = columns.sort_by_kind(recording, plate)
+    recording, completed = columns.complete(recording)
+    findings += [Finding(*entry) for entry in (*exchanged, *completed)]
+    low, high = clock.whole_stretch(recording, findings)
+    period = clock.sample_clock(recording, slice(low, high), findings)
+    clock.fast_enough(period, plate, findings)
+    currents = [signal[low:high] for signal in recording.currents_a]
+    voltages = [signal[low:high] for signal in recording.voltages_v]
+    empty = np.zeros(0, dtype=np.complex128)
+    if any(finding.code in HOPELESS and finding.stops for finding in findings) or high - low < clock.LEAST_SAMPLES:
+        return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})
+    levels.channel_levels(currents, voltages, findings)
+    if any(finding.code in HOPELESS and finding.stops for finding in findings):
+        return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), {})
+    raw_frequency = abs(dominant_frequency_hz(space_vector(*voltages), period))
+    levels.supply_range(raw_frequency, plate, findings)
+    pairing = channels.pair(
+        *_phasors(currents, voltages, period, raw_frequency),
+        plate,
+        start,
+        raw_frequency,
+        recording.voltages_are_line_to_line,
+        lag_deg,
+    )
+    findings += [Finding(*entry) for entry in pairing.findings]
+    if pairing.is_refused:
+        return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
+    straight_i = [sign * currents[k] for k, sign in zip(pairing.current_order, pairing.current_sign, strict=True)]
+    straight_v = [sign * voltages[k] for k, sign in zip(pairing.voltage_order, pairing.voltage_sign, strict=True)]
+    i, v = _vectors(straight_i, straight_v, recording.voltages_are_line_to_line)
+    supply = follow_supply(v, period, raw_frequency)
+    fundamental = measure_fundamental(i, v, supply, period, pairing.runs_backwards)
+    levels.switched_voltage(v, fundamental, findings)
+    clock.hidden_jitter(v, supply, fundamental, period, findings)
+    levels.plausible_size(fundamental, plate, findings)
+    even_i = evened(straight_i, True, supply, period)
+    even_v = evened(straight_v, recording.voltages_are_line_to_line, supply, period)
+    for even, kind in ((even_i, "current"), (even_v, "voltage")):
+        levels.unlike_gains(even.difference, kind, findings)
+    i, v = _vectors(even_i.signals, even_v.signals, recording.voltages_are_line_to_line)
+    return Audited(
+        low,
+        float(recording.time_s[low]),
+        period,
+        i,
+        v,
+        supply,
+        fundamental,
+        tuple(findings),
+        pairing.channel_map,
+        trust_of(even_i, even_v, supply),
+        pairing.lag_deg,
+        pairing.rivals_deg,
+    )
+
+
+def measure_fundamental(i: Vector, v: Vector, supply: SupplyAngle, period: float, backwards: bool) -> Fundamental:
+    """Sequence phasors over a Hann window, and the mean power of the whole stretch."""
+    time = np.arange(v.size) * period
+    angle = supply.angle_rad(time)
+    window = np.hanning(v.size + 2)[1:-1]
+    window /= window.sum()
+    forward = np.exp(-1j * angle) * window
+    positive_v, positive_i = complex(v @ forward), complex(i @ forward)
+    backward = np.conj(np.exp(-1j * angle)) * window
+    negative_v, negative_i = complex(v @ backward), complex(i @ backward)
+    apparent = 1.5 * positive_v * np.conj(positive_i)
+    frequency = float(np.average(supply.frequency_rad_per_s(time), weights=window)) / (2 * np.pi)
+    return Fundamental(
+        frequency,
+        positive_v,
+        positive_i,
+        np.conj(negative_v),
+        np.conj(negative_i),
+        float(apparent.real),
+        float(apparent.imag),
+        backwards,
+    )
+
+
+def _phasors(
+    currents: list[Signal], voltages: list[Signal], period: float, frequency_hz: float
+) -> tuple[list[complex], list[complex]]:
+    """Peak phasors of six channels over the first seconds: long enough to average, short enough for one frequency."""
+    count = min(currents[0].size, max(int(2.0 / period), int(5 / (frequency_hz * period))))
+    angle = 2 * np.pi * frequency_hz * np.arange(count) * period
+    return (
+        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
+        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
+    )
+
+
+def _vectors(currents: Sequence[Signal], voltages: Sequence[Signal], line_to_line: bool) -> tuple[Vector, Vector]:
+    star = phase_voltages(*voltages) if line_to_line else (voltages[0], voltages[1], voltages[2])
+    i, v = space_vector(*currents), space_vector(*star)
+    return i - i.mean(), v - v.mean()

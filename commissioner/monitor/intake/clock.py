@@ -1,0 +1,210 @@
+"""The time axis: the longest stretch without a hole, the sample period, and the jitter that the stamps show or hide."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.monitor.intake.findings import Finding, Fundamental
+from commissioner.monitor.signals.supply import SupplyAngle, Vector
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording, Signal
+
+LEAST_SAMPLES = 64
+RECORD_LONGER = "record 30-60 s at steady load without gaps"
+SLOWEST_RATE = 10.0
+"""Samples per rated period: the inversion needs side bands on either side of the fundamental."""
+SHORTEST_S = 2.0
+"""Below this the shaft line (2 Hz resolution at best) cannot be told from the mains."""
+LARGEST_JITTER = 0.05
+"""rms deviation of the time stamps from a straight line, in sample periods."""
+NOTED_JITTER = 0.01
+LARGEST_HIDDEN_JITTER = 0.5
+"""Of a sample period, seen in the voltage where the stamps show none: white jitter below it averages out like noise."""
+
+
+def whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tuple[int, int]:
+    """The longest run of samples without a hole or a number that is none."""
+    time = recording.time_s
+    if time.size < LEAST_SAMPLES:
+        findings.append(
+            Finding(
+                "too_short",
+                "refused",
+                f"the recording holds {time.size} samples",
+                time.size,
+                LEAST_SAMPLES,
+                RECORD_LONGER,
+            )
+        )
+        return 0, time.size
+    signals = [time, *recording.currents_a, *recording.voltages_v]
+    good = np.all([np.isfinite(signal) for signal in signals], axis=0)
+    period = recording.sample_period_s
+    broken = ~good
+    with np.errstate(invalid="ignore"):
+        steps = np.diff(time) / period
+        holes = np.flatnonzero(~(steps < 1.5)) + 1 if period > 0 else np.array([], dtype=np.int64)
+    if holes.size and good.all() and _is_printed_line(time):
+        holes = holes[:0]
+    if holes.size and good.all() and abs((time[-1] - time[0]) / period + 1 - time.size) < 0.25 * holes.size:
+        holes = holes[:0]  # as many rows as the time asks for: the stamps jitter, nothing is lost
+    if np.any(np.diff(time) <= 0):
+        findings.append(
+            Finding(
+                "time_order",
+                "refused",
+                "time does not run forward",
+                float(np.nanmin(np.diff(time))),
+                "steps above 0 s",
+                "sort the rows by time",
+            )
+        )
+    edges = np.unique(np.concatenate([[0], holes, np.flatnonzero(broken), np.flatnonzero(broken) + 1, [time.size]]))
+    lengths = np.diff(edges)
+    usable = np.where(broken[np.minimum(edges[:-1], time.size - 1)], 0, lengths)
+    k = int(np.argmax(usable))
+    low, high = int(edges[k]), int(edges[k + 1])
+    lost = _lost(steps, holes) + int(broken.sum())
+    if lost or broken.any():
+        kept = (high - low) / time.size
+        findings.append(
+            Finding(
+                "missing_samples",
+                "note",
+                f"{lost} samples are missing in {max(holes.size, 1)} places; only the longest whole "
+                f"stretch is used ({(high - low) * period:.2f} s, {kept:.0%} of the recording)",
+                lost,
+                0,
+                "record without gaps",
+            )
+        )
+    if (high - low) * period < SHORTEST_S:
+        reason = "missing samples leave" if lost else "the recording holds"
+        findings.append(
+            Finding(
+                "too_short" if not lost else "missing_samples",
+                "refused",
+                f"{reason} {(high - low) * period:.3g} s without a break: too few load periods",
+                (high - low) * period,
+                f"at least {SHORTEST_S:g} s, better 30-60 s",
+                RECORD_LONGER,
+            )
+        )
+    return low, high
+
+
+def _lost(steps: Signal, holes: NDArray[np.int64]) -> int:
+    return int(np.sum(np.round(steps[holes - 1]) - 1)) if holes.size else 0
+
+
+def sample_clock(recording: RunningRecording, part: slice, findings: list[Finding]) -> float:
+    """The sample period from the time stamps; jitter is what is left after a straight line and the printed digits."""
+    time = recording.time_s[part]
+    if time.size < 16 or any(finding.code == "time_order" for finding in findings):
+        return recording.sample_period_s
+    slope, deviation = _straight(time)
+    rms = 0.0 if _is_printed_line(time) else float(deviation.std())
+    if rms > LARGEST_JITTER:
+        findings.append(
+            Finding(
+                "clock_jitter",
+                "refused",
+                f"the time stamps wander by {rms:.1%} of a sample period rms",
+                rms,
+                LARGEST_JITTER,
+                "record with a hardware clock at a fixed rate",
+            )
+        )
+    elif rms > NOTED_JITTER:
+        findings.append(
+            Finding(
+                "clock_jitter",
+                "note",
+                f"the time stamps wander by {rms:.1%} of a sample period rms",
+                rms,
+                NOTED_JITTER,
+                "record with a hardware clock",
+            )
+        )
+    named = recording.metadata.get("sample_period_s")
+    if isinstance(named, float) and abs(named / slope - 1) > 1e-3:
+        findings.append(
+            Finding(
+                "clock_rate",
+                "note",
+                "sample_period_s and the time stamps disagree; the stamps are used",
+                named,
+                float(slope),
+                "correct sample_period_s",
+            )
+        )
+    return float(slope)
+
+
+def fast_enough(sample_period_s: float, plate: Nameplate, findings: list[Finding]) -> None:
+    """Refuses a rate at which the supply itself cannot be followed, which is what milliseconds read as seconds look like."""
+    per_period = 1 / (plate.rated_frequency_hz * sample_period_s) if sample_period_s > 0 else 0.0
+    if per_period < SLOWEST_RATE:
+        findings.append(
+            Finding(
+                "sample_rate",
+                "refused",
+                f"{per_period:.3g} samples in a period of the rated frequency",
+                per_period,
+                SLOWEST_RATE,
+                "record at 2 kHz or faster, and give the time in seconds",
+            )
+        )
+
+
+def _straight(time: Signal) -> tuple[float, Signal]:
+    """(sample period, deviation of each stamp from the straight line in sample periods)."""
+    index = np.arange(time.size, dtype=np.float64)
+    slope, offset = np.polyfit(index, time - time[0], 1)
+    return float(slope), (time - time[0] - offset - slope * index) / slope
+
+
+def _is_printed_line(time: Signal) -> bool:
+    """True where the stamps leave a straight line by no more than the digits in which they were printed."""
+    slope, deviation = _straight(time)
+    quantum = _printed_step(time) / slope
+    return bool(quantum < 2.0 and np.ptp(deviation) <= 1.02 * quantum + 1e-6)
+
+
+def _printed_step(time: Signal) -> float:
+    """The decimal step in which the stamps were printed, 0 where there is none of 0.1 us or coarser."""
+    sample = time[:500]
+    for digits in range(1, 8):
+        if np.all(np.abs(sample - np.round(sample, digits)) < 1e-9):
+            return float(10.0**-digits)
+    return 0.0
+
+
+def hidden_jitter(
+    v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: list[Finding]
+) -> None:
+    """Jitter that the stamps do not show: it moves the voltage along the circle only, noise moves it in and out as well.
+
+    From second differences (they drop harmonics): omega V sigma_t = sqrt((var_along - var_across) / 6).
+    """
+    turned = (
+        v * np.exp(-1j * supply.angle_rad(np.arange(v.size) * period)) * np.exp(-1j * np.angle(fundamental.voltage_v))
+    )
+    rough = turned[2:] - 2 * turned[1:-1] + turned[:-2]
+    excess = max(float(rough.imag.var() - rough.real.var()), 0.0) / 6
+    if rough.imag.var() < 1.3 * rough.real.var():
+        return
+    jitter = np.sqrt(excess) / (2 * np.pi * fundamental.frequency_hz * abs(fundamental.voltage_v)) / period
+    if jitter > NOTED_JITTER * 5:
+        kind = "refused" if jitter > LARGEST_HIDDEN_JITTER else "note"
+        findings.append(
+            Finding(
+                "clock_jitter",
+                kind,
+                f"the samples were taken off their time by {jitter:.0%} of a sample period rms",
+                float(jitter),
+                LARGEST_HIDDEN_JITTER,
+                "record with a hardware clock",
+            )
+        )

@@ -1,0 +1,96 @@
+"""Columns before phases: currents and voltages under each other's names, and a third one that follows from two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from commissioner.monitor.intake.channels import Entry
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording, Signal
+
+CURRENT_RANGE = (0.02, 3.0)
+"""Of the rated current, rms."""
+VOLTAGE_RANGE = (0.1, 2.5)
+"""Of a phase's rated voltage, rms: an inverter at reduced frequency, or line to line."""
+APART = 2.0
+"""Factor between the smallest of one kind and the largest of the other, or the columns stay as they are named."""
+
+
+def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[RunningRecording, list[Entry]]:
+    """Currents and voltages by their size where the columns as named cannot be what they are named; else as it is.
+
+    Absent columns (nothing in them) have no kind: where both groups are exchanged, the hole goes along.
+    """
+    signals = [*recording.currents_a, *recording.voltages_v]
+    size = np.array([float(np.std(good)) if (good := signal[np.isfinite(signal)]).size else 0.0 for signal in signals])
+    if _is_plausible(size, (3, 4, 5), plate):
+        return recording, []
+    others = [
+        kinds for kinds in combinations(range(6), 3) if _is_plausible(size, kinds, plate) and _is_clear(size, kinds)
+    ]
+    if len(others) != 1:
+        return recording, []
+    wrong_i = [k for k in others[0] if k < 3]
+    wrong_v = [k - 3 for k in range(3, 6) if k not in others[0]]
+    for i, v in zip(wrong_i, wrong_v, strict=True):
+        signals[i], signals[3 + v] = signals[3 + v], signals[i]
+    names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
+    entry: Entry = (
+        "crossed_channels",
+        "corrected",
+        f"columns of currents and voltages are exchanged: {names}",
+        names,
+        "currents and voltages in their own columns",
+        "correct the column names",
+    )
+    a, b, c, d, e, f = signals
+    return replace(recording, currents_a=(a, b, c), voltages_v=(d, e, f)), [entry]
+
+
+def _is_plausible(size: Signal, voltages: tuple[int, ...], plate: Nameplate) -> bool:
+    """Every column that holds something lies in the range of its kind."""
+    scale = np.full(6, plate.rated_current_a)
+    low, high = np.full(6, CURRENT_RANGE[0]), np.full(6, CURRENT_RANGE[1])
+    kinds = list(voltages)
+    scale[kinds] = plate.rated_voltage_v / np.sqrt(3.0)
+    low[kinds], high[kinds] = VOLTAGE_RANGE
+    share = size / scale
+    return bool(np.all((size == 0) | ((share > low) & (share < high))))
+
+
+def _is_clear(size: Signal, voltages: tuple[int, ...]) -> bool:
+    """The two kinds lie a factor `APART` from each other."""
+    v = [size[k] for k in voltages if size[k] > 0]
+    i = [size[k] for k in range(6) if k not in voltages and size[k] > 0]
+    return bool(v and i and (min(v) > APART * max(i) or min(i) > APART * max(v)))
+
+
+def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]]:
+    """A recording of two currents, or of two line-to-line voltages, with the third as minus their sum; else as it is.
+
+    Without a neutral the three sum to zero. A phase voltage's missing third is not known: the star point may move.
+    """
+    entries: list[Entry] = []
+    groups = [list(recording.currents_a), list(recording.voltages_v)]
+    for group, kind in zip(groups, ("current", "voltage"), strict=True):
+        absent = [k for k, signal in enumerate(group) if not np.any(np.nan_to_num(signal))]
+        if len(absent) != 1 or (kind == "voltage" and not recording.voltages_are_line_to_line):
+            continue
+        k = absent[0]
+        group[k] = -(group[k - 1] + group[k - 2])
+        name = f"third_{kind}"
+        entries.append(
+            (
+                name,
+                "corrected",
+                f"one {kind} was not recorded: taken as minus the sum of the other two",
+                k + 1,
+                3,
+                f"record all three {kind}s",
+            )
+        )
+    i, v = groups
+    return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), entries

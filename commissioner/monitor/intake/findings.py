@@ -1,0 +1,85 @@
+"""What an audit says: findings with their number, limit and remedy, the mains as the terminals see it, the usable stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from commissioner.monitor.intake.sensors import Trust
+from commissioner.monitor.signals.supply import SupplyAngle, Vector
+
+WIRING = ("crossed_channels", "polarity")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found, its number, what was allowed, and what to do; `kind` is note, corrected or refused."""
+
+    code: str
+    kind: str
+    what: str
+    value: float | str | None = None
+    limit: float | str | None = None
+    remedy: str = ""
+
+    @property
+    def stops(self) -> bool:
+        return self.kind == "refused"
+
+
+def miswired(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """What was put right here and should be put right at the probes."""
+    return tuple(f for f in findings if f.kind == "corrected" and f.code in WIRING)
+
+
+@dataclass(frozen=True)
+class Fundamental:
+    """The mains as the terminals see it: peak phasors, positive and negative sequence, power of all three phases."""
+
+    frequency_hz: float
+    voltage_v: complex
+    current_a: complex
+    voltage_negative_v: complex
+    current_negative_a: complex
+    power_w: float
+    reactive_var: float
+    runs_backwards: bool
+
+    @property
+    def voltage_unbalance(self) -> float:
+        return abs(self.voltage_negative_v) / abs(self.voltage_v)
+
+    @property
+    def current_unbalance(self) -> float:
+        return abs(self.current_negative_a) / max(abs(self.current_a), 1e-12)
+
+    @property
+    def power_factor(self) -> float:
+        return self.power_w / max(float(np.hypot(self.power_w, self.reactive_var)), 1e-12)
+
+
+@dataclass(frozen=True)
+class Audited:
+    """The stretch that may be used, as space vectors in the right order, and everything that was found.
+
+    `lag_deg` is the current's behind its voltage in the order taken, `rivals_deg` in the other orders that make a motor.
+    """
+
+    first_sample: int
+    start_s: float
+    sample_period_s: float
+    current_a: Vector
+    voltage_v: Vector
+    supply: SupplyAngle | None
+    fundamental: Fundamental | None
+    findings: tuple[Finding, ...]
+    channel_map: Mapping[str, str]
+    sensors: Trust = field(default_factory=Trust)
+    lag_deg: float = 0.0
+    rivals_deg: tuple[float, ...] = ()
+
+    @property
+    def refusal(self) -> Finding | None:
+        return next((finding for finding in self.findings if finding.stops), None)

@@ -1,0 +1,212 @@
+"""Speed, torque and load torque within the period, with a standard deviation at every point.
+
+Load torque (1): tau_l = tau_e - J d omega_r / dt, the derivative taken line by line in the frequency domain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from commissioner.monitor.machine.estimate import Kept, band_weights, speed_lines
+from commissioner.monitor.machine.fit import Fitted, Problem, circuit_at, steps
+from commissioner.monitor.machine.inversion import (
+    RotorState,
+    SpeedLines,
+    Torus,
+    basis_of,
+    complex_speed,
+    rotor_state,
+    speed_noise,
+    speed_on,
+    torque_of,
+)
+from commissioner.monitor.signals.averaging import Lines
+from commissioner.monitor.signals.supply import Vector
+from commissioner.motor.running import TCircuit
+from commissioner.records import Signal
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """At `(n,)` instants; the load torque is None where the inertia is unknown or the data cannot carry it. Standard deviations likewise."""
+
+    time_s: Signal
+    shaft_angle_rad: Signal
+    speed_rad_per_s: Signal
+    torque_nm: Signal
+    load_torque_nm: Signal | None
+    speed_std: Signal
+    torque_std: Signal
+    load_torque_std: Signal | None
+    noise_rms: tuple[float, float, float]
+    """Speed, torque, load torque: the part of the deviations that is drawn anew in each recording, rms over the period."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What the inversion found, as lines: enough to evaluate everything at any instant, and its small changes."""
+
+    circuit: TCircuit
+    speed: SpeedLines
+    state: RotorState
+    raw: SpeedLines
+    weight: Vector
+    kept: Kept
+    changes: tuple[tuple[TCircuit, SpeedLines, Vector, Vector], ...]
+    """Independent one-sigma changes: (circuit, speed lines, rotor flux lines, current lines)."""
+    sensor_changes: int = 0
+    """So many of them, the last ones, are the sensors'."""
+
+
+def solve(problem: Problem, fitted: Fitted, kept: Kept) -> Solved:
+    """The solution and one change per noise block and per direction of the parameters' covariance."""
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    weight = band_weights(problem, fitted)
+    raw = speed_lines(problem, fitted, weight)
+    speed = SpeedLines(raw.mean_rad_per_s, kept.share * raw.amplitude_rad_per_s)
+    state = rotor_state(fitted.circuit, pairs, lines, on, speed)
+    changes = [
+        *_noise_changes(problem, fitted, speed, state, weight, kept),
+        *_parameter_changes(problem, fitted, speed, weight, kept),
+        *_model_changes(problem, fitted, speed, state, weight, kept),
+    ]
+    if np.isfinite(problem.mean_speed_std):
+        moved = SpeedLines(speed.mean_rad_per_s + problem.mean_speed_std, speed.amplitude_rad_per_s)
+        changes.append((fitted.circuit, moved, state.flux_wb, lines.current_a))
+    return Solved(fitted.circuit, speed, state, raw, weight, kept, tuple(changes))
+
+
+def _noise_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector, kept: Kept
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    """Each block's residual, in speed, flux and current together."""
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    circuit = fitted.circuit
+    _, noise_up, noise_low = speed_noise(circuit, pairs, lines, on)
+    noise = kept.share * (weight * noise_up + (1 - weight) * noise_low)
+    drive = circuit.rotor_resistance_ohm * circuit.magnetizing_inductance_h / circuit.rotor_inductance_h
+    flux_on = on.basis @ state.flux_wb
+    changes = []
+    for b in range(noise.shape[0]):
+        wobble = 2 * np.real(on.basis[:, on.positive] @ noise[b])
+        push = drive * lines.current_influence[b] + 1j * pairs * (on.project @ (wobble * flux_on))
+        moved = SpeedLines(speed.mean_rad_per_s, speed.amplitude_rad_per_s + noise[b])
+        changes.append(
+            (circuit, moved, state.flux_wb + state.inverse @ push, lines.current_a + lines.current_influence[b])
+        )
+    return changes
+
+
+def _model_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, state: RotorState, weight: Vector, kept: Kept
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    """Each harmonic moved by its circuit error, real and imaginary part in turn, and all by each air-gap mode."""
+    error = problem.band_error
+    own = kept.share * np.hypot(np.abs(weight) * error.upper, np.abs(1 - weight) * error.lower) / np.sqrt(2.0)
+    alone = np.diag(own).astype(np.complex128)
+    gap = kept.share * (weight * error.gap_upper + (1 - weight) * error.gap_lower)
+    return [
+        (
+            fitted.circuit,
+            SpeedLines(speed.mean_rad_per_s, speed.amplitude_rad_per_s + move),
+            state.flux_wb,
+            problem.lines.current_a,
+        )
+        for move in (*alone, *(1j * alone), *gap[np.any(gap != 0, axis=1)])
+    ]
+
+
+def _parameter_changes(
+    problem: Problem, fitted: Fitted, speed: SpeedLines, weight: Vector, kept: Kept
+) -> list[tuple[TCircuit, SpeedLines, Vector, Vector]]:
+    lines, on, pairs = problem.lines, problem.on, problem.pole_pairs
+    _, start_up, start_low = complex_speed(fitted.circuit, pairs, lines, on)
+    changes = []
+    for step in steps(fitted, held=True):
+        circuit = circuit_at(fitted, step)
+        mean, upper, lower = complex_speed(circuit, pairs, lines, on)
+        value = speed.mean_rad_per_s if np.isfinite(problem.mean_speed_std) else mean.real
+        shift = kept.share * (weight * (upper - start_up) + (1 - weight) * (lower - start_low))
+        moved = SpeedLines(value, speed.amplitude_rad_per_s + shift)
+        changes.append((circuit, moved, rotor_state(circuit, pairs, lines, on, moved).flux_wb, lines.current_a))
+    return changes
+
+
+def evaluate(
+    problem: Problem, solved: Solved, time_s: Signal, comb_phases_rad: Mapping[int, Signal], inertia_kg_m2: float | None
+) -> Waveform:
+    """All quantities at instants where the combs have the phases given."""
+    lines, pairs = problem.lines, problem.pole_pairs
+    basis = basis_of(lines, comb_phases_rad, time_s.size)
+    value = _at(solved.circuit, pairs, problem, basis, solved.speed, solved.state.flux_wb, lines.current_a)
+    moved = [
+        _at(circuit, pairs, problem, basis, speed, flux, current) for circuit, speed, flux, current in solved.changes
+    ]
+    left_out = (solved.kept.speed_variance, 0.0)
+    spread = [np.sqrt(sum((m[k] - value[k]) ** 2 for m in moved) + left_out[k]) for k in range(2)]
+    inertia = inertia_kg_m2
+    load_std = None
+    if inertia is not None:
+        load_std = np.sqrt(
+            sum((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2 for m in moved)
+            + inertia**2 * solved.kept.acceleration_variance
+        )
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (value[0][1:] + value[0][:-1]) * np.diff(time_s))])
+    return Waveform(
+        time_s,
+        angle,
+        value[0],
+        value[1],
+        None if inertia is None else value[1] - inertia * value[2],
+        spread[0],
+        spread[1],
+        load_std,
+        _noise_rms(value, moved[: lines.current_influence.shape[0]], inertia or 0.0),
+    )
+
+
+def without_unknown_load(made: Waveform) -> Waveform:
+    """No load torque where its uncertainty is larger than its own movement: such a curve would show noise."""
+    if made.load_torque_nm is None or made.load_torque_std is None:
+        return made
+    if np.sqrt(np.mean(made.load_torque_std**2)) < np.std(made.load_torque_nm):
+        return made
+    return replace(made, load_torque_nm=None, load_torque_std=None)
+
+
+def _noise_rms(
+    value: tuple[Signal, Signal, Signal], moved: list[tuple[Signal, Signal, Signal]], inertia: float
+) -> tuple[float, float, float]:
+    speed, torque = (sum(np.mean((m[k] - value[k]) ** 2) for m in moved) for k in range(2))
+    load = sum(np.mean((m[1] - value[1] - inertia * (m[2] - value[2])) ** 2) for m in moved)
+    return float(np.sqrt(speed)), float(np.sqrt(torque)), float(np.sqrt(load))
+
+
+def _at(
+    circuit: TCircuit, pairs: int, problem: Problem, basis: Vector, speed: SpeedLines, flux: Vector, current: Vector
+) -> tuple[Signal, Signal, Signal]:
+    """(speed, torque, acceleration) at the basis' instants."""
+    positive = problem.on.positive
+    rate = problem.lines.rate_rad_per_s[positive]
+    both = basis[:, positive] @ np.stack([speed.amplitude_rad_per_s, 1j * rate * speed.amplitude_rad_per_s], axis=1)
+    torque = torque_of(circuit, pairs, basis @ flux, basis @ current)
+    return speed.mean_rad_per_s + 2 * both[:, 0].real, torque, 2 * both[:, 1].real
+
+
+def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float, float]:
+    """Mean electromagnetic torque over all combs' phases, its standard deviation, and the sensors' part of that."""
+    on, lines = problem.on, problem.lines
+
+    def mean(circuit: TCircuit, flux: Vector, current: Vector) -> float:
+        return float(torque_of(circuit, problem.pole_pairs, on.basis @ flux, on.basis @ current).mean())
+
+    value = mean(solved.circuit, solved.state.flux_wb, lines.current_a)
+    moved = [mean(circuit, flux, current) - value for circuit, _, flux, current in solved.changes]
+    sensors = moved[len(moved) - solved.sensor_changes :]
+    return value, float(np.sqrt(np.sum(np.square(moved)))), float(np.sqrt(np.sum(np.square(sensors))))
+
+
+__all__ = ["Lines", "Solved", "Torus", "Waveform", "evaluate", "mean_torque_nm", "solve", "speed_on"]

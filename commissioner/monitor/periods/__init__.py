@@ -1,0 +1,1 @@
+"""Shaft and load periods from the currents alone."""

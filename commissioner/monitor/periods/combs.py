@@ -1,0 +1,213 @@
+"""From a spectrum to combs: the shaft first, then whatever else repeats, each refined and told from mixing products."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from commissioner.monitor.periods import periods
+from commissioner.monitor.periods.periods import PairSpectrum, Periodicity, ShaftSearch
+from commissioner.monitor.signals import tracking
+from commissioner.monitor.signals.averaging import Comb, apart, free_orders
+from commissioner.monitor.signals.supply import TurningFrame, Vector
+from commissioner.records import Signal
+
+SUPPLY_ORDERS = 13
+MOST_ORDERS = 40
+MOST_SEARCH_ORDERS = 14
+"""Taken out while looking for further combs: higher ones are below the floor of any load seen so far."""
+MOST_SHAFT_ORDERS = 24
+USED_FOR_REFINING = 4
+DRIFT_DEGREE = 4
+"""A slip that wanders over the segment, as voltage and load do: phase polynomial beyond a fixed ratio to the mains (or to the
+clock), only as far as its coefficients stand out. Where it does, the frequency that captures most is not the mean one."""
+DRIFT_KNOWN = 0.1
+"""Relative error of the drift's mean: coefficients below three deviations were dropped."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """The periodicities, with the spectrum in which the shaft was looked for and the one that is left at the end."""
+
+    shaft: Periodicity | None
+    loads: tuple[Periodicity, ...]
+    spectrum: PairSpectrum
+    left_over: PairSpectrum
+    candidates: tuple[tuple[float, float], ...]
+
+
+def find(frame: TurningFrame, part: slice, search: ShaftSearch, given_hz: tuple[float, ...] = ()) -> Found:
+    """Shaft and load periods of the segment. Loads at rational multiples of the shaft are the shaft's own comb."""
+    residual, _ = apart(frame, part, [], SUPPLY_ORDERS)
+    highest, full_scale = frame.band_hz * 0.95, float(abs(frame.current_a[part].mean()))
+    spectrum = periods.pair_spectrum(residual, frame.sample_period_s, highest, full_scale)
+    shaft, candidates = _find_shaft(frame, part, residual, spectrum, search)
+    known = [shaft] if shaft else []
+    left = spectrum
+    for frequency in given_hz:
+        known.append(_refined(frame, part, residual, spectrum, f"load {frequency:.4g} Hz", frequency, (1, 2, 3)))
+    for _ in range(periods.MOST_LOADS):
+        left_current, own = told_apart(frame, part, known)
+        left = periods.pair_spectrum(left_current, frame.sample_period_s, highest, full_scale)
+        new = _next_load(frame, part, left_current, left, known, search.supply_hz, spectrum)
+        if new is None:
+            break
+        known.append(new)
+    if len(known) > 1:
+        rest, own = told_apart(frame, part, known)
+        known = [_again(frame, part, rest + mine, spectrum, one) for one, mine in zip(known, own, strict=True)]
+    return Found(shaft and known[0], tuple(known[1:] if shaft else known), spectrum, left, candidates)
+
+
+def told_apart(frame: TurningFrame, part: slice, known: list[Periodicity]) -> tuple[Vector, list[Vector]]:
+    """The current's residual, and each comb's own part of it."""
+    combs = [
+        comb_of(frame, part, one, [c.frequency_hz for c in known[:k]], MOST_SEARCH_ORDERS)
+        for k, one in enumerate(known)
+    ]
+    return apart(frame, part, combs, SUPPLY_ORDERS)
+
+
+def _again(frame: TurningFrame, part: slice, alone: Vector, spectrum: PairSpectrum, one: Periodicity) -> Periodicity:
+    """Refined once more without the others: a line of theirs a tenth of a hertz beside would turn the phase that is followed."""
+    found = _refined(frame, part, alone, spectrum, one.name, one.frequency_hz, one.harmonics_seen)
+    return found if one.name == "shaft" else replace(found, name=f"load {found.frequency_hz:.4g} Hz")
+
+
+def _find_shaft(
+    frame: TurningFrame, part: slice, residual: Vector, spectrum: PairSpectrum, search: ShaftSearch
+) -> tuple[Periodicity | None, tuple[tuple[float, float], ...]]:
+    candidates = periods.shaft_candidates(spectrum, search, periods.search_harmonics(frame.band_hz, search))
+    table = tuple((f, score) for f, score, _ in candidates)
+    for frequency, _, visible in candidates[:1]:
+        seen = tuple(
+            h
+            for h in visible
+            if _is_peak(spectrum, h * frequency) and not _on_mains_skirt(h * frequency, search.supply_hz)
+        )
+        powers = spectrum.at(np.array(seen, dtype=np.float64) * frequency, 0.3) if seen else np.array([0.0])
+        if powers.max() > periods.SHAFT_SIGNIFICANT or powers.sum() > 2 * periods.SHAFT_SIGNIFICANT:
+            return _refined(frame, part, residual, spectrum, "shaft", frequency, seen), table
+    return None, table
+
+
+def _is_peak(spectrum: PairSpectrum, frequency_hz: float) -> bool:
+    """False on the skirt of a stronger line within three cells: the shaft then turns outside the slip that was allowed."""
+    place = np.array([frequency_hz])
+    return bool(spectrum.at(place, 0.6)[0] > 0.3 * spectrum.at(place, 3.0)[0])
+
+
+def _on_mains_skirt(frequency_hz: float, supply_hz: float) -> bool:
+    """Near an even mains line (unbalance, harmonics), which is far stronger than any load's and wanders in size."""
+    return abs(frequency_hz - 2 * supply_hz * round(frequency_hz / (2 * supply_hz))) < periods.NEAR_MAINS_HZ
+
+
+def _refined(
+    frame: TurningFrame,
+    part: slice,
+    residual: Vector,
+    spectrum: PairSpectrum,
+    name: str,
+    frequency_hz: float,
+    seen: tuple[int, ...],
+) -> Periodicity:
+    """The frequency at which the comb captures most; a shaft follows the mains, others what captures more."""
+    time = frame.time_s[part]
+    strongest = _strongest(spectrum, frequency_hz, seen)
+    tries = []
+    noise = None
+    for follows in ("mains",) if name == "shaft" else ("clock", "mains"):
+        phase = comb_phase(frame, part, frequency_hz, follows)
+        demodulated = tracking.demodulate(residual, time, phase, strongest)
+        noise = demodulated.noise_variance if noise is None else noise
+        demodulated = replace(demodulated, noise_variance=noise)  # the same for both, or chance in it would decide
+        shift, std, power = tracking.refine(demodulated, 0.8 / np.ptp(time))
+        tries.append((power, frequency_hz + shift, std, follows))
+    power, frequency, std, follows = max(tries)
+    phase = comb_phase(frame, part, frequency, follows)
+    drift = tracking.track(tracking.demodulate(residual, time, phase, strongest), DRIFT_DEGREE)
+    shift = drift.mean_rad_per_s / (2 * np.pi)
+    std = float(np.hypot(std, DRIFT_KNOWN * shift))
+    return Periodicity(name, frequency + shift, std, follows, power, seen, drift.without_mean())
+
+
+def _strongest(spectrum: PairSpectrum, frequency_hz: float, seen: tuple[int, ...]) -> list[int]:
+    """Up to four harmonics, those with the most power times order squared (they fix the frequency best)."""
+    orders = np.array(seen or (1, 2), dtype=np.float64)
+    power = spectrum.at(orders * frequency_hz, 0.3)
+    ranked = orders[np.argsort(-power * np.minimum(orders, 6) ** 2)]
+    return [int(h) for h in ranked[:USED_FOR_REFINING]]
+
+
+def comb_phase(frame: TurningFrame, part: slice, frequency_hz: float, follows: str) -> Signal:
+    """Phase of the fundamental over the segment, zero at its middle: 2 pi f t for "clock"; for "mains" rho (theta_e + slip's
+    wander), the wander without its mean slope, so that `frequency_hz` stays the mean frequency.
+    """
+    time = frame.time_s[part]
+    if follows == "clock":
+        return np.asarray(2 * np.pi * frequency_hz * (time - 0.5 * (time[0] + time[-1])))
+    angle = frame.supply_angle_rad[part]
+    ratio = 2 * np.pi * frequency_hz / mean_supply(frame, part)
+    wander = frame.slip_phase_rad[part]
+    turned = angle + wander - (wander[-1] - wander[0]) * (time - time[0]) / (time[-1] - time[0])
+    return np.asarray(ratio * (turned - turned[turned.size // 2]))
+
+
+def mean_supply(frame: TurningFrame, part: slice) -> float:
+    """Supply frequency of the segment in rad/s: turns of the supply angle over its length."""
+    angle, time = frame.supply_angle_rad[part], frame.time_s[part]
+    return float((angle[-1] - angle[0]) / (time[-1] - time[0]))
+
+
+def comb_of(
+    frame: TurningFrame, part: slice, found: Periodicity, others_hz: list[float], most: int = MOST_ORDERS
+) -> Comb:
+    """The comb's phase and orders on the segment; orders that collide with `others_hz` or the mains are left out."""
+    time = frame.time_s[part]
+    limit = min(MOST_SHAFT_ORDERS if found.name == "shaft" else MOST_ORDERS, most)
+    highest = min(limit, int(0.9 * frame.band_hz / found.frequency_hz))
+    taken = [h * f for f in others_hz for h in range(1, int(frame.band_hz / f) + 1) if h <= limit]
+    orders = free_orders(
+        found.frequency_hz, highest, taken, mean_supply(frame, part) / (2 * np.pi), float(np.ptp(time))
+    )
+    phase = comb_phase(frame, part, found.frequency_hz, found.follows)
+    if found.drift is not None:
+        phase = phase + found.drift(time)
+    return Comb(found.name, phase, found.frequency_hz, orders, found.follows)
+
+
+def _next_load(
+    frame: TurningFrame,
+    part: slice,
+    residual: Vector,
+    left: PairSpectrum,
+    known: list[Periodicity],
+    supply_hz: float,
+    first: PairSpectrum,
+) -> Periodicity | None:
+    """The strongest remaining pair that is no product of known combs, as a comb of its own."""
+    strongest = max((first.power * first.floor_a2).max(), 1e-300)
+    combs_hz = [c.frequency_hz for c in known]
+    for frequency, power in periods.find_peaks_above(
+        left, periods.SIGNIFICANT, periods.LOWEST_LOAD_HZ, periods.HIGHEST_LOAD_HZ
+    ):
+        k = round(frequency / left.frequency_hz[1])
+        if power * left.floor_a2[k] < LEAST_SHARE * strongest or not _is_torque_like(left, k):
+            continue
+        if periods.is_product(frequency, combs_hz, supply_hz, left.cell_hz):
+            continue
+        fundamental, seen = periods.lowest_fundamental(left, frequency, combs_hz, supply_hz)
+        found = _refined(frame, part, residual, left, f"load {fundamental:.4g} Hz", fundamental, seen)
+        return replace(found, name=f"load {found.frequency_hz:.4g} Hz")
+    return None
+
+
+LEAST_SHARE = 1e-4
+"""Power of a load line against the strongest line: below 1 % of its amplitude it moves no waveform."""
+
+
+def _is_torque_like(spectrum: PairSpectrum, k: int) -> bool:
+    """A torque makes both side bands; one alone is a slot or network line. True within a factor of 8 in amplitude."""
+    upper, lower = abs(spectrum.upper[k]), abs(spectrum.lower[k])
+    return bool(max(upper, lower) < 8 * min(upper, lower))

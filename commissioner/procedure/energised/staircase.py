@@ -1,0 +1,255 @@
+"""The DC staircase: levels of both signs, enough to tell the stator's resistance from what the inverter loses."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from commissioner.errors import Aborted
+from commissioner.identify.inverter import staircase as resistance
+from commissioner.identify.inverter.settling import Approach, settle
+from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import prior
+from commissioner.motor.standstill import poles_per_s
+from commissioner.procedure.energised.session import (
+    BIAS_RAMP_PER_S,
+    OFFSET_S,
+    along_axis,
+    duration_s,
+    measure_offset,
+    next_block,
+    period_s,
+    ramp_down,
+)
+from commissioner.procedure.findings import StaircaseFitted, StepProgress
+from commissioner.procedure.states import Event
+from commissioner.procedure.steps import Findings, Job, Step
+from commissioner.records import SampleBlock, Signal
+from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetBias, Tell
+
+STEP = "DC staircase"
+RUNGS = (1.0, 0.6, 0.3)
+"""DC levels of one sign, of the top current."""
+KNOWN_TOP = 0.95
+"""Flux of the top DC level, of the limit, once the inductance is known."""
+SECONDS = 5.0
+"""A staircase's energised time; levels that have not settled by then are extrapolated."""
+STEER_S = 0.02
+"""Time between two voltages of the climb or of a push."""
+IDLE_S = 4.0
+"""The climb would pass the whole test voltage in this time as long as no current flows."""
+CARRIES = 0.02
+"""Of the top current: from here on the climb is slow."""
+RISE_STEPS = 10
+KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
+"""Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
+SETTLED = 0.006
+FAST_TIMES = 4.0
+PUSH, ARRIVAL = 4.0, 0.85
+"""First surplus of a push towards the next level, in resistive steps; it falls to nothing while the flux gets that far."""
+PUSH_ABOVE_S = 0.15
+"""A shorter push cannot be timed over the link."""
+
+
+def measure_resistance(job: Job, findings: Findings) -> Step:
+    """DC levels of both signs; on the first axis a slow climb finds how much voltage they need."""
+    axis_deg = job.plan.tests_deg[findings.tests_done]
+    findings.axis_s = 0.0
+    stair = _Stair(job, findings, axis_deg)
+    yield LoadExcitation(axis_deg, (), BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
+    yield Enable(STEP)
+    findings.segment += 1
+    yield from stair.zero()
+    voltages = stair.known_voltages() or (yield from stair.climb())
+    both = (*voltages, *(-v for v in reversed(voltages)))
+    for number, (before_v, voltage_v) in enumerate(itertools.pairwise((0.0, *both))):
+        yield from stair.hold(before_v, voltage_v, len(both) - number)
+        yield Tell(stair.progress(len(both)))
+    yield SetBias(0.0)
+    yield from ramp_down(findings, STEP, axis_deg, 1.0 / BIAS_RAMP_PER_S)
+    yield Disarm("staircase measured")
+    findings.knee = findings.knee or tuple(stair.knee)
+    fitted = resistance.fit_staircase((*stair.levels(), *findings.knee), axis_deg)
+    findings.staircases.append(fitted)
+    value, std = fitted.stator_resistance
+    yield Tell(StaircaseFitted(axis_deg, value, std, fitted.error_voltage.value, stair.seconds))
+    return Event.RESISTANCE_KNOWN
+
+
+@dataclass
+class _Stair:
+    """One DC staircase under way."""
+
+    job: Job
+    findings: Findings
+    axis_deg: float
+    knee: list[DcLevel] = field(default_factory=list)
+    seconds: float = 0.0
+    offset_a: float = 0.0
+    _held: list[tuple[float, Approach]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        job = self.job
+        flux_wb = job.flux_limit_wb(self.findings.resistance_ohm(job))
+        self._most_a = self.findings.test_current_a(job)
+        limits = StaircaseLimits(self._most_a, flux_wb, job.test_voltage_v)
+        self._plan = resistance.staircase(job.nameplate, limits)
+        look = self.findings.look
+        self._known: InverseGamma | None = look.parameters if look else None
+        machine = self._known or prior(job.nameplate).typical
+        slow, fast = poles_per_s(machine)
+        self._slow_s, self._fast_s = -1.0 / slow, -1.0 / fast
+        self._top_a = self._plan.top_current_a
+        if self._known is not None:
+            inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
+            self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
+
+    # -- steps ----------------------------------------------------------------------------------------------------
+
+    def zero(self) -> Generator[Command, Any, None]:
+        """Before any voltage: what the sensors show is offset."""
+        self.offset_a = yield from measure_offset(self.findings, STEP, self.axis_deg)
+        self.seconds += OFFSET_S
+
+    def known_voltages(self) -> tuple[float, ...]:
+        """The rungs' voltages once a look has told resistance, inductance and inverter; empty before."""
+        if self._known is None:
+            return ()
+        currents = np.array([rung * self._top_a for rung in RUNGS])
+        lost = self.findings.inverter.on_axis(currents, self.axis_deg)
+        volts = self._known.stator_resistance_ohm * currents + lost
+        return tuple(float(min(v, self.job.test_voltage_v)) for v in volts)
+
+    def climb(self) -> Generator[Command, Any, tuple[float, ...]]:
+        """Raise the bias until the top current flows, slowly once any flows; the rungs' voltages, largest first.
+
+        What the climb needs to build up flux would drive too much current once held: it is taken off, for the most
+        inductive motor the plate allows.
+        """
+        job, voltage_v, steady, reached = self.job, 0.0, [0.0], [0.0]
+        while reached[-1] < self._top_a and voltage_v < job.test_voltage_v:
+            slow = self._plan.climb_v_per_s
+            rate = slow if reached[-1] > CARRIES * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
+            voltage_v = min(voltage_v + rate * STEER_S, job.test_voltage_v)
+            step_s, seen_a = yield from self._steer(voltage_v)
+            self._note_climb(voltage_v, seen_a, (seen_a - reached[-1]) / step_s)
+            reached.append(max(reached[-1], seen_a))
+            back = min(len(reached) - 1, RISE_STEPS)
+            rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
+            steady.append(max(steady[-1], voltage_v - self._plan.largest_inductance_h * rise))
+        if reached[-1] < 0.3 * self._top_a:
+            raise Aborted(
+                "no current flows", step=f"{STEP}, axis {self.axis_deg:g} deg", value=f"{reached[-1]:.3g} A",
+                limit=f"{self._top_a:.3g} A within {job.test_voltage_v:.3g} V",
+                remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
+            )  # fmt: skip
+        return tuple(float(np.interp(rung * reached[-1], reached, steady)) for rung in RUNGS)
+
+    def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
+        """Points on the knee of the inverter's error, which no settled level shows; the iron's small lag taken off."""
+        last_a = self.knee[-1].current_a if self.knee else 0.0
+        if last_a + KNEE_STEP * self._top_a <= current_a <= KNEE_TOP * self._top_a:
+            typical = prior(self.job.nameplate).typical
+            lag_v = (typical.leakage_inductance_h + typical.magnetizing_inductance_h) * rise_a_per_s
+            if lag_v < KNEE_LAG * voltage_v:
+                self.knee.append(DcLevel(voltage_v - lag_v, current_a, 0.0))
+
+    def hold(self, before_v: float, voltage_v: float, levels_left: int) -> Generator[Command, Any, None]:
+        """Hold a level until its current has settled or its share of the time is up; keep how it got there."""
+        share_s = (SECONDS * self.job.stretch - self.seconds) / levels_left
+        until_s = self.seconds + max(share_s, 0.2 * self._slow_s, 0.05)
+        yield from self._push(before_v, voltage_v)
+        yield SetBias(voltage_v)
+        began_s, ramp_s = self.seconds, abs(voltage_v - before_v) / (BIAS_RAMP_PER_S * self.job.test_voltage_v)
+        skipped = round((FAST_TIMES * self._fast_s + ramp_s) / period_s(self.findings))
+        current = np.zeros(0)
+        while (self.seconds < until_s or current.size < 2 * skipped) and not self._has_settled(current):
+            current = np.append(current, self._current((yield from self._fetch())))
+            if self.seconds - began_s > self._plan.longest_dwell_s:
+                break
+        time_s = np.arange(current.size, dtype=np.float64) * period_s(self.findings)
+        skipped = min(skipped, current.size // 2)
+        self._held.append((voltage_v, Approach(time_s[skipped:], current[skipped:])))
+
+    def _push(self, before_v: float, voltage_v: float) -> Generator[Command, Any, None]:
+        """More than the step for a while, falling: the flux is nearly there when it ends (known machine only)."""
+        if self._known is None:
+            return
+        machine, job = self._known, self.job
+        step_v = machine.stator_resistance_ohm * abs(self._current_at(voltage_v) - self._current_at(before_v))
+        room_v = (self._most_a - self._top_a) * (machine.stator_resistance_ohm + machine.rotor_resistance_ohm)
+        surplus_v = max(0.0, min(PUSH * step_v, room_v, job.test_voltage_v - abs(voltage_v)))
+        length_s = self._slow_s * _push_length(surplus_v / step_v) if surplus_v > step_v else 0.0
+        if length_s < PUSH_ABOVE_S:
+            return
+        began_s, sign = self.seconds, math.copysign(1.0, voltage_v - before_v)
+        while self.seconds - began_s < length_s:
+            left = 1.0 - (self.seconds - began_s + 0.5 * STEER_S) / length_s
+            yield from self._steer(voltage_v + sign * surplus_v * max(left, 0.0))
+
+    def _current_at(self, voltage_v: float) -> float:
+        """What a voltage drives through the known machine behind the known inverter in the end."""
+        assert self._known is not None
+        grid = np.linspace(0.0, 1.2 * self._top_a, 200)
+        volts = self._known.stator_resistance_ohm * grid + self.findings.inverter.on_axis(grid, self.axis_deg)
+        return math.copysign(float(np.interp(abs(voltage_v), volts, grid)), voltage_v)
+
+    # -- what came out --------------------------------------------------------------------------------------------
+
+    def levels(self) -> tuple[DcLevel, ...]:
+        """The levels with the currents they have settled at, or would have."""
+        settled = settle([approach for _, approach in self._held], self._slow_s)
+        rows = zip(self._held, settled.current_a, settled.std_a, strict=True)
+        return tuple(DcLevel(voltage_v, float(a), float(s)) for (voltage_v, _), a, s in rows)
+
+    def progress(self, planned: int) -> StepProgress:
+        voltage_v, approach = self._held[-1]
+        return StepProgress(
+            self.axis_deg, len(self._held) / planned,
+            f"{self.seconds:4.1f} s  {voltage_v:+.2f} V drive {approach.current_a[-1]:+.3f} A",
+        )  # fmt: skip
+
+    def _has_settled(self, current: Signal) -> bool:
+        """The means of the last three windows differ by less than `SETTLED` of the top current."""
+        n = max(8, round(self._plan.window_s / period_s(self.findings)))
+        if current.size < 3 * n:
+            return False
+        means = [float(np.mean(current[current.size - k * n : current.size - (k - 1) * n])) for k in (1, 2, 3)]
+        return max(means) - min(means) < SETTLED * self._top_a
+
+    # -- samples --------------------------------------------------------------------------------------------------
+
+    def _steer(self, voltage_v: float) -> Generator[Command, Any, tuple[float, float]]:
+        """Ask for a voltage and wait `STEER_S`: (time passed, mean current of the last block)."""
+        yield SetBias(voltage_v)
+        passed_s, current = 0.0, np.zeros(1)
+        while passed_s < STEER_S:
+            block = yield from self._fetch()
+            current = self._current(block)
+            passed_s += duration_s(block)
+        return passed_s, float(np.mean(current))
+
+    def _current(self, block: SampleBlock) -> Signal:
+        return along_axis(block) - self.offset_a
+
+    def _fetch(self) -> Generator[Command, Any, SampleBlock]:
+        block = yield from next_block(self.findings, STEP, self.axis_deg)
+        self.seconds += duration_s(block)
+        return block
+
+
+def _push_length(push: float) -> float:
+    """Time constants x after which a step with a surplus falling from `push` steps to nothing is `ARRIVAL` done:
+    (1 + push)(1 - e^-x) - push (x - 1 + e^-x) / x, the response of y' + y = 1 + push (1 - t/x) at t = x."""
+    low, high = 0.0, 4.0
+    for _ in range(40):
+        x = 0.5 * (low + high)
+        done = (1.0 + push) * -math.expm1(-x) - push * (x + math.expm1(-x)) / x
+        low, high = (x, high) if done < ARRIVAL else (low, x)
+    return low

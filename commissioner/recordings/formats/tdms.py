@@ -1,0 +1,183 @@
+"""Channels of a TDMS file (National Instruments, "TDMS File Format Internal Structure", version 2.0).
+
+Read are numeric channels of interleaved and contiguous segments, with linear NI scaling, and their waveform properties.
+DAQmx raw data, extended floats and other scalings are refused by name; texts and time stamps are passed over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, too_large
+from commissioner.recordings.formats.stretch import Stretch
+from commissioner.records import Signal
+
+_META, _NEW_LIST, _RAW, _INTERLEAVED, _BIG_ENDIAN, _DAQMX = 1 << 1, 1 << 2, 1 << 3, 1 << 5, 1 << 6, 1 << 7
+_NO_DATA, _AS_BEFORE, _UNFINISHED = 0xFFFFFFFF, 0, 0xFFFFFFFFFFFFFFFF
+_TYPES = {
+    1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8", 0x19: "f4", 0x1A: "f8",
+    0x21: "u1",
+}  # fmt: skip
+_TEXT, _TIME_STAMP = 0x20, 0x44
+MAX_SEGMENTS = 200_000
+
+Property = float | str | None
+
+
+@dataclass
+class _Channel:
+    """One object of the file: where its values lie in the present segment, what was collected, its properties."""
+
+    kind: int = 0
+    count: int = 0
+    text_bytes: int = 0
+    pieces: list[np.ndarray] = field(default_factory=list)
+    properties: dict[str, Property] = field(default_factory=dict)
+
+    def size(self, order: str) -> int:
+        return self.text_bytes if self.kind == _TEXT else self.count * self.dtype(order).itemsize
+
+    def dtype(self, order: str) -> np.dtype:
+        return np.dtype("V16") if self.kind == _TIME_STAMP else np.dtype(order + _TYPES[self.kind])
+
+
+def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
+    """(values by `group.channel [unit]`, the file's properties and the sample period where all channels agree on one).
+
+    DataRefused: damaged, too large, or not read here.
+    """
+    file, objects = Stretch.of_file(path, "TDMS"), dict[str, _Channel]()
+    active: list[str] = []
+    for _ in range(MAX_SEGMENTS):
+        if file.is_at_end:
+            break
+        active = _segment(file, objects, active)
+    else:
+        raise too_large(path, f"> {MAX_SEGMENTS} segments", MAX_SEGMENTS)
+    held = {key: channel for key, channel in objects.items() if channel.pieces and channel.kind in _TYPES}
+    size = 8 * sum(piece.size for channel in held.values() for piece in channel.pieces)
+    if size > MAX_BYTES:
+        raise too_large(path, size, MAX_BYTES)
+    values = {_name(key, channel): _scaled(channel, file) for key, channel in held.items()}
+    return values, _metadata(objects, list(held.values()))
+
+
+def _metadata(objects: dict[str, _Channel], held: list[_Channel]) -> dict[str, float | str]:
+    of_file = objects["/"].properties if "/" in objects else {}
+    known: dict[str, float | str] = {name: value for name, value in of_file.items() if value is not None}
+    periods = {channel.properties.get("wf_increment") for channel in held}
+    period = periods.pop() if len(periods) == 1 else None
+    return known | ({"sample_period_s": period} if isinstance(period, float) and period > 0 else {})
+
+
+def _segment(file: Stretch, objects: dict[str, _Channel], active: list[str]) -> list[str]:
+    """Read one segment; the objects that hold raw data in it, which the next one may take over."""
+    start = file.at
+    if bytes(file.take(4)) != b"TDSm":
+        file.refuse("a segment without its mark")
+    (contents,) = file.read("<I")
+    order = ">" if contents & _BIG_ENDIAN else "<"
+    _, length, raw_at = file.read(order + "iQQ")
+    if contents & _DAQMX:
+        file.refuse("DAQmx raw data")
+    body = start + 28
+    end = len(file.data) if length == _UNFINISHED else body + length
+    if contents & _META:
+        part = file.part(body, raw_at)
+        active = _objects(part, order, objects, [] if contents & _NEW_LIST else active)
+    if contents & _RAW and body + raw_at < end:
+        raw = file.part(body + raw_at, min(end, len(file.data)) - body - raw_at)
+        _values(raw, order, [objects[key] for key in active if objects[key].count], bool(contents & _INTERLEAVED))
+    if end <= start:
+        file.refuse("a segment of no length")
+    file.at = end
+    return active
+
+
+def _objects(part: Stretch, order: str, objects: dict[str, _Channel], active: list[str]) -> list[str]:
+    known = dict.fromkeys(active)
+    (count,) = part.read(order + "I")
+    for _ in range(count):
+        key = _text(part, order)
+        channel = objects.setdefault(key, _Channel())
+        if len(objects) > MAX_COLUMNS:
+            raise too_large(part.path, f"{len(objects)} channels", MAX_COLUMNS)
+        (index,) = part.read(order + "I")
+        if index not in (_NO_DATA, _AS_BEFORE):
+            channel.kind, dimension, channel.count = part.read(order + "IIQ")
+            if dimension != 1 or channel.kind not in (*_TYPES, _TEXT, _TIME_STAMP):
+                part.refuse(f"a channel of type {channel.kind:#x}")
+            channel.text_bytes = part.read(order + "Q")[0] if channel.kind == _TEXT else 0
+        if index != _NO_DATA:
+            known[key] = None
+        (properties,) = part.read(order + "I")
+        for _ in range(properties):
+            name = _text(part, order)
+            channel.properties[name] = _property(part, order)
+    return list(known)
+
+
+def _values(raw: Stretch, order: str, held: list[_Channel], is_interleaved: bool) -> None:
+    """The chunks of a segment; each channel's values contiguous, or sample by sample in turn. A torn last chunk is left."""
+    if is_interleaved:
+        if any(channel.kind == _TEXT for channel in held):
+            raw.refuse("interleaved texts")
+        row = np.dtype([(f"c{k}", channel.dtype(order)) for k, channel in enumerate(held)])
+        table = np.frombuffer(raw.take(len(raw.data) // row.itemsize * row.itemsize), row) if held else ()
+        for k, channel in enumerate(held):
+            channel.pieces.append(table[f"c{k}"])  # type: ignore[call-overload]
+        return
+    chunk = sum(channel.size(order) for channel in held)
+    count = len(raw.data) // chunk if chunk else 0
+    if not count:
+        return
+    rows, start = np.frombuffer(raw.take(count * chunk), np.uint8).reshape(count, chunk), 0
+    for channel in held:
+        end = start + channel.size(order)
+        if channel.kind != _TEXT:
+            channel.pieces.append(np.ascontiguousarray(rows[:, start:end]).view(channel.dtype(order)).ravel())
+        start = end
+
+
+def _scaled(channel: _Channel, file: Stretch) -> Signal:
+    """In the channel's unit, as its own scaling says."""
+    values = np.concatenate(channel.pieces).astype(np.float64)
+    scalings = channel.properties.get("NI_Number_Of_Scales")
+    for k in range(int(scalings) if isinstance(scalings, float) and 0 < scalings < 100 else 0):
+        kind = channel.properties.get(f"NI_Scale[{k}]_Scale_Type")
+        slope = channel.properties.get(f"NI_Scale[{k}]_Linear_Slope")
+        offset = channel.properties.get(f"NI_Scale[{k}]_Linear_Y_Intercept")
+        if kind is None:
+            continue
+        if kind != "Linear" or not isinstance(slope, float) or not isinstance(offset, float):
+            file.refuse(f"a scaling of the kind {kind}")
+        values = slope * values + offset
+    return values
+
+
+def _text(part: Stretch, order: str) -> str:
+    (length,) = part.read(order + "I")
+    return bytes(part.take(length)).decode("utf-8", errors="replace")
+
+
+def _property(part: Stretch, order: str) -> Property:
+    (kind,) = part.read(order + "I")
+    if kind == _TEXT:
+        return _text(part, order)
+    if kind == _TIME_STAMP:
+        part.take(16)
+        return None
+    if kind not in _TYPES:
+        part.refuse(f"a property of type {kind:#x}")
+    dtype = np.dtype(order + _TYPES[kind])
+    return float(np.frombuffer(part.take(dtype.itemsize), dtype)[0])
+
+
+def _name(key: str, channel: _Channel) -> str:
+    """`/'group'/'channel'` -> `group.channel [unit]`"""
+    name = ".".join(part.strip("'").replace("''", "'") for part in key.strip("/").split("'/'"))
+    unit = channel.properties.get("unit_string")
+    return f"{name} [{unit}]" if isinstance(unit, str) and unit else name

@@ -1,0 +1,1 @@
+"""The run folder and what can be had from it: records and blocks in, list, report and replay out."""

@@ -1,0 +1,37 @@
+"""The report of a run that was cut off before it could make its own, from what its archive holds."""
+
+from __future__ import annotations
+
+from contextlib import closing, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+
+from commissioner.procedure.findings import RunEnded
+from commissioner.report.page import with_notice
+from commissioner.report.run.page import run_page
+from commissioner.report.run.summary import summarise
+from commissioner.run.archive.catalogue import RunSummary
+from commissioner.run.archive.folder import RunFolder, plain, read_journal
+from commissioner.run.archive.replay import learn_again
+
+
+def mark_restored(run: RunSummary) -> None:
+    """The report says on top that the drive holds its old values again; a disk that is full leaves it as it is."""
+    page = Path(run.folder) / "report.html"
+    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    with suppress(OSError), closing(RunFolder(page.parent)) as folder:
+        text = page.read_text("utf-8")
+        folder.save_text(
+            page.name, with_notice(text, f"Restored on {when}: the drive holds the values it had before this run.")
+        )
+
+
+def make_report(run: RunSummary) -> None:
+    """`report.html` of the run. DataRefused where it never reached its drive."""
+    path = Path(run.folder)
+    job, findings = learn_again(path)
+    ended = RunEnded(run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s)
+    result = plain(summarise(findings, ended, run.run, job.parameter_names))
+    journal = read_journal(path / "journal.jsonl")
+    with closing(RunFolder(path)) as folder:
+        folder.save_text("report.html", run_page(result, journal, findings))

@@ -1,0 +1,26 @@
+"""How kernels here are compiled: cached, IEEE division without Python's zero check, fused adds allowed.
+
+Infinities and NaN keep their meaning; the same machine gives the same bits.
+"""
+
+from contextlib import suppress
+from pathlib import Path
+
+from numba import njit
+
+
+def _forget_stale_kernels(folder: Path) -> None:
+    """Drop compiled kernels older than any source here: numba's cache looks at a kernel's own file only, not at the
+    laws and slots that are compiled into it."""
+    newest = max(path.stat().st_mtime for path in folder.rglob("*.py"))
+    for index in folder.rglob("__pycache__/*.nbi"):
+        with suppress(OSError):
+            if index.stat().st_mtime < newest:
+                index.unlink()
+
+
+_forget_stale_kernels(Path(__file__).parents[1])
+FAST = {"reassoc", "arcp", "contract", "nsz"}
+kernel = njit(cache=True, error_model="numpy", fastmath=FAST)
+piece = njit(forceinline=True, error_model="numpy", fastmath=FAST)
+"""A part of a kernel too small to be called: it is written into its callers by the compiler."""

@@ -1,0 +1,137 @@
+"""One drive answering register requests: its pace, its faults, and pymodbus's description of its registers.
+
+Pace. At `max` only requests move motor time: a window read just as far as the window needs, any other request a fixed
+step; the watchdog alone looks at the wall clock, so a dead client leaves a dead drive. At speed N motor time is N times
+wall time and everything, the watchdog too, lives in it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pymodbus.constants import ExcCodes
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from sim.drive.drive_map import DriveMap, load_map
+from sim.drive.firmware import Firmware, warm_up
+from sim.drive.memory import Memory
+from sim.drive.states import Answer
+from sim.scenario import Scenario
+from sim.wire.faults import Plan, parse
+from sim.wire.state_log import StateLog
+
+STEP_ENERGISED_S = 0.001
+STEP_OFF_S = 0.010
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to serve. `speed` 0 means max; `tcp_port` -1 means none, 0 any; `rtu` a path or `pty`."""
+
+    speed: float = 0.0
+    seed: int = 0
+    nvm: Path | None = None
+    state_log: Path | None = None
+    faults: tuple[str, ...] = ()
+    tcp_port: int = -1
+    tls_port: int = -1
+    tls_context: Any = None
+    rtu: str = ""
+    baud: int = 115200
+    parity: str = "N"
+
+
+class Drive:
+    """The firmware with its pace and its faults; answers register requests."""
+
+    def __init__(self, scenario: Scenario, options: Options) -> None:
+        self.plan = Plan([parse(text) for text in (*scenario.faults, *options.faults)])
+        self.speed = options.speed
+        self.map: DriveMap = load_map(shift=scenario.map_shift or self.plan.map_shift)
+        warm_up(scenario.plant, self.map)
+        setup = replace(scenario.setup, interlocks=dict(scenario.setup.interlocks))
+        factory = [
+            float(value) / self.map.items[name].scale
+            for name, value in zip(self.map.document["parameters"]["order"], setup.parameters, strict=True)
+        ]
+        self.firmware = Firmware(
+            scenario.plant,
+            self.map,
+            setup,
+            Memory(options.nvm, factory),
+            options.seed,
+            StateLog(options.state_log),
+            time.monotonic if options.speed == 0.0 else None,
+        )
+        self.firmware.before_command = lambda command: self.plan.before_command(command, self.firmware)
+        self.plan.arm(self.firmware)
+        self.started = time.monotonic()
+        self.stalled_until = 0.0
+
+    def keep_pace(self) -> None:
+        """At speed N: let motor time catch up with the wall."""
+        if self.speed:
+            target = (time.monotonic() - self.started) * self.speed
+            if target > self.firmware.t:
+                self.firmware.advance(target - self.firmware.t)
+        self.firmware.check_watchdog()
+
+    def pass_time(self) -> None:
+        """Motor time a request takes when it is not a window."""
+        if self.speed:
+            self.keep_pace()
+        else:
+            self.firmware.advance(STEP_ENERGISED_S if self.firmware.is_energised else STEP_OFF_S)
+
+    def fill_window(self, count: int) -> None:
+        """Motor time up to the last sample of the window asked for (at max), or up to now."""
+        if self.speed:
+            self.keep_pace()
+            return
+        samples = self.firmware.samples
+        wanted = samples.behind_gaps(int(self.firmware.values["window_index"])) + samples.fitting(count)
+        self.firmware.run_until_sample(wanted)
+        self.firmware.check_watchdog()
+
+    async def action(
+        self, function: int, start: int, address: int, count: int, registers: list[int], values: Any
+    ) -> ExcCodes | None:
+        """pymodbus's hook for every access: writes go to the firmware, reads are refreshed from it."""
+        if values is not None:
+            if function != 23:
+                self.pass_time()
+            return _exception(self.firmware.registers.write(address, list(values)))
+        if function == 6:  # its own echo
+            return None
+        is_window = address == self.map.window_address
+        if is_window:
+            self.fill_window(count)
+        else:
+            self.pass_time()
+        words = self.firmware.registers.read(address, count)
+        if isinstance(words, Answer):
+            return _exception(words)
+        registers[address - start : address - start + count] = words
+        return None
+
+
+def _exception(answer: Answer) -> ExcCodes | None:
+    return None if answer is Answer.DONE else ExcCodes(answer.value)
+
+
+def sim_device(drive: Drive) -> SimDevice:
+    """pymodbus's description of the register space: one block per run of mapped addresses."""
+    addresses = sorted(
+        {*drive.map.by_address, *range(drive.map.window_address, drive.map.window_address + drive.map.window_words)}
+    )
+    blocks: list[list[int]] = []
+    for address in addresses:
+        if blocks and address == blocks[-1][-1] + 1:
+            blocks[-1].append(address)
+        else:
+            blocks.append([address])
+    data = [SimData(b[0], count=len(b), values=0, datatype=DataType.REGISTERS) for b in blocks]
+    return SimDevice(drive.map.device_id, data, action=drive.action)

@@ -1,0 +1,1 @@
+"""Recordings by other authors' machines, for the blind protocol."""

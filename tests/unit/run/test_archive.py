@@ -1,0 +1,149 @@
+"""The run folder loses nothing that was written and shows where a kill tore the rest."""
+
+import json
+import stat
+
+import numpy as np
+import pytest
+
+from commissioner.recordings.table import read_table, to_standstill
+from commissioner.records import SampleBlock
+from commissioner.run.archive.catalogue import summarise
+from commissioner.run.archive.folder import RunFolder, plain, read_blocks, read_journal, write_recording
+
+
+def _block(first: int, count: int = 29, *, lost: int = 0, with_w: bool = True) -> SampleBlock:
+    k = first + np.arange(count, dtype=float)
+    return SampleBlock(
+        session=3,
+        first_index=first,
+        sample_period_s=2e-4,
+        axis_deg=60.0,
+        voltage_axis_v=np.sin(k),
+        current_u_a=np.cos(k),
+        current_v_a=-np.cos(k) / 2,
+        current_w_a=-np.cos(k) / 2 if with_w else None,
+        dc_link_v=540.0,
+        lost_before=lost,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = RunFolder.create(tmp_path / "runs", "test")
+    yield made
+    made.close()
+
+
+def test_run_folder_is_readable_by_its_owner_only(folder):
+    assert stat.S_IMODE(folder.path.stat().st_mode) == 0o700
+
+
+def test_two_runs_in_one_second_get_two_folders(tmp_path):
+    made = [RunFolder.create(tmp_path, "x") for _ in range(3)]
+    assert len({m.path for m in made}) == 3
+    for m in made:
+        m.close()
+
+
+def test_every_sample_comes_back_bit_for_bit(folder):
+    folder.append(_block(0), 0)
+    folder.append(_block(29, with_w=False), 0)
+    blocks = list(read_blocks(folder.path / "blocks.bin"))
+    assert [segment for segment, _ in blocks] == [0, 0]
+    assert np.array_equal(blocks[0][1].current_u_a, _block(0).current_u_a)
+    assert blocks[1][1].current_w_a is None
+
+
+@pytest.mark.parametrize("cut", [1, 5, 12, 40, 300, 900])
+def test_a_torn_last_block_is_left_out_and_the_rest_is_whole(folder, cut):
+    for n in range(3):
+        folder.append(_block(29 * n), 0)
+    path = folder.path / "blocks.bin"
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert [b.first_index for _, b in read_blocks(path)] == [0, 29]
+
+
+def test_a_flipped_bit_ends_the_reading_instead_of_giving_wrong_samples(folder):
+    for n in range(2):
+        folder.append(_block(29 * n), 0)
+    path = folder.path / "blocks.bin"
+    data = bytearray(path.read_bytes())
+    data[-100] ^= 1
+    path.write_bytes(data)
+    assert len(list(read_blocks(path))) == 1
+
+
+def test_lost_samples_are_missing_rows_in_the_recording(folder):
+    folder.append(_block(0, 10), 0)
+    folder.append(_block(15, 10, lost=5), 0)
+    folder.append(_block(0, 10), 1)
+    target = write_recording(folder.path, {"sample_period_s": 2e-4, "connection": "star"})
+    recording = to_standstill(read_table(target))
+    steps = np.round(np.diff(recording.time_s) / 2e-4).astype(int)
+    assert steps.tolist() == [1] * 9 + [6] + [1] * 19
+    assert recording.segment.tolist() == [0] * 20 + [1] * 10
+
+
+def test_journal_survives_a_torn_line(folder):
+    folder.journal("a", {"x": 1.0}, durable=True)
+    folder.journal("b", {"x": float("nan")})
+    path = folder.path / "journal.jsonl"
+    path.write_text(path.read_text() + '{"n": 2, "ki')
+    records = read_journal(path)
+    assert [r["kind"] for r in records] == ["a", "b"]
+    assert records[1]["record"] == {"x": None}
+
+
+def test_json_never_holds_nan_or_arrays():
+    assert (
+        json.dumps(plain({"a": np.array([1.0, np.inf]), "b": np.float64(2)}), allow_nan=False)
+        == '{"a": [1.0, null], "b": 2.0}'
+    )
+
+
+def test_what_is_added_after_a_torn_line_can_be_read(folder):
+    folder.journal("a", 1)
+    folder.close()
+    path = folder.path / "journal.jsonl"
+    path.write_text(path.read_text() + '{"n": 1, "ki')
+    again = RunFolder(folder.path)
+    again.journal("b", 2)
+    again.close()
+    assert [(r["n"], r["kind"]) for r in read_journal(path)] == [(0, "a"), (1, "b")]
+
+
+def intent(action):
+    return {"action": action, "values": {}}
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ([], "as before"),
+        ([("about_to", intent("energise"))], "as before"),
+        ([("about_to", intent("stage"))], "old or new"),
+        ([("about_to", intent("commit")), ("parameters_written", {})], "new"),
+        ([("about_to", intent("store")), ("snapshot_restored", {})], "as before (restored)"),
+        ([("about_to", intent("store")), ("parameters_written", {}), ("about_to", intent("stage"))], "old or new"),
+        ([("parameters_written", {}), ("about_to", intent("stage")), ("snapshot_restored", {})], "as before (rest"),
+        (
+            [("parameters_written", {"store_count_after": 18, "endurance_writes": 100000})],
+            "new, read back and stored; 18 of 100000 writes",
+        ),
+    ],
+)
+def test_the_last_word_of_the_journal_says_which_parameters_the_drive_holds(folder, lines, says):
+    for kind, record in lines:
+        folder.journal(kind, record)
+    assert summarise(folder.path).written.startswith(says)
+
+
+@pytest.mark.parametrize("mark", [": ", ":", " = ", "="])
+def test_a_comment_with_an_equals_sign_is_a_value_too(tmp_path, mark):
+    path = tmp_path / "a.csv"
+    path.write_text(
+        f"# rated_current_a{mark}5.2\n# note{mark}at 20:15, R=3\n# nothing\ntime_s,current_u_a\n0,1\n0.001,2\n"
+    )
+    metadata = read_table(path).metadata
+    assert metadata["rated_current_a"] == 5.2 and metadata["note"] == "at 20:15, R=3"
