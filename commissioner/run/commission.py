@@ -27,9 +27,9 @@ from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
-from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Course, Present, Runner, kind_of
-from commissioner.run.stop_file import stopped_by_file
+from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stopping.stop_file import stopped_by_file
 
 BUSY = 3.0
 """The closing diagnosis may take this much longer on a computer that does something else as well."""

@@ -19,7 +19,7 @@ from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
-from commissioner.run.operator_stop import OperatorStop, StopAsked
+from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
 from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status

@@ -65,8 +65,8 @@ class Library:
 
     def add_drive(self, table: DriveTable) -> Drive:
         """Check and keep. UsageError: address or drive file cannot be right, or the id is taken."""
-        from commissioner.link.drive_file import load_profile
-        from commissioner.link.url import parse_url
+        from commissioner.link.files.drive_file import load_profile
+        from commissioner.link.wire.url import parse_url
 
         _must_be_new([d.id for d in self.drives()], table.id)
         parse_url(table.url)

@@ -10,7 +10,7 @@ from commissioner.link.drive.facts import DisarmReport, WriteReport
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import SafetyFacts

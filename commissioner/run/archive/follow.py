@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.records import SampleBlock
-from commissioner.run.archive import read_document, read_next_block
+from commissioner.run.archive.folder import read_document, read_next_block
 
 
 class JournalFollower:

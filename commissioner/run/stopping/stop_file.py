@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from commissioner.run.archive import read_document
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.archive.folder import read_document
+from commissioner.run.stopping.operator_stop import OperatorStop
 
 NAME = "stop.json"
 EVERY_S = 0.02

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from commissioner.errors import Aborted
-from commissioner.run.archive import read_document
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.archive.folder import read_document
+from commissioner.run.stopping.operator_stop import OperatorStop
 
 BEAT_S, SILENCE_S = 0.5, 2.0
 """Between two beats; no beat for SILENCE_S ends the run."""
