@@ -94,6 +94,13 @@ def run(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
+    dead_man: Annotated[
+        bool,
+        typer.Option(
+            "--dead-man",
+            help="Held by a service: standard input says begin, beats, says stop; its end or 2 s of silence mean zero volts.",
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
@@ -110,6 +117,7 @@ def run(
         runs=runs,
         as_json=json,
         diagnosis=diagnosis,
+        dead_man=dead_man,
     )
 
 
