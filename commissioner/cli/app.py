@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from commissioner.cli.console import degrade_output
 from commissioner.cli.failures import run_to_exit
 
 app = typer.Typer(
@@ -288,6 +289,15 @@ def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     replay_run(runs, run, as_json=json)
 
 
+@app.command()
+def ports(json: Json = False) -> None:
+    """The serial adapters of this computer, each with its --drive URL. Opens none."""
+    from commissioner.cli.verbs.ports import ports as verb
+
+    verb(as_json=json)
+
+
 def main() -> None:
     """Entry point of the console script."""
+    degrade_output()
     run_to_exit(app, sys.argv[1:])

@@ -5,9 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import termios
 import time
-import tty
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -146,6 +144,8 @@ class Line:
 
     def open_pty(self) -> None:
         """A pseudo terminal: ours is the master side, the path of the other is `address`."""
+        import tty  # pseudo terminals are POSIX's
+
         self.server = self.make()
         self.pty_master, slave = os.openpty()
         tty.setraw(slave)
@@ -155,6 +155,8 @@ class Line:
         self._attach_pty()
 
     def _attach_pty(self) -> None:
+        import termios
+
         termios.tcflush(self.pty_master, termios.TCIFLUSH)
         handler = Handler(self.server, self)
         transport = PtyTransport(self.pty_master, handler)

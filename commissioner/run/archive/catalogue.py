@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import UsageError
-from commissioner.report.run.summary import ACCEPTED, RESTORED_SINCE
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.folder import read_document, read_journal
 
 RESTORED, OLD_OR_NEW = "as before (restored)", "old or new"

@@ -1,4 +1,4 @@
-"""What the operator's Ctrl-C, a closed terminal, the system's SIGTERM, or a word from the service means to a run."""
+"""What the operator's Ctrl-C or Ctrl-Break, a closed terminal, the system's SIGTERM, or a word from the service means to a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
 
 
 @dataclass(frozen=True)
