@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from contextlib import closing
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageErr
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
-from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
@@ -76,14 +76,14 @@ class _Ready:
 def plan_write_back(run: RunSummary, url: str | None) -> Plan:
     """What writing this run's result would change. Reads the drive, changes nothing."""
     ready, circuit = _ready(run, url), _circuit(run)
-    with _drive(ready) as (_, inverter):
+    with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.plate).values)
 
 
 def plan_restore(run: RunSummary, url: str | None) -> Plan:
     """What restoring the set this run found would change. Reads the drive, changes nothing."""
     ready = _ready(run, url)
-    with _drive(ready) as (_, inverter):
+    with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
 
 
@@ -177,20 +177,12 @@ def _check_bounds(circuit: InverseGamma, plate: Nameplate) -> None:
         )
 
 
-class _drive:
+@contextmanager
+def _drive(ready: _Ready) -> Iterator[Inverter]:
     """The drive, open for reading."""
-
-    def __init__(self, ready: _Ready) -> None:
-        self._ready = ready
-
-    def __enter__(self) -> tuple[ModbusPort, Inverter]:
-        self._port = open_port(
-            parse_url(self._ready.url), self._ready.profile, reply_timeout_s=REPLY_TIMEOUT_S
-        )
-        return self._port, Inverter(self._port, self._ready.profile)
-
-    def __exit__(self, *_: object) -> None:
-        self._port.close()
+    port = open_port(parse_url(ready.url), ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
+    with closing(port):
+        yield Inverter(port, ready.profile)
 
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
