@@ -91,15 +91,16 @@ def commission(
     order = Order(url, profile, nameplate, plan, write_back)
     findings = Findings()
     folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
-    with closing(folder), stop or OperatorStop() as stop, stopped_by_file(folder.path, stop):
+    asked = OperatorStop() if stop is None else stop
+    with closing(folder), asked, stopped_by_file(folder.path, asked):
         begun(folder.path)
         _tell(folder, present, WarmingUp())
         warm_up(nameplate)
-        ended = carry_out(order, folder, findings, present, course, "job", stop)
+        ended = carry_out(order, folder, findings, present, course, "job", asked)
         result = close_run(order, folder, findings, ended)
-        if diagnosis_s > 0.0 and findings.identification is not None and not stop.asked:
+        if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
             _tell(folder, present, Diagnosing(diagnosis_s))
-            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, stop))
+            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
             note(folder, "diagnosed", {"verdict": result["diagnosis"]["verdict"]})
     return Commissioned(ended, folder.path, result)
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from fastapi import FastAPI
 from starlette.middleware import Middleware
+from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
-from starlette.responses import Response
 
 from commissioner.service import problems
 from commissioner.service.access.gate import Gate
@@ -43,14 +43,19 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
             await parts.simulator.close()
 
     app = FastAPI(
-        title="commissioner", version=version("commissioner"), lifespan=lifetime, docs_url=None, redoc_url=None,
+        title="commissioner",
+        version=version("commissioner"),
+        lifespan=lifetime,
+        docs_url=None,
+        redoc_url=None,
         responses=problems.RESPONSES,
         middleware=[
             Middleware(Gate, host_names=parts.settings.host_names(), uploads=("/api/recordings", "/recordings")),
         ],
     )
     app.state.parts, app.state.url = parts, url
-    problems.install(app)
+    problems.install(app, views.answer)
+    views.install(app)
     for router in all_routers():
         app.include_router(router)
     app.include_router(views.router, include_in_schema=False)
@@ -65,5 +70,3 @@ class _Static(StaticFiles):
         response = await super().get_response(path, scope)
         response.headers["cache-control"] = "no-cache"
         return response
-
-

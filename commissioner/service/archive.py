@@ -62,8 +62,14 @@ class Archive:
         """Refusal 404 where there is none of this id."""
         entry = self._entry(run) if _is_name(run) else None
         if entry is None:
-            raise Refusal(404, f"there is no run {run[:80]}", step="archive", value=run[:80], limit="a run of this archive",
-                          remedy="GET /api/runs lists them")
+            raise Refusal(
+                404,
+                f"there is no run {run[:80]}",
+                step="archive",
+                value=run[:80],
+                limit="a run of this archive",
+                remedy="GET /api/runs lists them",
+            )
         return entry
 
     def summary(self, run: str) -> RunSummary:
@@ -76,8 +82,15 @@ class Archive:
         document = read_document(path.read_text("utf-8", "replace")) if path.is_file() else {}
         if document:
             return document
-        return {"run": entry.run, "outcome": entry.outcome, "reason": entry.reason, "energised_s": entry.energised_s,
-                "parameters": None, "written": [], "holds": entry.written}
+        return {
+            "run": entry.run,
+            "outcome": entry.outcome,
+            "reason": entry.reason,
+            "energised_s": entry.energised_s,
+            "parameters": None,
+            "written": [],
+            "holds": entry.written,
+        }
 
     def request(self, run: str) -> dict[str, Any]:
         """What the run was asked to do."""
@@ -88,8 +101,14 @@ class Archive:
         """A file of the run. Refusal 404 where the run left none of this name."""
         path = self.find(run).folder / name
         if not path.is_file():
-            raise Refusal(404, f"{run} has no {name}", step="archive", value=name, limit="a file of this run",
-                          remedy="a run makes it at its end; a run that was cut off may lack it")
+            raise Refusal(
+                404,
+                f"{run} has no {name}",
+                step="archive",
+                value=name,
+                limit="a file of this run",
+                remedy="a run makes it at its end; a run that was cut off may lack it",
+            )
         return path
 
     def _names(self) -> list[str]:
@@ -123,9 +142,20 @@ def _read_entry(folder: Path) -> Entry:
     origin, plate = asked.get("origin") or {}, asked.get("nameplate") or {}
     parameters = (summary.result or {}).get("parameters")
     return Entry(
-        summary.run, _utc_of(summary.run), str(origin.get("motor", "")), _plate_text(plate), summary.drive,
-        str(origin.get("person", "")), summary.outcome, summary.standing, summary.reason, summary.energised_s, summary.written,
-        parameters if isinstance(parameters, dict) else None, (summary.result or {}).get("holds_for_stator_flux_wb"), folder,
+        summary.run,
+        _utc_of(summary.run),
+        str(origin.get("motor", "")),
+        _plate_text(plate),
+        summary.drive,
+        str(origin.get("person", "")),
+        summary.outcome,
+        summary.standing,
+        summary.reason,
+        summary.energised_s,
+        summary.written,
+        parameters if isinstance(parameters, dict) else None,
+        (summary.result or {}).get("holds_for_stator_flux_wb"),
+        folder,
     )
 
 
@@ -154,7 +184,9 @@ def _plate_text(plate: Mapping[str, Any]) -> str:
 
 
 def _is_name(name: str) -> bool:
-    return 0 < len(name) < 200 and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name
+    return (
+        0 < len(name) < 200 and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name
+    )
 
 
 def _mtime(path: Path) -> int:

@@ -48,7 +48,7 @@ class Audit:
             entry = {"n": self._number, "utc": when, "person": person, "from": address, "what": what, **facts}
             digest = _digest(self._head, entry)
             line = json.dumps(entry | {"before": self._head, "hash": digest}, ensure_ascii=False) + "\n"
-            with open(self._path, "a", encoding="utf-8") as file:
+            with Path(self._path).open("a", encoding="utf-8") as file:
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())
@@ -95,5 +95,5 @@ def _entries(path: Path) -> Iterator[dict[str, Any]]:
 def _end_last_line(path: Path) -> None:
     """What a power loss left of a last line stays, as a line of its own that cannot be read."""
     if path.is_file() and path.stat().st_size and not path.read_bytes().endswith(b"\n"):
-        with open(path, "ab") as file:
+        with Path(path).open("ab") as file:
             file.write(b"\n")

@@ -121,7 +121,11 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
         return {"ok": False, "fields": fields, "efficiency": None, "questions": []}
     plate = Nameplate(**table.model_dump(exclude={"name"}))
     for contradiction in check(plate):
-        fields[contradiction.key] = {"ok": False, "what": "contradicts the rest of the plate", "remedy": contradiction.expected}
+        fields[contradiction.key] = {
+            "ok": False,
+            "what": "contradicts the rest of the plate",
+            "remedy": contradiction.expected,
+        }
     efficiency = efficiency_of(plate)
     return {
         "ok": all(field["ok"] for field in fields.values()), "fields": fields, "efficiency": round(efficiency, 4),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -78,43 +79,43 @@ def respond(refusal: Refusal) -> Response:
     )
 
 
-def install(app: FastAPI) -> None:
+def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> None:
     """Every way a request can fail, answered in one form."""
 
-    @app.exception_handler(Refusal)
-    async def refused(_request: Request, refusal: Refusal) -> Response:
-        return respond(refusal)
-
-    @app.exception_handler(CommissionerError)
-    async def failed(_request: Request, error: CommissionerError) -> Response:
-        return respond(refusal_of(error))
-
     @app.exception_handler(RequestValidationError)
-    async def invalid(_request: Request, error: RequestValidationError) -> Response:
+    async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
         unreadable = first["type"] == "json_invalid"
-        return respond(
+        return answer(
+            request,
             Refusal(
-                400 if unreadable else 422, f"{where or 'the body'} cannot be used", detail=str(first["msg"]),
-                step="read the request", value=_shown(first.get("input")), limit=str(first["msg"]),
+                400 if unreadable else 422,
+                f"{where or 'the body'} cannot be used",
+                detail=str(first["msg"]),
+                step="read the request",
+                value=_shown(first.get("input")),
+                limit=str(first["msg"]),
                 remedy=f"correct {where or 'the body'}; /openapi.json describes it",
-            )  # fmt: skip
+            ),
         )
 
     @app.exception_handler(HTTPException)
-    async def plain(_request: Request, error: HTTPException) -> Response:
+    async def plain(request: Request, error: HTTPException) -> Response:
         title = {404: "there is no such page or route", 405: "this method is not offered here"}.get(
             error.status_code, str(error.detail)
         )
         headers = dict(error.headers or {})
-        return respond(
-            Refusal(error.status_code, title, headers=headers, step="route", remedy="/openapi.json lists what there is")
+        return answer(
+            request,
+            Refusal(
+                error.status_code, title, headers=headers, step="route", remedy="/openapi.json lists what there is"
+            ),
         )
 
 
 def _shown(value: Any) -> Any:
     """A value that fits into JSON and onto a screen."""
-    if isinstance(value, bool | int | type(None)) or (isinstance(value, float) and value == value and abs(value) < 1e300):
+    if isinstance(value, bool | int | type(None)) or (isinstance(value, float) and math.isfinite(value)):
         return value
     return str(value)[:200]

@@ -50,8 +50,14 @@ class Job:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "id": self.id, "verb": self.verb, "files": self.files, "begun_utc": self.begun_utc, "is_done": self.is_done,
-            "exit_code": self.exit_code, "result": self.document, "problem": self.failure,
+            "id": self.id,
+            "verb": self.verb,
+            "files": self.files,
+            "begun_utc": self.begun_utc,
+            "is_done": self.is_done,
+            "exit_code": self.exit_code,
+            "result": self.document,
+            "problem": self.failure,
             "report": f"/api/recordings/{self.id}/report" if self.report else None,
         }
 
@@ -68,15 +74,27 @@ class Recordings:
         """Refusal 404 where there is none."""
         job = self._jobs.get(identifier)
         if job is None:
-            raise Refusal(404, "there is no such recording", step="recordings", value=identifier[:60],
-                          limit="one that was uploaded since the service began", remedy="upload it again")
+            raise Refusal(
+                404,
+                "there is no such recording",
+                step="recordings",
+                value=identifier[:60],
+                limit="one that was uploaded since the service began",
+                remedy="upload it again",
+            )
         return job
 
     async def take(self, verb: str, motor: str | None, uploads: AsyncIterator[tuple[str, AsyncIterator[bytes]]]) -> Job:
         """Keep the files and begin. Refusal: no file, a kind that no importer reads, or one that is too large."""
         if verb not in VERBS:
-            raise Refusal(422, "there is no such verb", step="recordings", value=verb[:40], limit=", ".join(VERBS),
-                          remedy="choose identify, diagnose or monitor")
+            raise Refusal(
+                422,
+                "there is no such verb",
+                step="recordings",
+                value=verb[:40],
+                limit=", ".join(VERBS),
+                remedy="choose identify, diagnose or monitor",
+            )
         job = Job(secrets.token_hex(8), verb, [], self._root)  # type: ignore[arg-type]
         job.folder = self._root / job.id
         job.folder.mkdir(parents=True, mode=0o700)
@@ -84,7 +102,9 @@ class Recordings:
             async for name, pieces in uploads:
                 job.files.append(await _keep(job.folder, name, pieces))
             if not job.files:
-                raise Refusal(422, "no file came", step="recordings", value=0, limit="at least one file", remedy="choose a file")
+                raise Refusal(
+                    422, "no file came", step="recordings", value=0, limit="at least one file", remedy="choose a file"
+                )
         except BaseException:
             shutil.rmtree(job.folder, ignore_errors=True)
             raise
@@ -104,7 +124,9 @@ class Recordings:
 
     async def _work(self, job: Job, motor: str | None) -> None:
         out = job.folder / "out"
-        files = [str(job.folder / name) for name in job.files if not name.lower().endswith(".dat")] or [str(job.folder / job.files[0])]
+        files = [str(job.folder / name) for name in job.files if not name.lower().endswith(".dat")] or [
+            str(job.folder / job.files[0])
+        ]
         arguments = [job.verb, *(files if job.verb != "monitor" else files[:1]), "--json"]
         arguments += ["--motor", motor] if motor else []
         arguments += ["--out", str(out)] if job.verb != "identify" else []
@@ -130,15 +152,27 @@ async def _keep(folder: Path, name: str, pieces: AsyncIterator[bytes]) -> str:
     """The file under a harmless form of its name, which is returned."""
     safe = re.sub(r"[^\w.\-]", "_", Path(name.replace("\\", "/")).name)[-100:].lstrip(".") or "recording"
     if not safe.lower().endswith(ENDINGS):
-        raise Refusal(415, f"{safe} is no recording", step="recordings", value=safe, limit=", ".join(ENDINGS),
-                      remedy="give CSV, Parquet, MATLAB 5, TDMS, MDF 4 or COMTRADE")
+        raise Refusal(
+            415,
+            f"{safe} is no recording",
+            step="recordings",
+            value=safe,
+            limit=", ".join(ENDINGS),
+            remedy="give CSV, Parquet, MATLAB 5, TDMS, MDF 4 or COMTRADE",
+        )
     size, path = 0, folder / safe
     with path.open("xb") as file:
         async for piece in pieces:
             size += len(piece)
             if size > LARGEST:
-                raise Refusal(413, f"{safe} is too large", step="recordings", value=f"more than {LARGEST} bytes",
-                              limit=f"{LARGEST} bytes", remedy="cut the recording, or use the command line")
+                raise Refusal(
+                    413,
+                    f"{safe} is too large",
+                    step="recordings",
+                    value=f"more than {LARGEST} bytes",
+                    limit=f"{LARGEST} bytes",
+                    remedy="cut the recording, or use the command line",
+                )
             await asyncio.to_thread(file.write, piece)
     return safe
 

@@ -23,9 +23,19 @@ def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> Non
     app = create_app(parts, url=url, ready=lambda: ready(url))
     tls = settings.file.tls
     config = uvicorn.Config(
-        app, ws="websockets-sansio", log_level="warning", access_log=False, server_header=False, date_header=True,
-        ssl_certfile=tls.certificate if tls else None, ssl_keyfile=tls.key if tls else None,
-        ws_ping_interval=1.0, ws_ping_timeout=2.0, ws_max_size=65536, timeout_graceful_shutdown=8, timeout_keep_alive=20,
+        app,
+        ws="websockets-sansio",
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        date_header=True,
+        ssl_certfile=tls.certificate if tls else None,
+        ssl_keyfile=tls.key if tls else None,
+        ws_ping_interval=1.0,
+        ws_ping_timeout=2.0,
+        ws_max_size=65536,
+        timeout_graceful_shutdown=8,
+        timeout_keep_alive=20,
     )
     _Server(config, parts.closing.set).run(sockets=[listening])
 
@@ -48,7 +58,10 @@ def _listen(host: str, port: int) -> socket.socket:
         listening = socket.create_server((host.strip("[]"), port), family=family, backlog=256)
     except OSError as failure:
         raise UsageError(
-            f"nothing can listen on {host}:{port}: {failure.strerror or failure}", step="serve", value=f"{host}:{port}",
-            limit="a free port of this computer", remedy="give another --port; 0 picks a free one",
+            f"nothing can listen on {host}:{port}: {failure.strerror or failure}",
+            step="serve",
+            value=f"{host}:{port}",
+            limit="a free port of this computer",
+            remedy="give another --port; 0 picks a free one",
         ) from failure
     return listening

@@ -82,6 +82,6 @@ class Simulator:
             process.terminate()
         try:
             await asyncio.wait_for(process.wait(), 5)
-        except (TimeoutError, asyncio.TimeoutError):
+        except TimeoutError:
             process.kill()
             await process.wait()

@@ -31,9 +31,7 @@ def serve(*, host: str, port: int, config: Path | None, open_page: bool, runs: P
     serve_until_stopped(load_settings(config, host=host, port=port, runs=runs), ready)
 
 
-def add(
-    name: str, *, role: str, password_file: Path | None, config: Path | None, runs: Path, as_json: bool
-) -> None:
+def add(name: str, *, role: str, password_file: Path | None, config: Path | None, runs: Path, as_json: bool) -> None:
     """A new account; the password from a file or a prompt."""
     from commissioner.service.access.accounts import Role
 

@@ -85,7 +85,9 @@ class Accounts:
 
     def _save(self) -> None:
         self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        rows = [{"name": a.name, "role": a.role.name.lower(), "password": a.password_hash} for a in self._known.values()]
+        rows = [
+            {"name": a.name, "role": a.role.name.lower(), "password": a.password_hash} for a in self._known.values()
+        ]
         part = self._path.with_name(self._path.name + ".part")
         with open(part, "w", encoding="utf-8", opener=lambda path, flags: os.open(path, flags, 0o600)) as file:
             json.dump({"accounts": rows}, file, indent=1)

@@ -47,7 +47,10 @@ class Gate:
         if scope["type"] == "http" and scope["method"] in SAFE:
             return None
         origin, site = headers.get("origin"), headers.get("sec-fetch-site", "none")
-        if (origin is not None and urlsplit(origin).netloc.lower() != host.lower()) or site not in ("same-origin", "none"):
+        if (origin is not None and urlsplit(origin).netloc.lower() != host.lower()) or site not in (
+            "same-origin",
+            "none",
+        ):
             return _refused(403, "the request comes from another site's page", origin or site, f"a page of {host}")
         if scope["type"] == "websocket":
             return None
@@ -64,7 +67,9 @@ def _name_of(host: str) -> str:
 
 
 def _refused(status: int, title: str, value: str, limit: str) -> Refusal:
-    return Refusal(status, title, step="gate", value=value[:200], limit=limit, remedy="open the page from the service itself")
+    return Refusal(
+        status, title, step="gate", value=value[:200], limit=limit, remedy="open the page from the service itself"
+    )
 
 
 def _with_headers(send: Send) -> Send:

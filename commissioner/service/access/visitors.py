@@ -75,7 +75,9 @@ def check_role(who: Visitor, role: Role) -> None:
     """Refusal 401 where nobody is logged in, 403 where the role is not enough."""
     facts: dict[str, Any] = {"step": "access", "limit": f"role {role.name.lower()}"}
     if who.role is None:
-        raise Refusal(401, "nobody is logged in", value=None, remedy="log in: POST /api/login, or the page /login", **facts)
+        raise Refusal(
+            401, "nobody is logged in", value=None, remedy="log in: POST /api/login, or the page /login", **facts
+        )
     if not who.may(role):
         remedy = "ask somebody whose account has the role"
         raise Refusal(403, "this needs another role", value=f"role {who.role.name.lower()}", remedy=remedy, **facts)

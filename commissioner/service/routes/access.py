@@ -39,15 +39,28 @@ async def log_in(request: Request, credentials: Credentials) -> Session:
     keys = (f"address {address}", f"name {credentials.name}")
     wait_s = max(parts.login_tries.wait_s(key) for key in keys)
     if wait_s > 0.0:
-        raise Refusal(429, "too many wrong passwords", step="log in", value=f"{wait_s:.0f} s to wait", limit="5 a minute",
-                      remedy="wait, then try again", headers={"retry-after": str(int(wait_s) + 1)})
+        raise Refusal(
+            429,
+            "too many wrong passwords",
+            step="log in",
+            value=f"{wait_s:.0f} s to wait",
+            limit="5 a minute",
+            remedy="wait, then try again",
+            headers={"retry-after": str(int(wait_s) + 1)},
+        )
     for key in keys:
         parts.login_tries.count(key)
     account = await asyncio.to_thread(parts.accounts.verify, credentials.name, credentials.password)
     if account is None:
         await asyncio.to_thread(parts.audit.write, credentials.name[:40], address, "log-in refused")
-        raise Refusal(401, "name or password is wrong", step="log in", value=credentials.name[:40],
-                      limit="an account and its password", remedy="try again; `commissioner accounts list` shows the names")
+        raise Refusal(
+            401,
+            "name or password is wrong",
+            step="log in",
+            value=credentials.name[:40],
+            limit="an account and its password",
+            remedy="try again; `commissioner accounts list` shows the names",
+        )
     for key in keys:
         parts.login_tries.forget(key)
     old = visitor_of(request).session

@@ -38,12 +38,24 @@ async def checks(request: Request, wish: CheckWish, _who: Operator) -> dict[str,
 async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> dict[str, Any]:
     """The document of `commissioner check`, with the time it was made. Refusal: a run has the drive, or it is silent."""
     if not drive.url:
-        raise Refusal(409, "the simulator is not running", step="check", value=drive.id, limit="a drive with an address",
-                      remedy="start the simulator first")
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="check",
+            value=drive.id,
+            limit="a drive with an address",
+            remedy="start the simulator first",
+        )
     live = parts.desk.live_on(drive.id)
     if live is not None or parts.desk.is_starting(drive.id):
-        raise Refusal(409, f"{drive.name} is in use by a run", step="check", value=live.id if live else "starting",
-                      limit="no run on this drive", remedy="wait for its end, or stop it")
+        raise Refusal(
+            409,
+            f"{drive.name} is in use by a run",
+            step="check",
+            value=live.id if live else "starting",
+            limit="no run on this drive",
+            remedy="wait for its end, or stop it",
+        )
     watch, log = parts.desk.watch(drive), parts.desk.log("check", drive.id)
     await asyncio.to_thread(watch.pause)
     try:

@@ -60,7 +60,13 @@ async def stop_runs(connection: HTTPConnection, reason: str, how: str, run: str 
         with contextlib.suppress(OSError):
             named = ", ".join(one.run for one in stopped) or "nothing was running"
             await asyncio.to_thread(
-                parts.audit.write, person, who.address, "STOP", by=how, run=named, reason=reason,
+                parts.audit.write,
+                person,
+                who.address,
+                "STOP",
+                by=how,
+                run=named,
+                reason=reason,
                 zero_volts=all(one.zero_volts for one in stopped),
             )
     return stopped
@@ -72,7 +78,14 @@ async def stop(request: Request, run: str, wish: StopWish | None = None) -> dict
     parts = parts_of(request)
     if run not in parts.desk.runs:
         parts.archive.find(run)
-        return {"run": run, "asked_utc": None, "zero_volts": True, "confirmed_utc": None, "after_s": 0.0, "state": "ended before"}
+        return {
+            "run": run,
+            "asked_utc": None,
+            "zero_volts": True,
+            "confirmed_utc": None,
+            "after_s": 0.0,
+            "state": "ended before",
+        }
     stopped = await stop_runs(request, wish.reason if wish else "", "POST", run)
     _check_confirmed(stopped)
     return asdict(stopped[0])
@@ -100,8 +113,12 @@ def _check_confirmed(stopped: list[Stopped]) -> None:
     silent = [one for one in stopped if not one.zero_volts]
     if silent:
         raise Refusal(
-            502, "STOP was sent; the drive has not confirmed that its output is off", step="stop", value=silent[0].state or "no word",
-            limit="a status that says so", remedy="take the motor as live: use the emergency stop, then isolate the drive's supply",
+            502,
+            "STOP was sent; the drive has not confirmed that its output is off",
+            step="stop",
+            value=silent[0].state or "no word",
+            limit="a status that says so",
+            remedy="take the motor as live: use the emergency stop, then isolate the drive's supply",
         )
 
 
@@ -123,8 +140,12 @@ def change_control(parts: Parts, drive: str, do: str, party: Party) -> dict[str,
     elif do in ("grant", "refuse"):
         held.answer(party, grants=do == "grant")
     asking = held.asking
-    return {"holder": held.holder.person if held.holder else None, "asking": asking.person if asking else None,
-            "you": held.is_held_by(party), "wait_s": round(held.wait_s, 1)}
+    return {
+        "holder": held.holder.person if held.holder else None,
+        "asking": asking.person if asking else None,
+        "you": held.is_held_by(party),
+        "wait_s": round(held.wait_s, 1),
+    }
 
 
 @router.websocket("/api/runs/{run}/control")

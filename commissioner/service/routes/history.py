@@ -31,8 +31,14 @@ async def compared(parts: Parts, a: str, b: str) -> dict[str, Any]:
     """What `commissioner runs compare` says of the two, the earlier one first."""
     first, second = sorted((parts.archive.find(a).run, parts.archive.find(b).run))
     if first == second:
-        raise Refusal(422, "a run cannot be compared with itself", step="compare", value=first, limit="two runs",
-                      remedy="choose another one")
+        raise Refusal(
+            422,
+            "a run cannot be compared with itself",
+            step="compare",
+            value=first,
+            limit="two runs",
+            remedy="choose another one",
+        )
     if (first, second) not in _compared:
         log = parts.desk.log("compare")
         arguments = ["runs", "compare", first, second, "--runs", str(parts.archive.root), "--json"]
@@ -54,7 +60,9 @@ async def trend(request: Request, motor: str, _who: Viewer) -> dict[str, Any]:
 
 def trend_of(parts: Parts, motor: str) -> dict[str, Any]:
     """The points, and of each parameter the change from the first to the last in units of their joint standard error."""
-    entries = [e for e in parts.archive.list(limit=1000) if e.motor == motor and e.parameters and e.outcome == "commissioned"]
+    entries = [
+        e for e in parts.archive.list(limit=1000) if e.motor == motor and e.parameters and e.outcome == "commissioned"
+    ]
     points = [_point(entry) for entry in reversed(entries)]
     changes = {name: _change(points, name) for name in PARAMETERS} if len(points) > 1 else {}
     return {"motor": motor, "points": points, "changes": changes}

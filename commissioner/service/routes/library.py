@@ -60,8 +60,14 @@ async def drive_state(request: Request, drive: str, _who: Viewer) -> dict[str, A
     parts = parts_of(request)
     found = _drive(parts.library, drive)
     if not found.url:
-        raise Refusal(409, "the simulator is not running", step="drive", value=drive, limit="a drive with an address",
-                      remedy="POST /api/simulator starts it")
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="drive",
+            value=drive,
+            limit="a drive with an address",
+            remedy="POST /api/simulator starts it",
+        )
     watch = parts.desk.watch(found)
     watch.want()
     live = parts.desk.live_on(found.id)
@@ -72,7 +78,11 @@ async def drive_state(request: Request, drive: str, _who: Viewer) -> dict[str, A
 async def motors(request: Request, _who: Viewer) -> dict[str, Any]:
     """All motors with their plates."""
     found = parts_of(request).library.motors()
-    return {"motors": [{"id": m.id, "name": m.name, "origin": m.origin, "nameplate": plate_document(m.plate)} for m in found]}
+    return {
+        "motors": [
+            {"id": m.id, "name": m.name, "origin": m.origin, "nameplate": plate_document(m.plate)} for m in found
+        ]
+    }
 
 
 @router.post("/api/motors", status_code=201)
@@ -108,11 +118,23 @@ async def start_simulator(request: Request, scenario: str, who: Visitor) -> dict
     """The simulator's drive. Refusal where a run has it."""
     parts = parts_of(request)
     if scenario not in SCENARIOS:
-        raise Refusal(422, "there is no such scenario", step="simulator", value=scenario[:40], limit=", ".join(SCENARIOS),
-                      remedy="choose one of these")
+        raise Refusal(
+            422,
+            "there is no such scenario",
+            step="simulator",
+            value=scenario[:40],
+            limit=", ".join(SCENARIOS),
+            remedy="choose one of these",
+        )
     if parts.desk.live_on(SIMULATOR) or parts.desk.is_starting(SIMULATOR):
-        raise Refusal(409, "the simulator is in use", step="simulator", value="a run goes on", limit="no run",
-                      remedy="wait for its end, or stop it")
+        raise Refusal(
+            409,
+            "the simulator is in use",
+            step="simulator",
+            value="a run goes on",
+            limit="no run",
+            remedy="wait for its end, or stop it",
+        )
     is_new = not parts.simulator.is_running or parts.simulator.scenario != scenario
     await parts.simulator.start(scenario)
     if is_new:
@@ -126,4 +148,6 @@ def _drive(library: Any, identifier: str) -> Any:
     try:
         return library.drive(identifier)
     except UsageError as error:
-        raise Refusal(404, error.what, step=error.step, value=error.value, limit=error.limit, remedy=error.remedy) from None
+        raise Refusal(
+            404, error.what, step=error.step, value=error.value, limit=error.limit, remedy=error.remedy
+        ) from None

@@ -61,6 +61,12 @@ async def report(request: Request, recording: str, _who: Viewer) -> Response:
     """The report with its pictures, as one HTML file."""
     path = parts_of(request).recordings.find(recording).report
     if path is None:
-        raise Refusal(404, "there is no report of this recording", step="recordings", value=recording[:60],
-                      limit="a verb that is done and makes one", remedy="wait, or look at the result")
+        raise Refusal(
+            404,
+            "there is no report of this recording",
+            step="recordings",
+            value=recording[:60],
+            limit="a verb that is done and makes one",
+            remedy="wait, or look at the result",
+        )
     return FileResponse(path, media_type="text/html", headers={"content-security-policy": REPORT_CSP})

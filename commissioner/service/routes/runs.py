@@ -49,10 +49,18 @@ async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
     """The run, begun. The audit says so before anything moves."""
     drive, motor = parts.library.drive(wish.drive), parts.library.motor(wish.motor)
     if not drive.url:
-        raise Refusal(409, "the simulator is not running", step="start a run", value=drive.id, limit="a drive with an address",
-                      remedy="start the simulator first")
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="start a run",
+            value=drive.id,
+            limit="a drive with an address",
+            remedy="start the simulator first",
+        )
     party = Party(who.session.id if who.session else "", who.person)
-    parts.audit.write(who.person, who.address, "asked to energise", drive=drive.id, motor=motor.id, write_back=wish.write_back)
+    parts.audit.write(
+        who.person, who.address, "asked to energise", drive=drive.id, motor=motor.id, write_back=wish.write_back
+    )
     run = await parts.desk.start(drive, motor, wish.axes_deg, write_back=wish.write_back, party=party)
     await asyncio.to_thread(parts.audit.write, who.person, who.address, "run begun", run=run.id)
     return run
@@ -104,7 +112,9 @@ async def report(request: Request, run: str, _who: Viewer) -> Response:
 
 
 @router.get("/api/runs/{run}/export/{format}", response_class=Response)
-async def export(request: Request, run: str, format: Literal["csv", "json", "mat", "parquet"], _who: Viewer) -> Response:
+async def export(
+    request: Request, run: str, format: Literal["csv", "json", "mat", "parquet"], _who: Viewer
+) -> Response:
     """The samples as CSV, MATLAB 5 or Parquet, or the result as JSON."""
     parts = parts_of(request)
     entry = parts.archive.find(run)
@@ -131,7 +141,16 @@ async def _exported(parts: Parts, entry: Entry, ending: str) -> Path:
 
 def _row(entry: Entry) -> dict[str, Any]:
     return {
-        "run": entry.run, "utc": entry.utc, "motor": entry.motor, "nameplate": entry.motor_text, "drive": entry.drive,
-        "person": entry.person, "outcome": entry.outcome, "standing": entry.standing, "reason": entry.reason,
-        "energised_s": entry.energised_s, "holds": entry.written, "parameters": entry.parameters,
+        "run": entry.run,
+        "utc": entry.utc,
+        "motor": entry.motor,
+        "nameplate": entry.motor_text,
+        "drive": entry.drive,
+        "person": entry.person,
+        "outcome": entry.outcome,
+        "standing": entry.standing,
+        "reason": entry.reason,
+        "energised_s": entry.energised_s,
+        "holds": entry.written,
+        "parameters": entry.parameters,
     }

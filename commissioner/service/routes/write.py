@@ -74,8 +74,14 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> di
 
 async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -> dict[str, Any]:
     if drive is not None and (parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id)):
-        raise Refusal(409, f"{drive.name} is in use by a run", step=arguments[0], value="a run goes on", limit="no run on this drive",
-                      remedy="wait for its end, or stop it")
+        raise Refusal(
+            409,
+            f"{drive.name} is in use by a run",
+            step=arguments[0],
+            value="a run goes on",
+            limit="no run on this drive",
+            remedy="wait for its end, or stop it",
+        )
     watch = parts.desk.watch(drive) if drive is not None else None
     log = parts.desk.log(arguments[0])
     if watch is not None:
