@@ -6,6 +6,7 @@ import getpass
 import json
 import sys
 import webbrowser
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,8 @@ def serve(*, host: str, port: int, config: Path | None, open_page: bool, runs: P
         if open_page:
             webbrowser.open(url)
 
-    serve_until_stopped(load_settings(config, host=host, port=port, runs=runs), ready)
+    with suppress(KeyboardInterrupt):  # Ctrl-C and SIGTERM are how a service ends
+        serve_until_stopped(load_settings(config, host=host, port=port, runs=runs), ready)
 
 
 def add(name: str, *, role: str, password_file: Path | None, config: Path | None, runs: Path, as_json: bool) -> None:
