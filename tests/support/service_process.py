@@ -1,7 +1,7 @@
 """`commissioner serve` as a process of its own, with its archive in a folder that goes away.
 
-    with ServiceProcess(tmp_path, speed="max") as service:
-        service.client.get("/api/health")
+with ServiceProcess(tmp_path, speed="max") as service:
+    service.client.get("/api/health")
 """
 
 from __future__ import annotations

@@ -149,7 +149,9 @@ def _stopping(run: LiveRun, t: Texts) -> _Said:
     said = t.gettext("It is not energised again; the computer ends its work first")
     if state.output_utc:
         said = t.say("Output off at %(time)s by the drive’s word; %(what)s", time=_time(state.output_utc), what=said)
-    return _Said("live", t.gettext("STOPPED: THE RUN IS ENDING"), said, t.say("asked by %(who)s", who=run.stop_asked_by))
+    return _Said(
+        "live", t.gettext("STOPPED: THE RUN IS ENDING"), said, t.say("asked by %(who)s", who=run.stop_asked_by)
+    )
 
 
 def _test_line(run: LiveRun, t: Texts) -> str:

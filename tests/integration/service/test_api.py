@@ -127,12 +127,17 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
     is_problem(service.client.post(f"/api/runs/{finished}/write-back", json={"token": "another"}), 409)
     done = service.client.post(f"/api/runs/{finished}/write-back", json={"token": table["token"]}).json()
     assert done["outcome"] == "written"
-    assert [w["read_back"] for w in done["report"]["written"]] == pytest.approx([r["will_be"] for r in table["rows"]], rel=1e-6)
+    assert [w["read_back"] for w in done["report"]["written"]] == pytest.approx(
+        [r["will_be"] for r in table["rows"]], rel=1e-6
+    )
     again = service.client.get(f"/api/runs/{finished}/write-back")
     assert "nothing to write" in is_problem(again, 409)["title"]
     old = service.client.get(f"/api/runs/{finished}/restore").json()
     assert [r["will_be"] for r in old["rows"]] == pytest.approx([r["now"] for r in table["rows"]])
-    assert service.client.post(f"/api/runs/{finished}/restore", json={"token": old["token"]}).json()["outcome"] == "restored"
+    assert (
+        service.client.post(f"/api/runs/{finished}/restore", json={"token": old["token"]}).json()["outcome"]
+        == "restored"
+    )
     told = [entry["what"] for entry in service.client.get("/api/audit").json()["entries"]]
     assert {"wrote", "restored", "asked to energise", "run begun"} <= set(told)
     assert service.client.get("/api/audit").json()["chain"]["is_intact"]
@@ -152,7 +157,9 @@ def test_a_run_compares_with_another_and_not_with_itself(service, finished):
 
 def test_one_run_at_a_time_on_a_drive_and_stop_twice_is_harmless(service, finished):
     run = service.start_run()
-    taken = is_problem(service.client.post("/api/runs", json={"drive": "simulator", "motor": "motor_2kw2", "confirm": True}), 409)
+    taken = is_problem(
+        service.client.post("/api/runs", json={"drive": "simulator", "motor": "motor_2kw2", "confirm": True}), 409
+    )
     assert taken["value"] == run
     is_problem(service.client.post("/api/checks", json={"drive": "simulator", "motor": "motor_2kw2"}), 409)
     is_problem(service.client.post("/api/simulator", json={"scenario": "linear"}), 409)
@@ -174,5 +181,7 @@ def test_a_recording_is_identified_and_one_that_is_none_is_refused(service, fini
         time.sleep(0.02)
     assert document["exit_code"] == 0, document
     assert document["result"]["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(3.7, rel=0.02)
-    is_problem(service.client.post("/api/recordings", files={"files": ("run.exe", b"MZ")}, data={"verb": "identify"}), 415)
+    is_problem(
+        service.client.post("/api/recordings", files={"files": ("run.exe", b"MZ")}, data={"verb": "identify"}), 415
+    )
     assert not [p for p in (service.runs / ".service" / "recordings").iterdir() if p.name != job["id"]]
