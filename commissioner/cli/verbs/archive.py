@@ -11,7 +11,14 @@ from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.archive.replay import replay
 from commissioner.run.archive.verify import refuse_damage, verify
 from commissioner.run.restore import restore
-from commissioner.run.write_accepted import Plan, as_document, check_token, plan_restore, plan_write_back, write_accepted
+from commissioner.run.write_accepted import (
+    Plan,
+    as_document,
+    check_token,
+    plan_restore,
+    plan_write_back,
+    write_accepted,
+)
 
 
 def restore_run(

@@ -28,7 +28,9 @@ def check(*, drive: str, profile: str, motor: str, procedure: Path | None, as_js
         "parameters_in_drive": inspection.parameters,
         "watchdog": inspection.watchdog,
         "checks": inspection.checks,
-        "limits": None if inspection.job is None else limits_of(inspection.job, inspection.identity.rated_drive_current_a),
+        "limits": None
+        if inspection.job is None
+        else limits_of(inspection.job, inspection.identity.rated_drive_current_a),
     }
     if as_json:
         screen.emit(document)

@@ -112,6 +112,8 @@ def _of_run(run: LiveRun, t: Texts) -> _Said:
         return _take_as_live(t.gettext("The drive does not confirm that its output is off. Isolate its supply"), t)
     if state.output == "on":
         return _Said("live", t.gettext("MOTOR ENERGISED"), _test_line(run, t), t.gettext("Esc or Space"))
+    if run.stop_asked_by:
+        return _stopping(run, t)
     soon = t.gettext("ends the run: Esc or Space")
     if state.phase == "measuring":
         return _Said(
@@ -138,6 +140,17 @@ def _of_run(run: LiveRun, t: Texts) -> _Said:
         t.gettext("ENERGISED SOON"),
         t.say("%(what)s; the test starts by itself. Stay clear", what=t.gettext(what)),
         soon,
+    )
+
+
+def _stopping(run: LiveRun, t: Texts) -> _Said:
+    """STOP was taken while the computer worked: the run ends as soon as it has done so."""
+    state = run.feed.state
+    said = t.gettext("It is not energised again; the computer ends its work first")
+    if state.output_utc:
+        said = t.say("Output off at %(time)s by the drive’s word; %(what)s", time=_time(state.output_utc), what=said)
+    return _Said(
+        "live", t.gettext("STOPPED: THE RUN IS ENDING"), said, t.say("asked by %(who)s", who=run.stop_asked_by)
     )
 
 

@@ -10,8 +10,8 @@ from commissioner.link.drive.facts import DisarmReport, WriteReport
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
+from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import SafetyFacts
 from commissioner.settings import load_motor
