@@ -56,7 +56,7 @@ def drives_conformance(
 ) -> None:
     """Every rule of the commissioning map against somebody's firmware: pass, fail or not tested, with the evidence.
 
-    Parameters are changed by 1 per cent for a moment and put back; one store is spent. 0: nothing failed, 3: some rule did.
+    Parameters are changed by 1 per cent for a moment and put back; two stores are spent. 0: nothing failed, 3: some rule did.
     """
     from commissioner.cli.verbs.conformance import conformance
 

@@ -175,11 +175,11 @@ class Drive:
             }
         )
 
-    def walk_to_enabled(self) -> Steps[None]:
-        """The three commands, whatever the drive makes of them."""
+    def walk_to_enabled(self, held: int = 0) -> Steps[None]:
+        """The three commands, whatever the drive makes of them; `held` bits are set in each."""
         for word in (SHUTDOWN, SWITCH_ON, ENABLE):
             yield from self.beat()
-            yield from self.command(word)
+            yield from self.command(word | held)
 
     def enable(self, signal: Signal, supervision: Supervision | None = None) -> Steps[None]:
         """Set up and energise. Broken where the drive does not follow."""

@@ -209,13 +209,20 @@ def the_status_says_what_is_applied(drive: Drive) -> Steps[None]:
     """While energised, present bias, current and remaining time are those of the test."""
     drive.needs_level()
     limit_s = 20.0
-    yield from drive.enable(Signal(bias_v=drive.level_v), drive.supervision(test_time_limit_s=limit_s))
-    data = joined((yield from drive.stream(1500)))
     scales = yield from drive.scales()
+    signal = Signal(bias_v=drive.level_v, bias_ramp_v_per_s=2.5 * drive.level_v)
+    yield from drive.enable(signal, drive.supervision(test_time_limit_s=limit_s))
+    before = joined((yield from drive.stream(300)))
+    rising_v = yield from drive.number("present_bias_v")
+    data = joined((yield from drive.stream(3000, start=len(before))))
     names = ("present_bias_v", "current_magnitude_a", "test_time_left_s", "samples_produced")
     bias_v, current_a, left_s, produced = yield from drive.numbers(*names)
     yield from drive.stop()
-    largest_a = float(np.abs(data[-20:, 1:]).max()) * scales["current_scale_a"]
+    grid_v, largest_a = scales["voltage_scale_v"], float(np.abs(data[-20:, 1:]).max()) * scales["current_scale_a"]
+    if not float(before[-1, 0]) * grid_v - 2 * grid_v <= rising_v <= 0.9 * drive.level_v:
+        raise Broken(
+            f"present_bias_v is {rising_v:.3f} V on the way from {before[-1, 0] * grid_v:.3f} V to {drive.level_v:.3f} V"
+        )
     if abs(bias_v - drive.level_v) > 1e-2 * drive.level_v:
         raise Broken(f"present_bias_v is {bias_v:.3f} V with {drive.level_v:.3f} V applied")
     if not 0.7 * largest_a < current_a < 1.4 * largest_a:

@@ -112,14 +112,25 @@ def only_the_command_word_commits(drive: Drive) -> Steps[None]:
 @rule
 def a_store_writes_once(drive: Drive) -> Steps[None]:
     """A store ends with result 2, the memory holds what is in use, and its counter has grown by one."""
-    in_use, count = (yield from _held(drive, "")), (yield from drive.number("store_count"))
-    result = yield from _carried_out(drive, "store")
-    if result != DONE:
-        raise Broken(f"store_result is {result}, wanted {DONE}: done")
-    yield from _must_hold(drive, "stored_", in_use, "a store")
-    after = yield from drive.number("store_count")
+    before, count = (yield from _held(drive, "")), (yield from drive.number("store_count"))
+    target = _changed(before, CHANGE)
+    result, stored, after = yield from _stored(drive, target)
+    back, _, _ = yield from _stored(drive, before)
+    yield from _must_hold(drive, "stored_", before, "storing the old values again")
+    if (result, back) != (DONE, DONE):
+        raise Broken(f"store_result is {result} and {back}, wanted {DONE}: done")
+    if stored != target:
+        raise Broken(f"{target} was in use when a store was asked for and {stored} is stored")
     if after != count + 1:
         raise Broken(f"store_count went from {count:g} to {after:g} by one store")
+
+
+def _stored(drive: Drive, values: Mapping[str, Words]) -> Steps[tuple[int, dict[str, Words], float]]:
+    """Commit and store a set: the store's result, what is stored then, and the memory's counter."""
+    yield from _stage(drive, values)
+    yield from _carried_out(drive, "commit")
+    result = yield from _carried_out(drive, "store")
+    return result, (yield from _held(drive, "stored_")), (yield from drive.number("store_count"))
 
 
 def _order(drive: Drive) -> tuple[str, ...]:
