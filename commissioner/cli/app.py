@@ -334,9 +334,13 @@ def write_back_run(
 
 @app.command()
 def serve(
-    host: Annotated[str, typer.Option(help="Where to listen; another host than this computer needs TLS and accounts.")] = "127.0.0.1",
+    host: Annotated[
+        str, typer.Option(help="Where to listen; another host than this computer needs TLS and accounts.")
+    ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 picks a free one.")] = 8321,
-    config: Annotated[Path | None, typer.Option("--config", help="TOML file: drives, TLS, folders. None: the simulator.")] = None,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="TOML file: drives, TLS, folders. None: the simulator.")
+    ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
     runs: Runs = RUNS,
     json: Json = False,
@@ -377,7 +381,9 @@ def ports(json: Json = False) -> None:
 def accounts_add(
     name: Annotated[str, typer.Argument(help="Name to log in with.")],
     role: Annotated[str, typer.Option(help="viewer | operator | administrator")] = "operator",
-    password_file: Annotated[Path | None, typer.Option(help="Read the password from this file; asked for if not given.")] = None,
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read the password from this file; asked for if not given.")
+    ] = None,
     config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
     runs: Runs = RUNS,
     json: Json = False,
