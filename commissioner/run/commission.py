@@ -23,7 +23,7 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal, write_recording
+from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
@@ -44,10 +44,12 @@ class Order:
     nameplate: Nameplate
     plan: ProcedurePlan
     write_back: bool
+    key: bytes | None = None
+    """Seals the run's folder."""
 
     def open_folder(self, runs: Path, **more: object) -> RunFolder:
         """A new run folder, with the order in it; the address without what is secret."""
-        folder = RunFolder.create(runs, Path(self.profile.file).stem)
+        folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
         request = {
             "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
@@ -75,6 +77,7 @@ def commission(
     runs: Path,
     present: Present,
     diagnosis_s: float = 0.0,
+    key: bytes | None = None,
     stop: OperatorStop | None = None,
     begun: Callable[[Path], None] = lambda _folder: None,
     origin: Mapping[str, Any] | None = None,
@@ -82,13 +85,14 @@ def commission(
     """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
 
     `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
+    `key`: seals the folder (`archive.seal`).
     `stop`: by which others end the run. `begun` is told the folder as soon as there is one. `origin`: who asked for the
     run, and under which names of drive and motor; kept with the request.
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)
     parse_url(url)
-    order = Order(url, profile, nameplate, plan, write_back)
+    order = Order(url, profile, nameplate, plan, write_back, key)
     findings = Findings()
     folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
     asked = OperatorStop() if stop is None else stop
@@ -172,11 +176,12 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
     }
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
-    write_recording(folder.path, metadata)
+    folder.write_recording(metadata)
     result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
+    folder.cover()
     return result
 
 

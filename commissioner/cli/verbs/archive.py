@@ -9,6 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.archive.replay import replay
+from commissioner.run.archive.verify import refuse_damage, verify
 from commissioner.run.restore import restore
 from commissioner.run.write_accepted import (
     Plan,
@@ -21,7 +22,8 @@ from commissioner.run.write_accepted import (
 
 
 def restore_run(
-    runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None
+    runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None,
+    seal: Path | None = None,
 ) -> None:
     """Write the run's snapshot back, after asking. `plan`: only show what would change; `token`: only if that still holds."""
     summary = find_run(runs, run)
@@ -89,14 +91,19 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
     screen.out.print(screen.table("", header, rows, right=(2, 3)))
 
 
-def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
-    """Decide the run again from its archive; exit 3 where a decision comes out otherwise."""
+def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
+    """Decide the run again from its archive; exit 3 where the folder is not as the run left it, or a decision comes out
+    otherwise."""
     summary = find_run(runs, run)
+    folder = Path(summary.folder)
+    verified = verify(folder)
+    if not salvage:
+        refuse_damage(folder, verified, "replay")
     with screen.busy("deciding again"):
-        done = replay(Path(summary.folder))
+        done = replay(folder, salvage=not verified.is_whole)
     if as_json:
         screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
-                     "difference": done.difference})  # fmt: skip
+                     "difference": done.difference, "state": verified.state, "losses": verified.losses})  # fmt: skip
         if not done.is_identical:
             raise SystemExit(DataRefused.exit_code)
         return
@@ -106,4 +113,5 @@ def replay_run(runs: Path, run: str, *, as_json: bool) -> None:
             value=done.difference.replayed, limit=done.difference.archived,
             remedy="the run was made by another version of commissioner, or its folder was changed",
         )  # fmt: skip
-    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]")
+    until = "" if verified.is_whole else f" up to the first loss; {screen.text(verified.usable)}"
+    screen.out.print(f"[green]{done.decisions} decisions, all identical[/]{until}")

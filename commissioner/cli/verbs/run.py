@@ -15,6 +15,7 @@ from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import check_failed
 from commissioner.procedure.plan import ProcedurePlan
+from commissioner.run.archive.seal import read_key
 from commissioner.run.commission import Commissioned, commission, require_capabilities
 from commissioner.run.inspection import inspect_drive
 from commissioner.run.stopping.dead_man import DeadMan
@@ -38,6 +39,7 @@ def run(
     runs: Path,
     as_json: bool,
     diagnosis: bool,
+    seal: Path | None = None,
     dead_man: bool = False,
 ) -> None:
     """Commission the drive; exits with the code of the outcome."""
@@ -58,6 +60,7 @@ def run(
         runs=runs,
         as_json=as_json,
         diagnosis=diagnosis,
+        seal=seal,
     )
 
 
@@ -73,8 +76,10 @@ def commission_and_show(
     runs: Path,
     as_json: bool,
     diagnosis: bool,
+    seal: Path | None = None,
 ) -> None:
     """The part that `run` and `demo` share."""
+    key = read_key(seal) if seal is not None else None
     nameplate = load_motor(motor)
     plan = load_procedure(procedure, axes_deg=axes)
     screen.require_yes(yes, as_json=as_json)
@@ -90,6 +95,7 @@ def commission_and_show(
             runs=runs,
             present=view,
             diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
+            key=key,
         )
     show_and_exit(done, as_json=as_json)
 

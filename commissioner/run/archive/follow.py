@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from commissioner.records import SampleBlock
-from commissioner.run.archive.folder import read_document, read_next_block
+from commissioner.run.archive.blocks import Placed, follow_blocks
+from commissioner.run.archive.documents import read_document
 
 
 class JournalFollower:
@@ -35,18 +35,7 @@ class BlocksFollower:
     def __init__(self, path: Path, offset: int = 0) -> None:
         self._path, self.offset = path, offset
 
-    def new(self, most: int = 10_000) -> list[tuple[int, SampleBlock]]:
+    def new(self, most: int = 10_000) -> list[Placed]:
         """The whole (segment, block) pairs since the last call, `most` at a time."""
-        blocks: list[tuple[int, SampleBlock]] = []
-        try:
-            length = self._path.stat().st_size
-            if length <= self.offset:
-                return blocks
-            with self._path.open("rb") as file:
-                file.seek(self.offset)
-                while len(blocks) < most and (block := read_next_block(file, length)) is not None:
-                    blocks.append(block)
-                    self.offset = file.tell()
-        except FileNotFoundError:
-            return []
+        blocks, self.offset = follow_blocks(self._path, self.offset, most)
         return blocks

@@ -10,7 +10,7 @@ import typer
 
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
-from commissioner.cli.secrets import Secrets
+from commissioner.link.wire.secrets import Secrets
 from commissioner.errors import DriveFault
 from tests.support.command_line import COMMAND
 
