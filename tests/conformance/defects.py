@@ -50,7 +50,7 @@ LINK = (
     ),  # fmt: skip
     _defect("not-a-number is taken", REGISTERS, "isfinite(value) && value >= item->low && value <= item->high", "!(value < item->low || value > item->high)", "values-out-of-range-are-refused"),
     _defect("a tone too many is taken", MAP, "CM_U16, 1, 0, CM_TONE_LIMIT", "CM_U16, 1, 0, 65535", "values-out-of-range-are-refused"),
-)  # fmt: skip
+)
 
 WHO = (
     _defect("another magic number", "src/cm_map.h", "0x434D5352u", "0x434D5353u", "magic-and-map-version"),
@@ -63,7 +63,7 @@ WHO = (
     _defect("DC link as a per-unit value", STATUS, "cm_port_dc_link_v());", "cm_port_dc_link_v() / 540.0f);", "measurements-can-be"),
     _defect("interlock bits nobody knows", STATUS, "image[CM_INTERLOCKS] = cm_port_interlocks();", "image[CM_INTERLOCKS] = cm_port_interlocks() | 0x8000;", "interlocks-are-the-files"),
     _defect("synchronous speed on the plate", STATUS, "r->rated_speed_rpm)", "1500.0f)", "plate-of-the-motor"),
-)  # fmt: skip
+)
 
 SUPERVISION = (
     _defect("watchdog takes too short a time", REGISTERS, "value < 100.0f", "value < 0.0f", "watchdog-takes-its-range"),
@@ -87,10 +87,10 @@ SUPERVISION = (
     _defect("watchdog is a timer from enable", STATES, "    drive->fed_at_ms = cm_port_milliseconds();\n}\n\nstatic bool", "}\n\nstatic bool", "a-fed-watchdog-does-not-bite"),
     _defect("no overcurrent trip", STATES, "drive->largest_current_a > drive->trip_current_a", "0", "too-much-current-trips"),
     _defect("overcurrent seen in phase u only", STATES, "for (int phase = 0; phase < 3; phase++)", "for (int phase = 0; phase < 1; phase++)", "too-much-current-trips"),
-    _defect("a trip keeps no value", STATES, "drive->trip_value = value;", "", "too-much-current-trips"),
+    _defect("a trip keeps no value", STATES, "drive->trip_value = value;", "", "the-watchdog-bites"),
     _defect("no test-time limit", STATES, "e->period >= e->time_limit_period", "0", "the-time-limit-trips"),
     _defect("needs-stop items take writes while energised", REGISTERS, "(item->flags & CM_NEEDS_STOP) && drive->state == CM_ENABLED", "0", "settings-that-need-a-stop-are-refused-while-energised"),
-)  # fmt: skip
+)
 
 COMMANDS = (
     _defect("switches on from disabled", STATES, "else if (drive->state == CM_SWITCH_ON_DISABLED)", "else if (drive->state == CM_SWITCH_ON_DISABLED && (word & 0x08))", "switching-on-needs-a-shut-down-before"),
@@ -103,7 +103,7 @@ COMMANDS = (
     _defect("a held reset bit resets", STATES, "&& !(drive->last_control & RESET_FAULT)", "", "a-fault-needs-a-reset"),
     _defect("any command leaves a fault", STATES, "if (is_reset_edge && cm_port", "if (cm_port", "a-fault-needs-a-reset"),
     _defect("the reset forgets the cause", STATES, "            drive->fault = CM_TRIP_NONE;", "            drive->fault = drive->trip_cause = CM_TRIP_NONE;", "the-trip-cause-outlives-the-reset"),
-)  # fmt: skip
+)
 
 WRITE_BACK = (
     _defect("staging is in use at once", REGISTERS, "    for (int k = 0; k < cm_item_count; k++) {", "    if (address >= CM_STAGED && address < CM_STAGED_CRC) memcpy(&drive->image[CM_IN_USE], &drive->image[CM_STAGED], 16);\n    for (int k = 0; k < cm_item_count; k++) {", "staged-values-are-held"),
@@ -116,7 +116,7 @@ WRITE_BACK = (
     _defect("any word commits", REGISTERS, "word == CM_COMMIT_WORD", "word", "only-the-command-word-commits"),
     _defect("a store counts twice", PARAMETERS, "next.store_count++;", "next.store_count += 2;", "a-store-writes-once"),
     _defect("a store loses the last value", PARAMETERS, "for (int k = 0; k < CM_PARAMETERS; k++)\n            next", "for (int k = 0; k < CM_PARAMETERS - 1; k++)\n            next", "a-store-writes-once"),
-)  # fmt: skip
+)
 
 SIGNAL = (
     _defect("phase in degrees", EXCITATION, "cm_get_f32(tone + 4) / RADIANS_PER_TURN", "cm_get_f32(tone + 4) / 360.0", "eight-tones-at-control-rate"),
@@ -136,7 +136,7 @@ SIGNAL = (
     _defect("the duration does not end it", EXCITATION, "e->period >= e->last_period;", "0;", "the-test-ends-by-itself-after-its-duration"),
     _defect("the end does not ramp", EXCITATION, "is_over && e->bias == 0 && e->scale == 0", "is_over", "the-test-ends-by-itself-after-its-duration"),
     _defect("present bias is the target", STATUS, "(float)e->bias / 1.0e9f : 0.0f", "(float)e->bias_target / 1.0e9f : 0.0f", "the-status-says-what-is-applied"),
-)  # fmt: skip
+)
 
 WINDOW = (
     _defect("check sum over the header only", RING, "window + CM_WINDOW_HEADER, used);", "window + CM_WINDOW_HEADER, 0);", "the-check-sum-is-right"),
@@ -156,6 +156,6 @@ WINDOW = (
     _defect("ended never", RING, "ring->has_ended && ready <= count", "0", "the-last-window-says-that-it-is"),
     _defect("one session number for all", STATES, "    drive->session++;", "", "every-session-has-its-own-number"),
     _defect("sample count runs on", RING, "ring->produced = ring->next_unread = ring->overruns = 0;", "ring->next_unread = ring->overruns = 0;", "every-session-has-its-own-number"),
-)  # fmt: skip
+)
 
 DEFECTS: tuple[Defect, ...] = (*LINK, *WHO, *SUPERVISION, *COMMANDS, *WRITE_BACK, *SIGNAL, *WINDOW)
