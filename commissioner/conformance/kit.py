@@ -11,6 +11,7 @@ from commissioner.conformance.judge import Recorder, judge
 from commissioner.conformance.line import Line
 from commissioner.conformance.records import Broken, Outcome, Rule, RuleResult, Steps
 from commissioner.conformance.rules import RULES
+from commissioner.conformance.rules.stopping import VITAL
 from commissioner.errors import CheckFailed, ReplyTimeout, UsageError
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.codec import Value
@@ -21,6 +22,8 @@ TEST_CURRENT_FRACTION = 0.2
 """Test current peak, of the rated motor current's peak in the drive's plate, else of the drive's own."""
 SILENT_RULES = 3
 """Rules in a row without any answer: the drive is gone, not wrong."""
+LEVEL = "a-bias-drives-a-current"
+"""The rule that finds the voltage of the others."""
 WHO = ("drive_type", "serial_number", "firmware_version", "map_version")
 
 
@@ -50,7 +53,7 @@ def run_conformance(
     reply_timeout_s: float = 0.5,
     on_result: Callable[[RuleResult], None] = lambda result: None,
 ) -> Conformance:
-    """Try every rule, or `only` these and the one that finds the test voltage.
+    """Try every rule, or `only` these and those that energising rests on.
 
     LinkUnreachable, ReplyTimeout: nobody answers, or no longer. CheckFailed: the drive is energised already.
     UsageError: the drive file describes no commissioning map, or no rule has such a name.
@@ -87,9 +90,8 @@ def chosen(only: Collection[str]) -> tuple[Rule, ...]:
             limit=", ".join(rule.name for rule in RULES),
             remedy="give names of rules",
         )
-    first_energised = next(rule for rule in RULES if rule.energises)
-    needs_level = any(rule.energises and rule.name in only for rule in RULES)
-    wanted = set(only) | ({first_energised.name} if needs_level else set())
+    energises = any(rule.energises and rule.name in only for rule in RULES)
+    wanted = set(only) | ({*VITAL, LEVEL} if energises else set())
     return tuple(rule for rule in RULES if not only or rule.name in wanted)
 
 
@@ -137,7 +139,7 @@ def _results(
     on_result: Callable[[RuleResult], None],
 ) -> tuple[RuleResult, ...]:
     results: list[RuleResult] = []
-    obstacle = _Obstacle(drive, line, energise=energise)
+    obstacle = _Obstacle(drive, line, results, energise=energise)
     for result in judge(rules, drive, line.perform, obstacle):
         results.append(result)
         on_result(result)
@@ -155,8 +157,8 @@ def _results(
 class _Obstacle:
     """Why a rule is not tried: energising was not allowed, or the drive is not fit for it. Asks the drive once."""
 
-    def __init__(self, drive: Drive, line: Line, *, energise: bool) -> None:
-        self._drive, self._line, self._energise = drive, line, energise
+    def __init__(self, drive: Drive, line: Line, results: list[RuleResult], *, energise: bool) -> None:
+        self._drive, self._line, self._results, self._energise = drive, line, results, energise
         self._seen: str | None = None
 
     def __call__(self, rule: Rule) -> str:
@@ -164,6 +166,9 @@ class _Obstacle:
             return ""
         if not self._energise:
             return "energises the motor: give --energise"
+        for result in self._results:
+            if result.name in VITAL and result.outcome is not Outcome.PASS:
+                return f"nothing more is energised: {result.name} did not pass"
         if self._seen is None:
             self._seen = Recorder(self._line.perform).run(_unfit(self._drive))
         return self._seen

@@ -270,7 +270,7 @@ SUPERVISION = (
         "for (int phase = 0; phase < 1; phase++)",
         "too-much-current-trips",
     ),
-    _defect("a trip keeps no value", STATES, "drive->trip_value = value;", "", "too-much-current-trips"),
+    _defect("a trip keeps no value", STATES, "drive->trip_value = value;", "", "the-watchdog-bites"),
     _defect("no test-time limit", STATES, "e->period >= e->time_limit_period", "0", "the-time-limit-trips"),
     _defect(
         "needs-stop items take writes while energised",

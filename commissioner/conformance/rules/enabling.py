@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from commissioner.conformance import drive as words
-from commissioner.conformance.drive import Drive, joined
+from commissioner.conformance.drive import Drive
 from commissioner.conformance.records import Broken, Steps
 from commissioner.conformance.registry import rules_of
 from commissioner.conformance.signal import Real, Signal
@@ -43,15 +43,13 @@ def a_bias_drives_a_current(drive: Drive) -> Steps[None]:
         if len(window.data) and _peak(window.data[-1:], scales["current_scale_a"]) >= drive.test_current_a:
             found_v = float(window.data[-1, 0]) * scales["voltage_scale_v"]
             break
-    yield from drive.put({"dc_bias_v": found_v})
-    settled = joined((yield from drive.stream(round(SETTLE_S / scales["control_period_s"]), start=index)))
     yield from drive.stop()
-    if not 0.0 < found_v <= highest_v or not len(settled):
+    if not 0.0 < found_v <= highest_v:
         raise Broken(f"no {drive.test_current_a:.2g} A at up to {highest_v:.0f} V along the axis, at {found_v:.3g} V")
-    drive.level_v = found_v
-    drive.test_current_a = max(
-        drive.test_current_a, float(np.median(np.abs(settled[-100:, 1:]).max(axis=1))) * scales["current_scale_a"]
-    )
+    samples = round(SETTLE_S / scales["control_period_s"])
+    settled = yield from drive.recorded(Signal(bias_v=found_v), samples, supervision)
+    steady_a = float(np.median(np.abs(settled[-100:, 1:]).max(axis=1))) * scales["current_scale_a"]
+    drive.level_v, drive.test_current_a = found_v, max(drive.test_current_a, steady_a)
 
 
 def _peak(data: Real, scale_a: float) -> float:

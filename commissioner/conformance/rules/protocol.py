@@ -11,7 +11,7 @@ from commissioner.registers.profile import Item, plan_spans
 RULES, rule = rules_of("Truths about the link")
 
 TOKENS = (0xA5C3, 0x0000, 0xFFFF, 0x1234)
-TIMED_READS = 21
+TIMED_READS = 11
 TIME_ALLOWANCE_S = 0.05
 """On top of the drive file's turn-around: network, converter and a busy computer."""
 UNKNOWN_FUNCTION = 0x41

@@ -1,104 +1,24 @@
-"""Rules of what ends a test: commands, watchdog, limits; and of faults and their reset."""
+"""Rules of the limits that end a test, of faults and of their reset."""
 
 from __future__ import annotations
 
 from commissioner.conformance import drive as words
 from commissioner.conformance.drive import Drive
-from commissioner.conformance.records import Broken, Steps, Wait
+from commissioner.conformance.records import Broken, Steps
 from commissioner.conformance.registry import rules_of
+from commissioner.conformance.rules.stopping import must_have_tripped
 from commissioner.conformance.signal import Signal
 from commissioner.registers.status import DriveState
 
 RULES, rule = rules_of("The commissioning map: supervision inside the drive", energises=True)
 
-OVERCURRENT, WATCHDOG, TIME_LIMIT = 1, 6, 7
+OVERCURRENT, TIME_LIMIT = 1, 7
 ENABLED, DISABLED, FAULT = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
-WATCHDOG_GRACE_S = 0.15
-"""Beyond its time, for the drive's own tick, the link and a busy computer."""
 
 
 def _watched(drive: Drive, **changes: float) -> Steps[None]:
     drive.needs_level()
     yield from drive.enable(Signal(bias_v=drive.level_v), drive.supervision(**changes))
-
-
-def _blocked_by(drive: Drive, word: int, name: str, wanted: tuple[DriveState, ...]) -> Steps[None]:
-    """Energise, give the command, and see the output off at the next look."""
-    yield from _watched(drive)
-    yield from drive.stream(60)
-    yield from drive.command(word)
-    seen = yield from drive.state()
-    if seen not in wanted:
-        raise Broken(f"after '{name}' the drive is '{seen.value}'")
-    window = yield from drive.window(0)
-    if window.flags & drive.layout.flags["running"]:
-        raise Broken(f"after '{name}' the sample window still says running")
-
-
-@rule
-def disable_voltage_blocks_at_once(drive: Drive) -> Steps[None]:
-    """The command disable voltage blocks an energised output at once."""
-    yield from _blocked_by(drive, words.DISABLE_VOLTAGE, "disable voltage", (DISABLED,))
-
-
-@rule
-def quick_stop_blocks_at_once(drive: Drive) -> Steps[None]:
-    """The command quick stop blocks an energised output at once."""
-    yield from _blocked_by(drive, words.QUICK_STOP, "quick stop", (DISABLED,))
-
-
-@rule
-def shut_down_blocks_at_once(drive: Drive) -> Steps[None]:
-    """The command shut down blocks an energised output at once."""
-    yield from _blocked_by(drive, words.SHUTDOWN, "shut down", (DriveState.READY_TO_SWITCH_ON, DISABLED))
-
-
-def _bite(drive: Drive, beat: int | None) -> Steps[float]:
-    """Starve the watchdog, or feed it one and the same heartbeat; when the fault was seen (s after the last feeding)."""
-    shortest, _ = drive.watchdog_range_ms
-    yield from _watched(drive, watchdog_ms=shortest)
-    yield from drive.beat()
-    waited_s, step_s = 0.0, 0.02
-    while waited_s < 1e-3 * shortest + WATCHDOG_GRACE_S:
-        if beat is not None:
-            yield from drive.put({"heartbeat": drive.heartbeat})
-        yield Wait(step_s)
-        waited_s += step_s
-        if (yield from drive.state()) is FAULT:
-            return waited_s
-    return waited_s
-
-
-@rule
-def the_watchdog_bites(drive: Drive) -> Steps[None]:
-    """Without heartbeats the drive blocks its output by itself within the watchdog's time, as a fault that says why."""
-    shortest, _ = drive.watchdog_range_ms
-    waited_s = yield from _bite(drive, None)
-    yield from _must_have_tripped(drive, WATCHDOG, f"{waited_s:.2f} s without a heartbeat")
-    value = yield from drive.number("trip_value")
-    limit = yield from drive.number("trip_limit")
-    if limit != shortest or not value >= shortest:
-        raise Broken(f"the watchdog of {shortest} ms tripped with value {value:g} and limit {limit:g}")
-
-
-@rule
-def only_a_changed_heartbeat_feeds(drive: Drive) -> Steps[None]:
-    """Writing the same heartbeat again does not feed the watchdog: a hung service that repeats itself is dead."""
-    waited_s = yield from _bite(drive, 1)
-    yield from _must_have_tripped(drive, WATCHDOG, f"{waited_s:.2f} s with one and the same heartbeat")
-
-
-@rule
-def a_fed_watchdog_does_not_bite(drive: Drive) -> Steps[None]:
-    """With changing heartbeats the test outlasts the watchdog's time."""
-    shortest, _ = drive.watchdog_range_ms
-    yield from _watched(drive, watchdog_ms=shortest)
-    for _ in range(round(2.2e-3 * shortest / 0.02)):
-        yield from drive.beat()
-        yield Wait(0.02)
-    seen = yield from drive.state()
-    if seen is not ENABLED:
-        raise Broken(f"fed every 20 ms, a watchdog of {shortest} ms ended the test: '{seen.value}'")
 
 
 @rule
@@ -110,7 +30,7 @@ def too_much_current_trips(drive: Drive) -> Steps[None]:
         signal = Signal(axis_deg=axis_deg, bias_v=drive.level_v)
         yield from drive.enable(signal, drive.supervision(current_limit_a=limit_a))
         yield from drive.stream(3000)
-        yield from _must_have_tripped(
+        yield from must_have_tripped(
             drive, OVERCURRENT, f"1.4 times the current limit of {limit_a:.3g} A at {axis_deg:g} degrees"
         )
         value, limit = yield from drive.numbers("trip_value", "trip_limit")
@@ -126,7 +46,7 @@ def the_time_limit_trips(drive: Drive) -> Steps[None]:
     yield from _watched(drive, test_time_limit_s=limit_s)
     period_s = yield from drive.number("control_period_s")
     yield from drive.stream(round(1.0 / period_s))
-    yield from _must_have_tripped(drive, TIME_LIMIT, f"a test-time limit of {limit_s:g} s")
+    yield from must_have_tripped(drive, TIME_LIMIT, f"a test-time limit of {limit_s:g} s")
     lasted_s = (yield from drive.number("samples_produced")) * period_s
     if abs(lasted_s - limit_s) > 0.02:
         raise Broken(f"a test-time limit of {limit_s:g} s ended the test after {lasted_s:.3f} s")
@@ -180,16 +100,3 @@ def the_trip_cause_outlives_the_reset(drive: Drive) -> Steps[None]:
         raise Broken(
             f"trip_cause is {after_reset:g} after the reset (wanted {TIME_LIMIT}) and {enabled:g} after the next enable"
         )
-
-
-def _must_have_tripped(drive: Drive, cause: int, by: str) -> Steps[None]:
-    """Fault state, code and cause, and a sample window that no longer runs."""
-    seen = yield from drive.state()
-    if seen is not FAULT:
-        raise Broken(f"{by} left the drive '{seen.value}', wanted a fault")
-    code, kept = (yield from drive.number("fault_code")), (yield from drive.number("trip_cause"))
-    if (code, kept) != (cause, cause):
-        raise Broken(f"{by}: fault_code {code:g}, trip_cause {kept:g}, wanted {cause}")
-    window = yield from drive.window(0)
-    if window.flags & drive.layout.flags["running"]:
-        raise Broken(f"{by}: the output is blocked and the sample window says running")
