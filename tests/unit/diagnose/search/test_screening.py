@@ -73,13 +73,13 @@ def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
     assert left_out == pytest.approx([0.5 * x for x in whole], rel=1e-3)
 
 
-def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_a_crumb(late, setting, nominal):
+def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_not_named(late, setting, nominal):
     """A sag of a link that stands still takes ten times what any other does: it is real, and six weak causes are not its name."""
     steps = Steps(replace(setting, record=late), WHITE, ["sampling_delay", "iron_loss"], print, late, lambda: True)
     screening = promised(nominal, late, setting, steps.names)
     guards = dict.fromkeys(steps.names, 100.0)
     assert steps._most_ruled_out(screening, guards) == RuledOut()
-    steps.ruled_out["sampling_delay"] = 0.5
+    steps.kept_of_ruled_out["sampling_delay"] = 0.5
     ruled_out = steps.ruled_out = steps._most_ruled_out(screening, guards)
     assert (
         ruled_out.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
