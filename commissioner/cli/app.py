@@ -238,7 +238,7 @@ def simulate(
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.runs import list_runs
+    from commissioner.cli.verbs.archived.runs import list_runs
 
     list_runs(runs, as_json=json)
 
@@ -250,7 +250,7 @@ def runs_show(
     json: Json = False,
 ) -> None:
     """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.verbs.runs import show_run
+    from commissioner.cli.verbs.archived.runs import show_run
 
     show_run(runs, run, as_json=json)
 
@@ -258,7 +258,7 @@ def runs_show(
 @runs_app.command("report")
 def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Where the HTML report of a run is; made again from its archive where it is missing."""
-    from commissioner.cli.verbs.runs import report_run
+    from commissioner.cli.verbs.archived.runs import report_run
 
     report_run(runs, run, as_json=json)
 
@@ -272,7 +272,7 @@ def runs_export(
     json: Json = False,
 ) -> None:
     """The samples of a run as one recording; works for runs that were cut off, too."""
-    from commissioner.cli.verbs.runs import export_run
+    from commissioner.cli.verbs.archived.runs import export_run
 
     export_run(runs, run, out, as_json=json, salvage=salvage)
 
@@ -280,7 +280,7 @@ def runs_export(
 @runs_app.command("compare")
 def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.runs import compare_runs
+    from commissioner.cli.verbs.archived.runs import compare_runs
 
     compare_runs(runs, before, after, as_json=json)
 
@@ -294,7 +294,7 @@ def runs_verify(
     json: Json = False,
 ) -> None:
     """Files and hash chain: exit 0 intact (a run that was killed is cut off, not damaged), 3 something lost or changed."""
-    from commissioner.cli.verbs.verify import verify_runs
+    from commissioner.cli.verbs.archived.verify import verify_runs
 
     verify_runs(runs, run, everything=everything, seal=seal, as_json=json)
 
@@ -311,7 +311,7 @@ def restore(
     json: Json = False,
 ) -> None:
     """Write back the parameter set a run found in the drive, verified and stored."""
-    from commissioner.cli.verbs.archive import restore_run
+    from commissioner.cli.verbs.archived.deciding import restore_run
 
     restore_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token, seal=seal)
 
@@ -327,16 +327,20 @@ def write_back_run(
     json: Json = False,
 ) -> None:
     """Write an accepted result of a run that was made without --write-back into its drive, verified and stored."""
-    from commissioner.cli.verbs.archive import write_run
+    from commissioner.cli.verbs.archived.deciding import write_run
 
     write_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token)
 
 
 @app.command()
 def serve(
-    host: Annotated[str, typer.Option(help="Where to listen; another host than this computer needs TLS and accounts.")] = "127.0.0.1",
+    host: Annotated[
+        str, typer.Option(help="Where to listen; another host than this computer needs TLS and accounts.")
+    ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 picks a free one.")] = 8321,
-    config: Annotated[Path | None, typer.Option("--config", help="TOML file: drives, TLS, folders. None: the simulator.")] = None,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="TOML file: drives, TLS, folders. None: the simulator.")
+    ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
     runs: Runs = RUNS,
     json: Json = False,
@@ -350,7 +354,7 @@ def serve(
 @app.command()
 def replay(run: Run = "last", salvage: Salvage = False, runs: Runs = RUNS, json: Json = False) -> None:
     """Feed the archived blocks through the pure layers; decisions must come out identical."""
-    from commissioner.cli.verbs.archive import replay_run
+    from commissioner.cli.verbs.archived.deciding import replay_run
 
     replay_run(runs, run, as_json=json, salvage=salvage)
 
@@ -377,7 +381,9 @@ def ports(json: Json = False) -> None:
 def accounts_add(
     name: Annotated[str, typer.Argument(help="Name to log in with.")],
     role: Annotated[str, typer.Option(help="viewer | operator | administrator")] = "operator",
-    password_file: Annotated[Path | None, typer.Option(help="Read the password from this file; asked for if not given.")] = None,
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read the password from this file; asked for if not given.")
+    ] = None,
     config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
     runs: Runs = RUNS,
     json: Json = False,

@@ -45,7 +45,7 @@ class Archive:
         self.root = root
         self._read: dict[str, tuple[tuple[int, int], Entry]] = {}
 
-    def list(
+    def entries(
         self, *, motor: str = "", drive: str = "", outcome: str = "", since: str = "", limit: int = 100
     ) -> list[Entry]:
         """Newest first."""

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -43,6 +43,9 @@ class Motor:
     source: str
     origin: str
     plate: Nameplate
+
+
+Known = TypeVar("Known", Drive, Motor)
 
 
 class Library:
@@ -181,7 +184,7 @@ def plate_document(plate: Nameplate) -> dict[str, Any]:
     return asdict(plate)
 
 
-def _found(known: list[Any], identifier: str, what: str) -> Any:
+def _found(known: list[Known], identifier: str, what: str) -> Known:
     for one in known:
         if one.id == identifier:
             return one

@@ -95,7 +95,7 @@ class Recordings:
                 limit=", ".join(VERBS),
                 remedy="choose identify, diagnose or monitor",
             )
-        job = Job(secrets.token_hex(8), verb, [], self._root)  # type: ignore[arg-type]
+        job = Job(secrets.token_hex(8), verb, [], self._root)
         job.folder = self._root / job.id
         job.folder.mkdir(parents=True, mode=0o700)
         try:

@@ -50,7 +50,7 @@ def main() -> None:
 
     if hasattr(os, "nice"):
         os.nice(10)
-    from commissioner.procedure.excite import warm_up
+    from commissioner.procedure.energised.excite import warm_up
     from commissioner.settings import load_motor
 
     warm_up(load_motor("motor_2kw2"))

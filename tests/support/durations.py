@@ -23,7 +23,7 @@ class Costs:
         self.rows: dict[str, tuple[float, float]] = {}
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item):  # noqa: ANN201 - a hook
+    def pytest_runtest_protocol(self, item: pytest.Item):
         cpu, wall = _cpu_s(), time.monotonic()
         result = yield
         self.rows[item.nodeid] = (round(_cpu_s() - cpu, 2), round(time.monotonic() - wall, 2))

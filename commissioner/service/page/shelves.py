@@ -35,7 +35,7 @@ async def archive(request: Request, motor: str = "", outcome: str = "", since: s
     parts = parts_of(request)
     limit = max(1, min(limit, 1000))
     found = await asyncio.to_thread(
-        lambda: parts.archive.list(motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit)
+        lambda: parts.archive.entries(motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit)
     )
     live = {run.id for run in parts.desk.live()}
     return render(

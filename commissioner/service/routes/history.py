@@ -61,7 +61,9 @@ async def trend(request: Request, motor: str, _who: Viewer) -> dict[str, Any]:
 def trend_of(parts: Parts, motor: str) -> dict[str, Any]:
     """The points, and of each parameter the change from the first to the last in units of their joint standard error."""
     entries = [
-        e for e in parts.archive.list(limit=1000) if e.motor == motor and e.parameters and e.outcome == "commissioned"
+        e
+        for e in parts.archive.entries(limit=1000)
+        if e.motor == motor and e.parameters and e.outcome == "commissioned"
     ]
     points = [_point(entry) for entry in reversed(entries)]
     changes = {name: _change(points, name) for name in PARAMETERS} if len(points) > 1 else {}

@@ -79,7 +79,7 @@ async def runs(
     """The archive, newest first."""
     parts = parts_of(request)
     found = await asyncio.to_thread(
-        lambda: parts.archive.list(motor=motor, drive=drive, outcome=outcome, since=since, limit=limit)
+        lambda: parts.archive.entries(motor=motor, drive=drive, outcome=outcome, since=since, limit=limit)
     )
     return {"runs": [_row(entry) for entry in found]}
 

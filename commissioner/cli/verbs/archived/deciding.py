@@ -22,7 +22,14 @@ from commissioner.run.write_accepted import (
 
 
 def restore_run(
-    runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None,
+    runs: Path,
+    run: str,
+    drive: str | None,
+    *,
+    yes: bool,
+    as_json: bool,
+    plan: bool = False,
+    token: str | None = None,
     seal: Path | None = None,
 ) -> None:
     """Write the run's snapshot back, after asking. `plan`: only show what would change; `token`: only if that still holds."""
