@@ -76,7 +76,9 @@ def _upper(prefix: str, base: str) -> Unit | None:
 def is_unit(text: str) -> bool:
     """Whether a cell of a row of units is one: nothing, a unit, or a unit that says nothing by itself."""
     bare = text.strip().strip("[]()（）【】").strip().lower()
-    return not bare or read_unit(text) is not None or bare in FOREIGN or bare in {"-", "none", "sequence", "unit", "units"}
+    return (
+        not bare or read_unit(text) is not None or bare in FOREIGN or bare in {"-", "none", "sequence", "unit", "units"}
+    )
 
 
 def scale_of(unit: str) -> float:

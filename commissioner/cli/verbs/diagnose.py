@@ -87,6 +87,7 @@ def _standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Stands
         if unknown:
             remarks.append(f"{Path(table.source).name}: unknown columns left out: {', '.join(unknown)}.")
         recording = to_standstill(table)
+        remarks += [f"{Path(table.source).name}: {note.what}." for note in recording.notes]
         recordings.append(replace(recording, metadata={**recording.metadata, **_plate(motor)}))
     return recordings, remarks
 

@@ -122,6 +122,8 @@ def clock_seconds(found: re.Match[str]) -> float:
         date = (int(year), int(month), int(day)) if year else (int(year2) % 100 + 2000, int(month2), int(day2))
         if date[1] > 12:
             date = (date[0], date[2], date[1])
-        days = float((np.datetime64(f"{date[0]:04d}-{date[1]:02d}-{date[2]:02d}") - np.datetime64("1970-01-01")).astype(int))
+        days = float(
+            (np.datetime64(f"{date[0]:04d}-{date[1]:02d}-{date[2]:02d}") - np.datetime64("1970-01-01")).astype(int)
+        )
     part = float("0." + fraction[1:]) if fraction else 0.0
     return 86400.0 * days + 3600.0 * int(hours) + 60.0 * int(minutes) + int(seconds) + part

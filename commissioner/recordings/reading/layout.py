@@ -43,7 +43,8 @@ class _Line:
 
 def head_lines(text: str) -> list[_Line]:
     """The first lines with where each begins; a longer line than any instrument writes ends them."""
-    lines, at = [], 0
+    lines: list[_Line] = []
+    at = 0
     while at < len(text) and len(lines) < MAX_PREFACE_LINES + 60:
         end = _line_end(text, at)
         if end < 0:
@@ -128,11 +129,11 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
     if skip:
         preface = [split(line.text, separator)[:2] for line in lines[first : first + 30]]
         channel = next((row[1] for row in preface if len(row) > 1 and row[0].lower() == "source"), "CH1")
-        units = {row[0].lower(): row[1] for row in preface if len(row) > 1}
+        beside = {row[0].lower(): row[1] for row in preface if len(row) > 1}
         named = ("Time", channel, *("",) * (width - 2))
         return Layout(
             separator, lines[first].start, named[:width],
-            (units.get("horizontal units", "s"), units.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
+            (beside.get("horizontal units", "s"), beside.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
     return Layout(
@@ -151,8 +152,6 @@ def _names(above: Sequence[Row], width: int) -> tuple[tuple[str, ...], tuple[str
     if before and _is_units(before) and len(before) >= 2 and not _is_units(last):
         return _padded(last, width), _padded(before, width), 2, width >= 2 * len(last)
     return _padded(last, width), tuple(unit_in(n) for n in _padded(last, width)), 1, width >= 2 * len(last) >= 4
-
-
 
 
 def _stripped(row: Row, width: int) -> Row:

@@ -19,14 +19,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.recordings.table import CONTRACT_COLUMNS
+from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP
 
 MAX_MAP_BYTES = 100_000
 TARGET = re.compile(r"(-?)\s*([a-z][a-z0-9_]*)\s*(?:\*\s*([0-9.eE+-]+))?")
-HOW = (
-    'say what each channel is: comment lines at the top of the file (`# CH1: current_u_a`), or --map MAP.toml with [columns] '
-    'and lines like "CH1" = "current_u_a" ("-current_v_a * 10" turns and scales)'
-)
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ def read_mapping(path: Path) -> ChannelMap:
     if not path.is_file() or path.stat().st_size > MAX_MAP_BYTES:
         raise UsageError(
             f"there is no mapping {path}", step="read mapping", value=str(path), limit="a TOML file of columns",
-            remedy="give --map MAP.toml; " + HOW,
+            remedy="give --map MAP.toml; " + HOW_TO_MAP,
         )  # fmt: skip
     try:
         raw = tomllib.loads(path.read_text("utf-8"))
@@ -60,7 +56,9 @@ def read_mapping(path: Path) -> ChannelMap:
         raise ConfigurationError(file=str(path), key="the file", value=str(error), expected="TOML") from error
     for section in raw:
         if section not in {"columns", "metadata"} or not isinstance(raw[section], dict):
-            raise ConfigurationError(file=str(path), key=section, value=raw[section], expected="[columns] and [metadata]")
+            raise ConfigurationError(
+                file=str(path), key=section, value=raw[section], expected="[columns] and [metadata]"
+            )
     columns = {name: _target(str(path), name, text) for name, text in raw.get("columns", {}).items()}
     metadata = {k: _plain(str(path), k, v) for k, v in raw.get("metadata", {}).items()}
     return ChannelMap(columns, metadata, str(path))
