@@ -19,7 +19,7 @@ def ports(*, as_json: bool) -> None:
     if not found:
         screen.out.print("no serial adapter is plugged in, or this user may not see it")
         return
-    rows = [tuple(screen.printable(port[key]) for key in ("url", "description", "hardware")) for port in found]
+    rows = [tuple(screen.text(port[key]) for key in ("url", "description", "hardware")) for port in found]
     screen.out.print(screen.table("", ("--drive", "adapter", "hardware"), rows))
 
 

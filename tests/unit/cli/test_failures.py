@@ -10,8 +10,8 @@ import typer
 
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
-from commissioner.cli.secrets import Secrets
 from commissioner.errors import DriveFault
+from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND
 
 ONE_RUN = "20260101-000000-simulated"
