@@ -116,28 +116,33 @@ def _head(path: Path) -> bytes:
         return b""
 
 
-def _first_rows(path: Path) -> list[list[str]]:
-    """The first two rows below comments, as cells between commas."""
-    text = _head(path).decode("utf-8", errors="replace")
-    lines = [line.text for line in head_lines(text) if line.text.strip() and not line.text.startswith("#")]
-    return [split(line, ",") for line in lines[:2]]
+def _first_lines(head: bytes) -> list[str]:
+    """The first two lines below comments."""
+    text = head.decode("utf-8", errors="replace")
+    return [line.text for line in head_lines(text) if line.text.strip() and not line.text.startswith("#")][:2]
 
 
 def _is_contract_named(path: Path) -> bool:
-    rows = _first_rows(path)
-    return bool(rows) and any(cell in CONTRACT_COLUMNS for cell in rows[0])
+    lines = _first_lines(_head(path))
+    return bool(lines) and any(cell in CONTRACT_COLUMNS for cell in split(lines[0], ","))
 
 
 def _is_plain(path: Path) -> bool:
-    """Whether the file is the contract's CSV: its names between commas, then a row of plain numbers."""
+    """Whether the file is the contract's CSV: its names between commas, then a row of numbers without quotes. Bytes that
+    are no text go the same way, to be named there."""
     head = _head(path)
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or not head or b"\0" in head:
-        return b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff") and head[1::2].count(0) < 0.4 * len(head)
-    rows = _first_rows(path)
-    if len(rows) < 2 or not any(name in CONTRACT_COLUMNS for name in rows[0]) or len(rows[0]) != len(rows[1]):
+    if b"\0" in head:
+        return head[:2] not in (b"\xff\xfe", b"\xfe\xff") and max(head[k::2].count(0) for k in (0, 1)) < 0.35 * len(
+            head
+        )
+    lines = _first_lines(head)
+    if len(lines) < 2 or '"' in lines[1]:
         return False
-    plain = all(not unit_in(name) or name in CONTRACT_COLUMNS for name in rows[0])
-    return plain and b'"' not in head and all(is_number(cell) or not cell for cell in rows[1])
+    names, cells = (split(line, ",") for line in lines)
+    if not any(name in CONTRACT_COLUMNS for name in names) or len(names) != len(cells):
+        return False
+    plain = all(name in CONTRACT_COLUMNS or not unit_in(name) for name in names)
+    return plain and all(is_number(cell) or not cell for cell in cells)
 
 
 def _of_binary(path: Path, mapping: ChannelMap) -> Table:
