@@ -243,7 +243,7 @@ def simulate(
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.runs import list_runs
+    from commissioner.cli.verbs.archived.runs import list_runs
 
     list_runs(runs, as_json=json)
 
@@ -255,7 +255,7 @@ def runs_show(
     json: Json = False,
 ) -> None:
     """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.verbs.runs import show_run
+    from commissioner.cli.verbs.archived.runs import show_run
 
     show_run(runs, run, as_json=json)
 
@@ -263,7 +263,7 @@ def runs_show(
 @runs_app.command("report")
 def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Where the HTML report of a run is; made again from its archive where it is missing."""
-    from commissioner.cli.verbs.runs import report_run
+    from commissioner.cli.verbs.archived.runs import report_run
 
     report_run(runs, run, as_json=json)
 
@@ -277,7 +277,7 @@ def runs_export(
     json: Json = False,
 ) -> None:
     """The samples of a run as one recording; works for runs that were cut off, too."""
-    from commissioner.cli.verbs.runs import export_run
+    from commissioner.cli.verbs.archived.runs import export_run
 
     export_run(runs, run, out, as_json=json, salvage=salvage)
 
@@ -285,7 +285,7 @@ def runs_export(
 @runs_app.command("compare")
 def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.runs import compare_runs
+    from commissioner.cli.verbs.archived.runs import compare_runs
 
     compare_runs(runs, before, after, as_json=json)
 
@@ -299,7 +299,7 @@ def runs_verify(
     json: Json = False,
 ) -> None:
     """Files and hash chain: exit 0 intact (a run that was killed is cut off, not damaged), 3 something lost or changed."""
-    from commissioner.cli.verbs.verify import verify_runs
+    from commissioner.cli.verbs.archived.verify import verify_runs
 
     verify_runs(runs, run, everything=everything, seal=seal, as_json=json)
 
@@ -316,7 +316,7 @@ def restore(
     json: Json = False,
 ) -> None:
     """Write back the parameter set a run found in the drive, verified and stored."""
-    from commissioner.cli.verbs.archive import restore_run
+    from commissioner.cli.verbs.archived.deciding import restore_run
 
     restore_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token, seal=seal)
 
@@ -332,7 +332,7 @@ def write_back_run(
     json: Json = False,
 ) -> None:
     """Write an accepted result of a run that was made without --write-back into its drive, verified and stored."""
-    from commissioner.cli.verbs.archive import write_run
+    from commissioner.cli.verbs.archived.deciding import write_run
 
     write_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token)
 
@@ -359,7 +359,7 @@ def serve(
 @app.command()
 def replay(run: Run = "last", salvage: Salvage = False, runs: Runs = RUNS, json: Json = False) -> None:
     """Feed the archived blocks through the pure layers; decisions must come out identical."""
-    from commissioner.cli.verbs.archive import replay_run
+    from commissioner.cli.verbs.archived.deciding import replay_run
 
     replay_run(runs, run, as_json=json, salvage=salvage)
 

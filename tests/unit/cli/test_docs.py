@@ -32,7 +32,7 @@ def verbs(command=None, before=""):
 
 def named_verbs(text):
     """The verbs of the calls of `commissioner` in a text; the parts of a group are named with it."""
-    for first, second in re.findall(r"\bcommissioner (?!/)([a-z]+)(?: ([a-z]+))?", text):
+    for first, second in re.findall(r"\bcommissioner (?!/)([a-z][a-z-]*)(?: ([a-z]+))?", text):
         yield f"{first} {second}" if first == "runs" else first
 
 
