@@ -47,6 +47,14 @@ class SampleBlock:
 
 
 @dataclass(frozen=True)
+class ReadingNote:
+    """What a reader changed in a recording, or left unused; `code` for programs, `what` for people."""
+
+    code: str
+    what: str
+
+
+@dataclass(frozen=True)
 class StandstillRecording:
     """A standstill recording in the contract's format. Missing samples are missing rows: `time_s` jumps.
 
@@ -65,6 +73,7 @@ class StandstillRecording:
     sample_period_s: float
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
+    notes: tuple[ReadingNote, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,7 @@ class RunningRecording:
     sample_period_s: float
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
+    notes: tuple[ReadingNote, ...] = ()
 
 
 @dataclass(frozen=True)

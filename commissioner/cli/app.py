@@ -11,6 +11,7 @@ import typer
 from commissioner.cli.console import degrade_output
 from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.recordings import Map, recordings_app
 
 app = typer.Typer(
     name="commissioner",
@@ -23,6 +24,7 @@ app = typer.Typer(
 runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
+app.add_typer(recordings_app, name="recordings")
 accounts_app = typer.Typer(no_args_is_help=True, help="The service's accounts: add, list, remove.")
 app.add_typer(accounts_app, name="accounts")
 
@@ -154,6 +156,7 @@ def identify(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
     procedure: Procedure = None,
     runs: Runs = RUNS,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
@@ -161,11 +164,11 @@ def identify(
     from commissioner.cli.verbs.identify import identify_and_write
 
     if not write_back:
-        verb(files, motor=motor, estimator=estimator, as_json=json)
+        verb(files, motor=motor, estimator=estimator, as_json=json, mapping=mapping)
         return
     identify_and_write(
         files, motor=motor, estimator=estimator, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs,
-        as_json=json,
+        as_json=json, mapping=mapping,
     )  # fmt: skip
 
 
@@ -185,6 +188,7 @@ def monitor(
         list[float] | None, typer.Option("--load-hz", help="A known load frequency; repeatable.")
     ] = None,
     inertia: Annotated[float | None, typer.Option("--inertia", help="Total inertia in kg m2, for load torque.")] = None,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
@@ -192,7 +196,7 @@ def monitor(
 
     verb(
         file, motor=motor, out=out, baseline=baseline, learn=learn, start=start, load_hz=tuple(load_hz or ()),
-        inertia=inertia, as_json=json,
+        inertia=inertia, as_json=json, mapping=mapping,
     )  # fmt: skip
 
 
@@ -209,12 +213,13 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
 
-    verb(files, motor=motor, out=out, as_json=json)
+    verb(files, motor=motor, out=out, as_json=json, mapping=mapping)
 
 
 @app.command()

@@ -18,15 +18,23 @@ STANDSTILL_COLUMNS = frozenset(
 )
 
 
-def diagnose(files: Sequence[Path], motor: str | None = None, out: Path | None = None, as_json: bool = False) -> None:
+def diagnose(
+    files: Sequence[Path],
+    motor: str | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
+    mapping: Path | None = None,
+) -> None:
     """Diagnose recordings of one motor at standstill, or tables of steady-state points.
 
     With `out`, writes `report.html`, `model.json` and `diagnosis.json` there. Exit code 3 where the data cannot carry
     an answer.
     """
     from commissioner.recordings.importers import contract_table
+    from commissioner.recordings.reading.mapping import read_mapping
 
-    tables = [contract_table(Path(path)) for path in files]
+    said = read_mapping(mapping) if mapping else None
+    tables = [contract_table(Path(path), said) for path in files]
     if out is not None:
         from commissioner.recordings.whole import folder_to_write
 
@@ -87,6 +95,7 @@ def _standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Stands
         if unknown:
             remarks.append(f"{Path(table.source).name}: unknown columns left out: {', '.join(unknown)}.")
         recording = to_standstill(table)
+        remarks += [f"{Path(table.source).name}: {note.what}." for note in recording.notes]
         recordings.append(replace(recording, metadata={**recording.metadata, **_plate(motor)}))
     return recordings, remarks
 

@@ -22,12 +22,14 @@ ROWS = (
 )
 
 
-def identify(files: Sequence[Path], *, motor: str | None, estimator: str, as_json: bool) -> None:
+def identify(
+    files: Sequence[Path], *, motor: str | None, estimator: str, as_json: bool, mapping: Path | None = None
+) -> None:
     """Identify a motor from standstill recordings, with the estimators a live run uses."""
     from commissioner.identify.analysis import identify as analyse
 
     with screen.busy("identifying"):
-        document: dict[str, Any] = analyse(_recording(files), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
+        document: dict[str, Any] = analyse(_recording(files, mapping), _nameplate(motor), estimator).as_json()  # type: ignore[arg-type]
     if as_json:
         screen.emit(document | {"flux_guard": _flux_reached(document), "written": []})
     else:
@@ -45,7 +47,7 @@ def _flux_reached(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identify_and_write(
     files: Sequence[Path], *, motor: str | None, estimator: str, drive: str | None, profile: str | None, yes: bool,
-    procedure: Path | None, runs: Path, as_json: bool,
+    procedure: Path | None, runs: Path, as_json: bool, mapping: Path | None = None,
 ) -> None:  # fmt: skip
     """As `identify`; then the verdict, and an accepted result into the drive. Exits with the code of the outcome."""
     from commissioner.cli.screens.live import LiveView
@@ -63,7 +65,7 @@ def identify_and_write(
     screen.require_yes(yes, as_json=as_json)
     plan = load_procedure(procedure)
     with screen.busy("identifying"):
-        recording = _recording(files)
+        recording = _recording(files, mapping)
         plate = _nameplate(motor) or nameplate_from(recording.metadata)
         found = analyse(recording, plate, estimator)  # type: ignore[arg-type]
     if not as_json:
@@ -76,15 +78,13 @@ def identify_and_write(
     show_and_exit(done, as_json=as_json)
 
 
-def _recording(files: Sequence[Path]) -> StandstillRecording:
-    return joined([_read(path) for path in files])
-
-
-def _read(path: Path) -> StandstillRecording:
+def _recording(files: Sequence[Path], mapping: Path | None) -> StandstillRecording:
     from commissioner.recordings.importers import contract_table
+    from commissioner.recordings.reading.mapping import read_mapping
     from commissioner.recordings.table import to_standstill
 
-    return to_standstill(contract_table(path))
+    said = read_mapping(mapping) if mapping else None
+    return joined([to_standstill(contract_table(path, said)) for path in files])
 
 
 def _nameplate(motor: str | None) -> Nameplate | None:
@@ -134,6 +134,7 @@ def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
         sample_period_s=first.sample_period_s,
         metadata=first.metadata,
         source=", ".join(r.source for r in recordings),
+        notes=tuple(dict.fromkeys(note for r in recordings for note in r.notes)),
     )
 
 

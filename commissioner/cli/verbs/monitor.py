@@ -23,6 +23,7 @@ def monitor(
     load_hz: tuple[float, ...] = (),
     inertia: float | None = None,
     as_json: bool = False,
+    mapping: Path | None = None,
 ) -> None:
     """Watch one recording: print the answer, write waveforms and report to `out`, compare with `baseline`.
 
@@ -36,8 +37,9 @@ def monitor(
     from commissioner.recordings.baseline import update
     from commissioner.recordings.importers import read_running
     from commissioner.recordings.plate import plate_of, start_from
+    from commissioner.recordings.reading.mapping import read_mapping
 
-    recording = read_running(file)
+    recording = read_running(file, read_mapping(mapping) if mapping else None)
     plate = plate_of(recording.metadata, str(file), motor)
     wishes = Wishes(load_hz, inertia, start_from(start) if start else None)
     with busy("looking for speed and load"):
