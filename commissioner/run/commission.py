@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
@@ -21,9 +22,10 @@ from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import Diagnosing, RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal
+from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
@@ -64,7 +66,7 @@ class Commissioned:
 
     ended: RunEnded
     folder: Path
-    result: Mapping[str, Any]
+    result: RunDocument
 
 
 def commission(
@@ -105,7 +107,7 @@ def commission(
         if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
             _tell(folder, present, Diagnosing(diagnosis_s))
             result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
-            note(folder, "diagnosed", {"verdict": result["diagnosis"]["verdict"]})
+            note(folder, "diagnosed", {"verdict": (result["diagnosis"] or {})["verdict"]})
     return Commissioned(ended, folder.path, result)
 
 
@@ -160,7 +162,7 @@ def _announce(folder: RunFolder, intent: Intent) -> None:
     folder.journal("about_to", intent, durable=intent.action is not Action.STEER)
 
 
-def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
+def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
     """Recording, result and report, in that order: each needs only the one before."""
     try:
         return _saved(order, folder, findings, ended)
@@ -170,14 +172,14 @@ def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnd
         ) from failure
 
 
-def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
+def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
     metadata: dict[str, float | str] = {
         key: value for key, value in dataclasses.asdict(order.nameplate).items() if value is not None
     }
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
-    result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
+    result: RunDocument = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
@@ -192,12 +194,12 @@ def _time_left(seconds: float, stop: OperatorStop) -> Callable[[], bool]:
 
 
 def _with_diagnosis(
-    folder: RunFolder, result: Mapping[str, Any], findings: Findings, go_on: Callable[[], bool]
-) -> Mapping[str, Any]:
+    folder: RunFolder, result: RunDocument, findings: Findings, go_on: Callable[[], bool]
+) -> RunDocument:
     """Result and report once more, with what a four-parameter simulation would have got wrong."""
     diagnosis = diagnose_run(folder, go_on)
     remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
-    completed: dict[str, Any] = {**result, "diagnosis": diagnosis, "remarks": remarks}
+    completed: RunDocument = {**result, "diagnosis": diagnosis, "remarks": remarks}
     folder.save("result.json", completed)
     folder.save_text("report.html", run_page(completed, read_journal(folder.path / "journal.jsonl"), findings))
     return completed

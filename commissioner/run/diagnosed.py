@@ -8,9 +8,10 @@ from typing import Any
 from commissioner.diagnose.diagnosis import Diagnosis, diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.diagnose.verdict.parameter_shift import parameter_shifts
+from commissioner.encoding import plain
 from commissioner.errors import CommissionerError
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.run.archive.folder import RunFolder, plain
+from commissioner.run.archive.folder import RunFolder
 
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
 
