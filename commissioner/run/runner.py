@@ -19,7 +19,7 @@ from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
 from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
@@ -49,6 +49,7 @@ class _Progress:
     session_s: float = 0.0
     flux_fraction: float = 0.0
     next_status_s: float = 0.0
+    granted: StopAsked | None = None
 
 
 class Runner:
@@ -93,6 +94,8 @@ class Runner:
             finally:
                 self._progress.facts = replace(self._progress.facts, run_ended=True)
                 live = self._disarm(error.what if error is not None else "the run has ended")
+                if self._progress.granted is not None:  # zero volts came first
+                    note(self._folder, kind_of(self._progress.granted), self._progress.granted)
         if live is not None:
             ended, error = None, still_live(live, error)
         if ended is None:
@@ -105,7 +108,8 @@ class Runner:
     def _drive(self, course: Course) -> RunEnded:
         reply: object = None
         while True:
-            if self._stop.asked and not self._progress.has_written:  # what is written ends as written
+            if self._stop.wish is not None and not self._progress.has_written:  # what is written ends as written
+                self._progress.granted = self._stop.wish
                 raise Aborted(
                     "stopped by the operator",
                     step="run",
@@ -251,11 +255,12 @@ class Runner:
         self._show(record)
 
     def _show(self, record: object) -> None:
-        """To the screen. A screen that has gone must not end a run."""
+        """To the screen. A screen that has gone, or that has a defect, must not end a run."""
         try:
             self._present(record)
-        except (OSError, SystemExit):
+        except (Exception, SystemExit) as gone:
             self._present = lambda _record: None
+            note(self._folder, "presenter_lost", {"kind": type(gone).__name__, "what": str(gone)})
 
     def _stop_if(self, reason: StopReason | None) -> None:
         if reason is None:

@@ -15,7 +15,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from commissioner.errors import Aborted, CommissionerError, UsageError
-from commissioner.report.run.summary import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, standing
+from commissioner.report.run.summary import finding_sentences
 from commissioner.run.archive.documents import plain
 from commissioner.text import LONGEST
 from commissioner.text import shown as visible

@@ -74,8 +74,8 @@ def read_blocks(path: Path, damage: list[BlockDamage] | None = None) -> Iterator
     yield from blocks
 
 
-def follow_blocks(path: Path, offset: int) -> tuple[list[Placed], int]:
-    """The whole blocks from byte `offset` on, and where to go on: a frame that is still being written is left for later."""
+def follow_blocks(path: Path, offset: int, most: int) -> tuple[list[Placed], int]:
+    """The whole blocks from byte `offset` on, `most` at a time, and where to go on: a frame that is still being written is left for later."""
     if not path.is_file():
         return [], offset
     with path.open("rb") as file:
@@ -83,7 +83,7 @@ def follow_blocks(path: Path, offset: int) -> tuple[list[Placed], int]:
         data = file.read()
     found: list[Placed] = []
     at = 0
-    while (payload := _payload(data, at)) is not None:
+    while len(found) < most and (payload := _payload(data, at)) is not None:
         found.append(_decode(payload))
         at += _FRAME.size + len(payload)
     return found, offset + at

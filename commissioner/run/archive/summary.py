@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from commissioner.report.run.summary import ACCEPTED, RESTORED_SINCE
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.documents import read_document
 from commissioner.run.archive.journal import Record, read_journal
 

@@ -10,8 +10,8 @@ from commissioner.link.drive.facts import DisarmReport, WriteReport
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
+from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import SafetyFacts
 from commissioner.settings import load_motor
@@ -132,7 +132,7 @@ def test_a_stop_during_the_write_back_lets_it_end_as_written(folder):
 
     class Writing(Drive):
         def write_circuit(self, *_):
-            stop.asked = "SIGTERM"
+            stop.ask("", "SIGTERM")
             return WriteReport((), True, 0, 1, None)
 
     plate = load_motor("motor_2kw2")

@@ -11,12 +11,36 @@ from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.archive.replay import replay
 from commissioner.run.archive.verify import refuse_damage, verify
 from commissioner.run.restore import restore
+from commissioner.run.write_accepted import (
+    Plan,
+    as_document,
+    check_token,
+    plan_restore,
+    plan_write_back,
+    write_accepted,
+)
 
 
-def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, seal: Path | None = None) -> None:
-    """Write the run's snapshot back, after asking."""
-    screen.require_yes(yes, as_json=as_json)
+def restore_run(
+    runs: Path,
+    run: str,
+    drive: str | None,
+    *,
+    yes: bool,
+    as_json: bool,
+    plan: bool = False,
+    token: str | None = None,
+    seal: Path | None = None,
+) -> None:
+    """Write the run's snapshot back, after asking. `plan`: only show what would change; `token`: only if that still holds."""
     summary = find_run(runs, run)
+    if plan or token is not None:
+        shown = plan_restore(summary, drive)
+        if plan:
+            _show_plan(shown, as_json=as_json)
+            return
+        check_token(shown, token or "")
+    screen.require_yes(yes, as_json=as_json)
     if not yes:
         screen.out.print(
             f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
@@ -39,6 +63,39 @@ def restore_run(runs: Path, run: str, drive: str | None, *, yes: bool, as_json: 
     )
     if done.wear_fraction is not None:
         screen.out.print(screen.wear(done.store_count, done.wear_fraction))
+
+
+def write_run(
+    runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None
+) -> None:
+    """An accepted result into the drive, after the table was shown and agreed to."""
+    summary = find_run(runs, run)
+    shown = plan_write_back(summary, drive)
+    if plan:
+        _show_plan(shown, as_json=as_json)
+        return
+    screen.require_yes(yes, as_json=as_json)
+    if not yes:
+        _show_plan(shown, as_json=False)
+        screen.confirm("Write?", otherwise="nothing was written")
+    done = write_accepted(summary, drive, shown.token if token is None else token)
+    if as_json:
+        reason = f"{len(done.written)} values written, {screen.kept(done.is_stored)}"
+        screen.emit({"outcome": "written", "reason": reason, "run": summary.run, "report": done})
+        return
+    screen.out.print(f"[green]{len(done.written)} parameters written, {screen.kept(done.is_stored)}[/]")
+    if done.wear_fraction is not None:
+        screen.out.print(screen.wear(done.store_count_after, done.wear_fraction))
+
+
+def _show_plan(plan: Plan, *, as_json: bool) -> None:
+    if as_json:
+        screen.emit(as_document(plan))
+        return
+    rows = [(str(r.register), r.name, f"{r.now:.6g}", f"{r.will_be:.6g}", r.unit, r.convention) for r in plan.rows]
+    screen.out.print(f"[bold]{plan.drive_type} #{plan.serial_number}[/]")
+    header = ("register", "parameter", "now", "will be", "unit", "convention")
+    screen.out.print(screen.table("", header, rows, right=(2, 3)))
 
 
 def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused, UsageError
-from commissioner.run.archive.catalogue import OLD_OR_NEW, RunSummary, find_run, read_runs
 from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.catalogue import OLD_OR_NEW, RunSummary, find_run, read_runs
 from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.verify import refuse_damage, verify
 
