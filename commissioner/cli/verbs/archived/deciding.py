@@ -9,6 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.archive.replay import replay
+from commissioner.run.archive.seal import read_key
 from commissioner.run.archive.verify import refuse_damage, verify
 from commissioner.run.restore import restore
 from commissioner.run.write_accepted import (
@@ -42,13 +43,10 @@ def restore_run(
         check_token(shown, token or "")
     screen.require_yes(yes, as_json=as_json)
     if not yes:
-        screen.out.print(
-            f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
-            "stored. Make sure that it is the same drive."
-        )
+        _show_plan(plan_restore(summary, drive), as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
     with screen.busy("writing and reading back"):
-        done = restore(summary, drive)
+        done = restore(summary, drive, key=read_key(seal) if seal is not None else None)
     mark_restored(summary)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
