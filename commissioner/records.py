@@ -129,6 +129,8 @@ class DriveStatus:
     test_time_left_s: float = 0.0
     samples_produced: int = 0
     overruns: int = 0
+    settings_count: int | None = None
+    """Changes of a setting since power-up, whoever made them; None where the drive does not count them."""
 
 
 @dataclass(frozen=True)

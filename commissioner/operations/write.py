@@ -54,13 +54,16 @@ def planned_restore(request: RunRequest) -> Plan:
     return plan_restore(request.find(), request.drive)
 
 
-def restore(request: RunRequest, token: str | None = None, observe: Observe = nobody) -> Restored:
-    """The set that the run found, written back, verified and stored. Aborted where `token` is of another table."""
+def restore(
+    request: RunRequest, token: str | None = None, observe: Observe = nobody, key: bytes | None = None
+) -> Restored:
+    """The set that the run found, written back, verified and stored. Aborted where `token` is of another table.
+    `key`: of a sealed folder."""
     summary = request.find()
     if token is not None:
         check_token(plan_restore(summary, request.drive), token)
     observe(Began("writing and reading back"))
-    done = write_snapshot(summary, request.drive)
+    done = write_snapshot(summary, request.drive, key=key)
     mark_restored(summary)
     return done
 

@@ -28,6 +28,8 @@ from commissioner.report.run.summary import diagnosis_sentences, summarise
 from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
+from commissioner.run.holding.drive_lock import ACT, DriveLock
+from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import OperatorStop
@@ -49,9 +51,10 @@ class Order:
     key: bytes | None = None
     """Seals the run's folder."""
 
-    def open_folder(self, runs: Path, **more: object) -> RunFolder:
-        """A new run folder, with the order in it; the address without what is secret."""
+    def open_folder(self, runs: Path, lock: DriveLock, **more: object) -> RunFolder:
+        """A new run folder, with the order in it; the address without what is secret. The lock is this run's from here on."""
         folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
+        lock.name_run(folder.path.name)
         request = {
             "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
@@ -84,7 +87,7 @@ def commission(
     begun: Callable[[Path], None] = lambda _folder: None,
     origin: Mapping[str, Any] | None = None,
 ) -> Commissioned:
-    """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
+    """The whole job. Configuration errors are raised, and DriveInUse where another run has the drive; from the first request on, every end is a run with a folder.
 
     `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
     `key`: seals the folder (`archive.seal`).
@@ -93,21 +96,21 @@ def commission(
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)
-    parse_url(url)
     order = Order(url, profile, nameplate, plan, write_back, key)
     findings = Findings()
-    folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
     asked = OperatorStop() if stop is None else stop
-    with closing(folder), asked, stopped_by_file(folder.path, asked):
-        begun(folder.path)
-        _tell(folder, present, WarmingUp())
-        warm_up(nameplate)
-        ended = carry_out(order, folder, findings, present, course, "job", asked)
-        result = close_run(order, folder, findings, ended)
-        if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
-            _tell(folder, present, Diagnosing(diagnosis_s))
-            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
-            note(folder, "diagnosed", {"verdict": (result["diagnosis"] or {})["verdict"]})
+    with DriveLock.take(parse_url(url), profile, ACT) as lock:
+        folder = order.open_folder(runs, lock, **({"origin": origin} if origin else {}))
+        with closing(folder), asked, stopped_by_file(folder.path, asked):
+            begun(folder.path)
+            _tell(folder, present, WarmingUp())
+            warm_up(nameplate)
+            ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
+            result = close_run(order, folder, findings, ended)
+            if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
+                _tell(folder, present, Diagnosing(diagnosis_s))
+                result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
+                note(folder, "diagnosed", {"verdict": (result["diagnosis"] or {})["verdict"]})
     return Commissioned(ended, folder.path, result)
 
 
@@ -132,6 +135,7 @@ def carry_out(
     steps: Callable[[Job, Findings], Course],
     kind: str,
     stop: OperatorStop,
+    lock: DriveLock,
 ) -> RunEnded:
     """The steps over the order's link, each refusal and failure as the end of a run. The job is journalled as `kind`;
     a `stop` asked for before it began ends the run, too. A UsageError before the first request is raised, too."""
@@ -141,8 +145,10 @@ def carry_out(
             inverter = Inverter(port, profile, lambda intent: _announce(folder, intent))
             job = make_job(profile, order.nameplate, order.plan, port, write_back=order.write_back)
             folder.journal(kind, job, durable=True)
-            runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
-            ended = runner.perform(steps(job, findings))
+            with Mastery(inverter, lock) as mastery:
+                mastery.take(inverter.identify())
+                runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
+                ended = runner.perform(steps(job, findings))
             with suppress(OSError):
                 folder.journal("link", port.stats.as_dict())
             return ended

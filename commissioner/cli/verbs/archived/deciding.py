@@ -7,6 +7,7 @@ from pathlib import Path
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
 from commissioner.operations import archive, write
+from commissioner.run.archive.seal import read_key
 from commissioner.run.write_accepted import Plan, as_document
 
 
@@ -27,15 +28,11 @@ def restore_run(
         _show_plan(write.planned_restore(request), as_json=as_json)
         return
     screen.require_yes(yes, as_json=as_json)
-    summary = request.find()
     if not yes:
-        screen.out.print(
-            f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
-            "stored. Make sure that it is the same drive."
-        )
+        _show_plan(write.planned_restore(request), as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
     with screen.busy("writing and reading back"):
-        done = write.restore(request, token)
+        done = write.restore(request, token, key=read_key(seal) if seal is not None else None)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
