@@ -23,6 +23,7 @@ import pyarrow.parquet as pa_parquet
 from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.computed import without_computed_third
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
+from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
@@ -311,10 +312,12 @@ def _read_csv(path: Path) -> Table:
     columns = text.readline().count(b",") + 1
     if columns > MAX_COLUMNS:
         raise too_large(path, f"{columns} columns", MAX_COLUMNS)
-    rest = pa.BufferReader(
-        memoryview(data)[start:]
-    )  # a thread that reads a Python file is cut off at exit, which then hangs or aborts
-    table = pa_csv.read_csv(rest, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
+    rest = arrow_owned(memoryview(data)[start:])
+    table = pa_csv.read_csv(
+        rest,
+        read_options=pa_csv.ReadOptions(use_threads=False),
+        convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]),
+    )
     return _as_table(path, table, typed_metadata(path, metadata))
 
 

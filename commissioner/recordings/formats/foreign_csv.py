@@ -13,6 +13,7 @@ import pyarrow.csv as pa_csv
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
+from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to_numbers
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
@@ -104,7 +105,7 @@ def _parsed(body: str, layout: Layout, width: int, keep: object, source: str) ->
     names = [f"c{k}" for k in range(width)]
     try:
         return pa_csv.read_csv(
-            pa.BufferReader(body.encode("utf-8", errors="replace")),
+            arrow_owned(body.encode("utf-8", errors="replace")),
             read_options=pa_csv.ReadOptions(column_names=names, use_threads=False),
             parse_options=pa_csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=keep),
             convert_options=pa_csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string())),
