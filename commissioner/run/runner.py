@@ -6,6 +6,7 @@ journals, on the disk, what energises or writes before it goes out.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
@@ -21,11 +22,15 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
 from commissioner.run.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
+from commissioner.safety.freshness import DriveClock
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
+from commissioner.safety.sensors import SensorWatch
 from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
 
 STATUS_EVERY_S = 0.25
 """Motor time between two readings of the drive's status while energised."""
+LATE_S = 0.05
+"""A sample that may be older than this: the drive is asked how many it has made, as often as this at the most."""
 EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
 TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
@@ -49,6 +54,9 @@ class _Progress:
     session_s: float = 0.0
     flux_fraction: float = 0.0
     next_status_s: float = 0.0
+    asked_s: float = -math.inf
+    clock: DriveClock | None = None
+    sensors: SensorWatch | None = None
 
 
 class Runner:
@@ -198,22 +206,29 @@ class Runner:
         progress = self._progress
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
+        limits = progress.facts.drive_limits
+        assert limits is not None
+        progress.sensors = SensorWatch(limits.current_a)
+        began_s = time.monotonic()
         self._cursor = self._inverter.enable()
+        progress.clock = DriveClock(began_s, self._cursor.stream.sample_period_s)
 
     def _fetch(self) -> SampleBlock | None:
-        """The next block, archived and judged; None once the drive has ended the session."""
+        """The next block with its age, archived and judged; None once the drive has ended the session."""
         block = self._next_block()
         if block is None:
             return None
         progress = self._progress
+        assert progress.sensors is not None
         self._folder.append(block, progress.segment)
         seconds = (block.count + block.lost_before) * block.sample_period_s
         progress.session_s += seconds
         progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
         self._stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
+        self._stop_if(progress.sensors.judge(block))
         if progress.session_s >= progress.next_status_s:
             progress.next_status_s = progress.session_s + STATUS_EVERY_S
-            self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+            self._ask_status()
         return block
 
     def _next_block(self) -> SampleBlock | None:
@@ -226,7 +241,7 @@ class Runner:
             window = self._inverter.fetch(self._cursor)
             self._cursor = window.cursor
             if window.block is not None:
-                return window.block
+                return self._dated(window.block, asked)
             if window.has_ended:
                 self._stop_if(judge_status(self._inverter.read_status(), self._watch))
                 return None
@@ -238,6 +253,29 @@ class Runner:
             limit="new samples within the watchdog's time",
             remedy="check the drive's status; the output has been switched off",
         )
+
+    def _dated(self, block: SampleBlock, asked_s: float) -> SampleBlock:
+        """The block with the largest age its last sample can have now. A window that is not full ends with the newest."""
+        progress, cursor = self._progress, self._cursor
+        assert progress.clock is not None and cursor is not None
+        if block.count < cursor.stream.samples_per_window:
+            progress.clock = progress.clock.at_most(cursor.next_index, asked_s)
+        now_s = time.monotonic()
+        if progress.clock.age_s(cursor.next_index, now_s) > LATE_S and now_s - progress.asked_s > LATE_S:
+            self._ask_status()
+            now_s = time.monotonic()
+        return replace(block, age_s=progress.clock.age_s(cursor.next_index, now_s))
+
+    def _ask_status(self) -> None:
+        """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
+        progress = self._progress
+        asked_s = progress.asked_s = time.monotonic()
+        status = self._inverter.read_status()
+        self._stop_if(judge_status(status, self._watch))
+        assert progress.clock is not None and progress.sensors is not None
+        if status.samples_produced > 0:
+            progress.clock = progress.clock.at_most(status.samples_produced, asked_s)
+        progress.sensors.claim(status)
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):
