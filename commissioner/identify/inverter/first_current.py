@@ -52,9 +52,19 @@ def first_current(levels: Sequence[HeldLevel], sample_period_s: float, tail: int
             remedy="check the current sensors' sign and order, the motor cable and the contactor",
         )  # fmt: skip
     slope_ohm = change_v / change_a
-    moved_wb = [
-        float(np.sum(level.samples_v - smaller.voltage_v - slope_ohm * (level.samples_a - smaller_a))) * sample_period_s
-        for level in levels[1:]
-    ]
-    inductance_h = 0.5 * (moved_wb[1] - moved_wb[0]) / change_a
+    down, up = (_moved_wb(level, smaller.voltage_v, smaller_a, slope_ohm, sample_period_s) for level in levels[1:])
+    inductance_h = 0.5 * (up - down) / change_a
     return FirstCurrent(inductance_h, slope_ohm, (larger.voltage_v, smaller.voltage_v), (larger_a, smaller_a))
+
+
+def stepped_inductance_h(larger: HeldLevel, smaller: HeldLevel, sample_period_s: float, tail: int) -> float:
+    """The static inductance between two levels above the inverter's knee, the second held after the first."""
+    larger_a, smaller_a = (float(np.mean(level.samples_a[-tail:])) for level in (larger, smaller))
+    change_a = max(larger_a - smaller_a, 1e-9)
+    slope_ohm = (larger.voltage_v - smaller.voltage_v) / change_a
+    return -_moved_wb(smaller, smaller.voltage_v, smaller_a, slope_ohm, sample_period_s) / change_a
+
+
+def _moved_wb(level: HeldLevel, voltage_v: float, current_a: float, slope_ohm: float, period_s: float) -> float:
+    """Stator flux gained from the level's first sample on: what of the voltage the static line does not take."""
+    return float(np.sum(level.samples_v - voltage_v - slope_ohm * (level.samples_a - current_a))) * period_s

@@ -126,12 +126,12 @@ def staircase(nameplate: Nameplate, limits: StaircaseLimits, seen_inductance_h: 
     """The plan for a motor of which the plate and, if so, the inductance at a small current is known.
 
     Its top current keeps the stator flux L_s i of the most inductive motor that this can be under the limit, iron
-    unsaturated.
+    unsaturated. A small current can show too little inductance, behind an inverter that loses much: it raises the top never.
     """
     box = prior(nameplate)
     inductance_h = MOST_INDUCTIVE * (box.typical.leakage_inductance_h + box.typical.magnetizing_inductance_h)
     if seen_inductance_h is not None:
-        inductance_h = SEEN_DOUBT * seen_inductance_h
+        inductance_h = max(inductance_h, SEEN_DOUBT * seen_inductance_h)
     top_a = 0.9 * min(limits.current_a, limits.flux_wb / inductance_h)
     slow = -poles_per_s(box.typical)[0]
     return StaircasePlan(

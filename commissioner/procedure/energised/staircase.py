@@ -6,9 +6,8 @@ inductance says how much the motor that is really there may be given.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from commissioner.errors import Aborted
 from commissioner.identify.inverter import staircase as resistance
-from commissioner.identify.inverter.first_current import FirstCurrent, HeldLevel, first_current
+from commissioner.identify.inverter.first_current import FirstCurrent, HeldLevel, first_current, stepped_inductance_h
 from commissioner.identify.inverter.settling import Approach, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
@@ -34,12 +33,12 @@ from commissioner.records import Signal
 from commissioner.safety.commands import Command, SetBias, SetDriveLimits, Tell
 
 STEP, FIRST_STEP = "DC staircase", "first current"
-RUNGS, FIRST_RUNGS = (1.0, 0.6, 0.3), (1.0, 0.55)
-"""DC levels of one sign, of the top current; of the first current."""
+RUNGS, UNKNOWN_RUNGS, FIRST_LOWER = (1.0, 0.6, 0.3), (0.6, 0.3), 0.55
+"""DC levels of one sign, of the top current; on an unknown motor those before the top; the lower of the first current."""
 FIRST_SHARE = 0.2
 """The first current, of the top that the plate's most inductive motor could take."""
-KNOWN_TOP = 0.95
-"""Flux of the top DC level, of the limit, once the inductance is known."""
+TOP, KNOWN_TOP = 0.9, 0.95
+"""Flux of the top DC level, of the limit, and once all of the machine is known."""
 TOP_ROOM = 1.15
 """Current that the drive ends a staircase at, of its top."""
 SECONDS = 5.0
@@ -72,11 +71,16 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
             return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
     stair = _Stair(job, findings, axis_deg)
     yield from stair.begin(stair.ceilings())
-    voltages = stair.known_voltages() or (yield from stair.climb(findings.first_current))
-    both = (*voltages, *(-v for v in reversed(voltages)))
-    for number, (before_v, voltage_v) in enumerate(itertools.pairwise((0.0, *both))):
-        yield from stair.hold(before_v, voltage_v, len(both) - number)
-        yield Tell(stair.progress(len(both)))
+    known = stair.known_voltages()
+    if known:
+        yield from stair.walk((*known, *(-v for v in reversed(known))))
+    else:
+        yield from stair.climb(UNKNOWN_RUNGS[0])
+        yield from stair.walk([stair.voltage_at(rung) for rung in UNKNOWN_RUNGS])
+        stair.tighten()
+        yield from stair.climb(1.0)
+        top = stair.voltage_at(1.0)
+        yield from stair.walk((top, *(-stair.voltage_at(rung) for rung in reversed(UNKNOWN_RUNGS)), -top))
     yield from stair.end("staircase measured", 1.0 / BIAS_RAMP_PER_S)
     findings.knee = findings.knee or tuple(stair.knee)
     fitted = resistance.fit_staircase((*stair.levels(), *findings.knee), axis_deg)
@@ -90,10 +94,9 @@ def _first_current(job: Job, findings: Findings, axis_deg: float) -> Generator[C
     """A tenth of the current, then half of that: the static inductance of the motor that is really there."""
     stair = _Stair(job, findings, axis_deg, is_first=True)
     yield from stair.begin(stair.ceilings())
-    upper_v, lower_v = yield from stair.climb(None)
-    yield from stair.hold(0.0, upper_v, 3)
-    yield from stair.hold(upper_v, lower_v, 2)
-    yield from stair.hold(lower_v, upper_v, 1)
+    yield from stair.climb(1.0)
+    upper_v, lower_v = stair.voltage_at(1.0), stair.voltage_at(FIRST_LOWER)
+    yield from stair.walk((upper_v, lower_v, upper_v))
     seen = stair.first_current()
     yield from stair.end("first current seen", FIRST_END_S)
     findings.first_current = seen
@@ -113,6 +116,8 @@ class _Stair(DirectCurrent):
         self._is_first = is_first
         self._most_a = findings.test_current_a(job)
         self.knee: list[DcLevel] = []
+        self._reached, self._steady, self._before_v = [0.0], [0.0], 0.0
+        self._levels = 3 if is_first else 2 * len(RUNGS)
         self._held: list[tuple[float, Approach]] = []
         self._whole: list[HeldLevel] = []
         flux_wb = job.flux_limit_wb(findings.resistance_ohm(job))
@@ -148,17 +153,18 @@ class _Stair(DirectCurrent):
         volts = self._known.stator_resistance_ohm * currents + lost
         return tuple(float(min(v, self.job.test_voltage_v)) for v in volts)
 
-    def climb(self, seen: FirstCurrent | None) -> Generator[Command, Any, tuple[float, ...]]:
-        """Raise the bias until the top current flows, slowly once any flows; the rungs' voltages, largest first. It begins
-        where a first current flowed.
+    def climb(self, share: float) -> Generator[Command, Any, None]:
+        """Raise the bias until this share of the top current flows, slowly once any flows, from where current was seen to
+        flow before.
 
         What the climb needs to build up flux would drive too much current once held: it is taken off, for the most
-        inductive motor the plate allows.
+        inductive motor that this can be.
         """
-        job, voltage_v, steady, reached = self.job, seen.voltage_v[1] if seen else 0.0, [0.0], [0.0]
-        slow, carries = self._plan.climb_v_per_s, FIRST_CARRIES if self._is_first else CARRIES
-        step_s = STEER_S
-        while reached[-1] < self._top_a and voltage_v < job.test_voltage_v:
+        job, slow, reached, steady = self.job, self._plan.climb_v_per_s, self._reached, self._steady
+        carries = FIRST_CARRIES if self._is_first else CARRIES
+        seen = self.findings.first_current
+        voltage_v, wanted_a = max(steady[-1], seen.voltage_v[1] if seen else 0.0), share * self._top_a
+        while reached[-1] < wanted_a and voltage_v < job.test_voltage_v:
             rate = slow if seen or reached[-1] > carries * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
             voltage_v = min(voltage_v + rate * STEER_S, job.test_voltage_v)
             step_s, seen_a = yield from self.steer(voltage_v, self._top_a)
@@ -167,14 +173,32 @@ class _Stair(DirectCurrent):
             back = min(len(reached) - 1, RISE_STEPS)
             rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
             steady.append(max(steady[-1], voltage_v - self._plan.largest_inductance_h * rise))
-        if reached[-1] < 0.3 * self._top_a:
+        if reached[-1] < 0.3 * wanted_a:
             raise Aborted(
                 "no current flows", step=self._where, value=f"{reached[-1]:.3g} A",
-                limit=f"{self._top_a:.3g} A within {job.test_voltage_v:.3g} V",
+                limit=f"{wanted_a:.3g} A within {job.test_voltage_v:.3g} V",
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip
-        rungs = FIRST_RUNGS if self._is_first else RUNGS
-        return tuple(float(np.interp(rung * reached[-1], reached, steady)) for rung in rungs)
+        self._top_a = min(self._top_a, reached[-1] / share)
+
+    def voltage_at(self, rung: float) -> float:
+        """What the climb has shown to hold this share of the top current."""
+        return float(np.interp(rung * self._top_a, self._reached, self._steady))
+
+    def tighten(self) -> None:
+        """The inductance between the two levels held last says how high the top may be."""
+        period = period_s(self.findings)
+        larger, smaller = self._whole[-2:]
+        inductance_h = stepped_inductance_h(larger, smaller, period, self._tail)
+        self._top_a = min(self._top_a, TOP * self._limit_wb / max(resistance.SEEN_DOUBT * inductance_h, 1e-9))
+
+    def walk(self, voltages_v: Sequence[float]) -> Generator[Command, Any, None]:
+        """Hold these levels, one after the other."""
+        for voltage_v in voltages_v:
+            yield from self.hold(self._before_v, voltage_v, self._levels - len(self._held))
+            self._before_v = voltage_v
+            if not self._is_first:
+                yield Tell(self.progress(self._levels))
 
     def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
         """Points on the knee of the inverter's error, which no settled level shows; the iron's small lag taken off."""
@@ -244,8 +268,11 @@ class _Stair(DirectCurrent):
 
     def first_current(self) -> FirstCurrent:
         """From the levels that were held: the larger, the smaller, the larger again."""
-        period = period_s(self.findings)
-        return first_current(self._whole, period, max(8, round(self._plan.window_s / period)))
+        return first_current(self._whole, period_s(self.findings), self._tail)
+
+    @property
+    def _tail(self) -> int:
+        return max(8, round(self._plan.window_s / period_s(self.findings)))
 
     def progress(self, planned: int) -> StepProgress:
         voltage_v, approach = self._held[-1]
@@ -256,7 +283,7 @@ class _Stair(DirectCurrent):
 
     def _has_settled(self, current: Signal) -> bool:
         """The means of the last three windows differ by less than `SETTLED` of the top current."""
-        n = max(8, round(self._plan.window_s / period_s(self.findings)))
+        n = self._tail
         if current.size < 3 * n:
             return False
         means = [float(np.mean(current[current.size - k * n : current.size - (k - 1) * n])) for k in (1, 2, 3)]
