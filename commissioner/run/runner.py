@@ -54,6 +54,7 @@ class _Progress:
     session_s: float = 0.0
     flux_fraction: float = 0.0
     next_status_s: float = 0.0
+    began_s: float = 0.0
     asked_s: float = -math.inf
     clock: DriveClock | None = None
     sensors: SensorWatch | None = None
@@ -207,11 +208,10 @@ class Runner:
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
         limits = progress.facts.drive_limits
-        assert limits is not None
-        progress.sensors = SensorWatch(limits.current_a)
-        began_s = time.monotonic()
+        progress.sensors = SensorWatch(limits.current_a if limits else math.inf)
+        progress.began_s = time.monotonic()
         self._cursor = self._inverter.enable()
-        progress.clock = DriveClock(began_s, self._cursor.stream.sample_period_s)
+        progress.clock = None
 
     def _fetch(self) -> SampleBlock | None:
         """The next block with its age, archived and judged; None once the drive has ended the session."""
@@ -257,7 +257,9 @@ class Runner:
     def _dated(self, block: SampleBlock, asked_s: float) -> SampleBlock:
         """The block with the largest age its last sample can have now. A window that is not full ends with the newest."""
         progress, cursor = self._progress, self._cursor
-        assert progress.clock is not None and cursor is not None
+        assert cursor is not None
+        if progress.clock is None:
+            progress.clock = DriveClock(progress.began_s, block.sample_period_s)
         if block.count < cursor.stream.samples_per_window:
             progress.clock = progress.clock.at_most(cursor.next_index, asked_s)
         now_s = time.monotonic()

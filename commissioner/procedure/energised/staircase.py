@@ -43,7 +43,9 @@ TOP_ROOM = 1.15
 """Current that the drive ends a staircase at, of its top."""
 SECONDS = 5.0
 """A staircase's energised time, a first current's included; levels that have not settled by then are extrapolated."""
-FIRST_END_S = 0.05
+FIRST_SECONDS, FIRST_END_S = 2.2, 0.05
+FIRST_KEEPS = 0.6
+"""Of the climb's voltage: what the first current is held at, at the least; a slow motor's climb is nearly all induction."""
 IDLE_S = 4.0
 """The climb would pass the whole test voltage in this time as long as no current flows."""
 CARRIES, FIRST_CARRIES = 0.02, 0.15
@@ -172,7 +174,8 @@ class _Stair(DirectCurrent):
             reached.append(max(reached[-1], seen_a))
             back = min(len(reached) - 1, RISE_STEPS)
             rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
-            steady.append(max(steady[-1], voltage_v - self._plan.largest_inductance_h * rise))
+            held_v = voltage_v - self._plan.largest_inductance_h * rise
+            steady.append(max(steady[-1], held_v, FIRST_KEEPS * voltage_v if self._is_first else 0.0))
         if reached[-1] < 0.3 * wanted_a:
             raise Aborted(
                 "no current flows", step=self._where, value=f"{reached[-1]:.3g} A",
@@ -211,7 +214,8 @@ class _Stair(DirectCurrent):
 
     def hold(self, before_v: float, voltage_v: float, levels_left: int) -> Generator[Command, Any, None]:
         """Hold a level until its current has settled or its share of the time is up; keep how it got there."""
-        share_s = (SECONDS * self.job.stretch - self._already_s - self.seconds) / levels_left
+        budget_s = FIRST_SECONDS if self._is_first else SECONDS
+        share_s = (budget_s * self.job.stretch - self._already_s - self.seconds) / levels_left
         until_s = self.seconds + max(share_s, 0.2 * self._slow_s, 0.05)
         yield from self._push(before_v, voltage_v)
         yield SetBias(voltage_v)
