@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LINK = ("late", "jitter", "spell", "stall", "request_stall", "drop", "duplicate", "corrupt", "busy")
+LINK = ("none", "late", "jitter", "spell", "stall", "request_stall", "drop", "duplicate", "corrupt", "busy")
 HOST = ("host_stop",)
 SENSORS = (
     "currents_doubled", "currents_halved", "sensor_reversed", "sensor_silent", "sensor_frozen", "all_frozen", "sensors_swapped",
@@ -35,6 +35,8 @@ def draw(rng: np.random.Generator, kind: str) -> Trouble:
     session = int(rng.integers(1, len(LONGEST_SESSIONS_S) + 1))
     at_s = float(rng.uniform(0.0, LONGEST_SESSIONS_S[session - 1]))
     phase = int(rng.integers(3))
+    if kind == "none":  # the control: nothing happens
+        return Trouble(kind, 0, 0.0, FOR_EVER_S, 0.0)
     if kind == "late":  # constant, from the first request on or from some moment
         from_start = rng.random() < 0.5
         return Trouble(
