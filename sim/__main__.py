@@ -114,8 +114,14 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
 
 async def _serve_until_signal(scenario, serving, serve) -> None:
     stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    loop = asyncio.get_running_loop()
+    for name in (
+        "SIGINT",
+        "SIGTERM",
+        "SIGBREAK",
+    ):  # the last is Windows' Ctrl-Break; its loop has no handlers of its own
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: loop.call_soon_threadsafe(stop.set))
     await serve(scenario, serving, _announce, stop)
 
 

@@ -113,7 +113,7 @@ def read_document(name: str, depth: int = 0) -> dict[str, Any]:
     if path.suffix == ".json":
         return {"name": path.stem, **_extended_model(path)}
     try:
-        document = tomllib.loads(path.read_text())
+        document = tomllib.loads(path.read_text("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: not TOML: {error}") from error
     base = document.pop("extends", None)
@@ -125,7 +125,7 @@ def read_document(name: str, depth: int = 0) -> dict[str, Any]:
 
 def _extended_model(path: Path) -> dict[str, Any]:
     try:
-        document = json.loads(path.read_text())
+        document = json.loads(path.read_text("utf-8"))
         return dict(document["scenario"])
     except (ValueError, KeyError, TypeError) as error:
         raise ScenarioError(f"{path}: not an extended model with a scenario: {error}") from error
@@ -245,7 +245,7 @@ def _machine(document: dict[str, Any], source: str) -> tuple[Nameplate, Machine]
 
 def table_rows() -> list[dict[str, str]]:
     """Rows of the machine table: T circuits with their sources."""
-    with MACHINE_TABLE.open(newline="") as file:
+    with MACHINE_TABLE.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -1,0 +1,1 @@
+"""The command line: options in; words, tables, JSON and exit codes out."""

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from commissioner.cli.console import degrade_output
+from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
 
 app = typer.Typer(
@@ -20,6 +22,9 @@ app = typer.Typer(
 )
 runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
 app.add_typer(runs_app, name="runs")
+app.add_typer(drives_app, name="drives")
+accounts_app = typer.Typer(no_args_is_help=True, help="The service's accounts: add, list, remove.")
+app.add_typer(accounts_app, name="accounts")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Diagnosed = Annotated[
@@ -36,6 +41,17 @@ Drive = Annotated[
 Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in config/drives or a .toml file.")]
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
+]
+Seal = Annotated[
+    Path | None,
+    typer.Option(
+        "--seal",
+        envvar="COMMISSIONER_SEAL",
+        help="Key file: what is archived is sealed with it, and proved by `verify`.",
+    ),
+]
+Salvage = Annotated[
+    bool, typer.Option("--salvage", help="Go on with what is whole of a damaged run; the loss is still named.")
 ]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
@@ -94,6 +110,14 @@ def run(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
+    seal: Seal = None,
+    dead_man: Annotated[
+        bool,
+        typer.Option(
+            "--dead-man",
+            help="Held by a service: standard input says begin, beats, says stop; its end or 2 s of silence mean zero volts.",
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
@@ -110,6 +134,8 @@ def run(
         runs=runs,
         as_json=json,
         diagnosis=diagnosis,
+        seal=seal,
+        dead_man=dead_man,
     )
 
 
@@ -212,7 +238,7 @@ def simulate(
 @runs_app.command("list")
 def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.runs import list_runs
+    from commissioner.cli.verbs.archived.runs import list_runs
 
     list_runs(runs, as_json=json)
 
@@ -224,7 +250,7 @@ def runs_show(
     json: Json = False,
 ) -> None:
     """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.verbs.runs import show_run
+    from commissioner.cli.verbs.archived.runs import show_run
 
     show_run(runs, run, as_json=json)
 
@@ -232,7 +258,7 @@ def runs_show(
 @runs_app.command("report")
 def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Where the HTML report of a run is; made again from its archive where it is missing."""
-    from commissioner.cli.verbs.runs import report_run
+    from commissioner.cli.verbs.archived.runs import report_run
 
     report_run(runs, run, as_json=json)
 
@@ -241,21 +267,36 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 def runs_export(
     run: Run,
     out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """The samples of a run as one recording; works for runs that were cut off, too."""
-    from commissioner.cli.verbs.runs import export_run
+    from commissioner.cli.verbs.archived.runs import export_run
 
-    export_run(runs, run, out, as_json=json)
+    export_run(runs, run, out, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
 def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.runs import compare_runs
+    from commissioner.cli.verbs.archived.runs import compare_runs
 
     compare_runs(runs, before, after, as_json=json)
+
+
+@runs_app.command("verify")
+def runs_verify(
+    run: Annotated[str | None, typer.Argument(help="Run id, or the start of one; `last` for the newest.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Every run in the archive.")] = False,
+    seal: Seal = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Files and hash chain: exit 0 intact (a run that was killed is cut off, not damaged), 3 something lost or changed."""
+    from commissioner.cli.verbs.archived.verify import verify_runs
+
+    verify_runs(runs, run, everything=everything, seal=seal, as_json=json)
 
 
 @app.command()
@@ -263,23 +304,122 @@ def restore(
     run: Run,
     drive: Annotated[str | None, typer.Option("--drive", help="Drive URL; the run's own if not given.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    seal: Seal = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Only show what would change.")] = False,
+    token: Annotated[str | None, typer.Option(help="Write only if the table of --plan still holds.")] = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """Write back the parameter set a run found in the drive, verified and stored."""
-    from commissioner.cli.verbs.archive import restore_run
+    from commissioner.cli.verbs.archived.deciding import restore_run
 
-    restore_run(runs, run, drive, yes=yes, as_json=json)
+    restore_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token, seal=seal)
+
+
+@app.command("write-back")
+def write_back_run(
+    run: Run = "last",
+    drive: Annotated[str | None, typer.Option("--drive", help="Drive URL; the run's own if not given.")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    plan: Annotated[bool, typer.Option("--plan", help="Only show what would change.")] = False,
+    token: Annotated[str | None, typer.Option(help="Write only if the table of --plan still holds.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Write an accepted result of a run that was made without --write-back into its drive, verified and stored."""
+    from commissioner.cli.verbs.archived.deciding import write_run
+
+    write_run(runs, run, drive, yes=yes, as_json=json, plan=plan, token=token)
 
 
 @app.command()
-def replay(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
-    """Feed the archived blocks through the pure layers; decisions must come out identical."""
-    from commissioner.cli.verbs.archive import replay_run
+def serve(
+    host: Annotated[
+        str, typer.Option(help="Where to listen; another host than this computer needs TLS and accounts.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0 picks a free one.")] = 8321,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="TOML file: drives, TLS, folders. None: the simulator.")
+    ] = None,
+    open_page: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The service: HTTP API and the technician's page."""
+    from commissioner.cli.verbs.serve import serve as verb
 
-    replay_run(runs, run, as_json=json)
+    verb(host=host, port=port, config=config, open_page=open_page, runs=runs, as_json=json)
+
+
+@app.command()
+def replay(run: Run = "last", salvage: Salvage = False, runs: Runs = RUNS, json: Json = False) -> None:
+    """Feed the archived blocks through the pure layers; decisions must come out identical."""
+    from commissioner.cli.verbs.archived.deciding import replay_run
+
+    replay_run(runs, run, as_json=json, salvage=salvage)
+
+
+@app.command()
+def docs(
+    name: Annotated[str | None, typer.Argument(help="Chapter; all are listed without it.")] = None, json: Json = False
+) -> None:
+    """The manual: its chapters, or one of them."""
+    from commissioner.cli.verbs.docs import docs as verb
+
+    verb(name, as_json=json)
+
+
+@app.command()
+def ports(json: Json = False) -> None:
+    """The serial adapters of this computer, each with its --drive URL. Opens none."""
+    from commissioner.cli.verbs.ports import ports as verb
+
+    verb(as_json=json)
+
+
+@accounts_app.command("add")
+def accounts_add(
+    name: Annotated[str, typer.Argument(help="Name to log in with.")],
+    role: Annotated[str, typer.Option(help="viewer | operator | administrator")] = "operator",
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read the password from this file; asked for if not given.")
+    ] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """A new account. The password comes from a prompt or a file, never from the command line."""
+    from commissioner.cli.verbs.serve import add
+
+    add(name, role=role, password_file=password_file, config=config, runs=runs, as_json=json)
+
+
+@accounts_app.command("list")
+def accounts_list(
+    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Names and roles."""
+    from commissioner.cli.verbs.serve import list_accounts
+
+    list_accounts(config=config, runs=runs, as_json=json)
+
+
+@accounts_app.command("remove")
+def accounts_remove(
+    name: Annotated[str, typer.Argument(help="Name of the account.")],
+    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Remove an account; its sessions end at once."""
+    from commissioner.cli.verbs.serve import remove
+
+    remove(name, config=config, runs=runs, as_json=json)
 
 
 def main() -> None:
     """Entry point of the console script."""
+    degrade_output()
     run_to_exit(app, sys.argv[1:])

@@ -14,9 +14,8 @@ from typing import Any, NoReturn
 import typer
 from typer.exceptions import TyperException
 
-from commissioner.cli.secrets import Secrets
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
-from commissioner.link.wire.url import without_secrets
+from commissioner.link.wire.secrets import Secrets, shown_call
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 INTERRUPTED = 130
@@ -73,7 +72,9 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
 
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
-    return UsageError(text, step="command line", value=_call(arguments), limit="see --help", remedy="correct the call")
+    return UsageError(
+        text, step="command line", value=shown_call(arguments), limit="see --help", remedy="correct the call"
+    )
 
 
 def _stopped() -> CommissionerError:
@@ -96,14 +97,9 @@ def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerErr
     )  # fmt: skip
 
 
-def _call(arguments: Sequence[str]) -> str:
-    """The call as it may be shown and kept."""
-    return " ".join(without_secrets(Secrets(arguments).hide(argument)) for argument in arguments)
-
-
 def _too_much(arguments: Sequence[str]) -> CommissionerError:
     return DataRefused(
-        "this needs more memory than there is", step=_verb(arguments), value=_call(arguments),
+        "this needs more memory than there is", step=_verb(arguments), value=shown_call(arguments),
         limit="what fits into memory", remedy="split the recording, or ask for less",
     )  # fmt: skip
 

@@ -1,0 +1,1 @@
+"""A running motor from its terminals: currents and voltages in, speed, torque, load faults and indicators out."""

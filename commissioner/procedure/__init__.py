@@ -1,0 +1,1 @@
+"""The commissioning procedure, without a wire: drive replies in, commands, decisions and a verdict out."""

@@ -99,10 +99,10 @@ def _is_binary(path: Path) -> bool:
 
 def check_ending(path: Path) -> None:
     """UsageError where the name does not say which kind of recording it is to be."""
-    if not path.name.endswith((".csv", ".csv.gz", ".parquet")):
+    if not path.name.endswith((".csv", ".csv.gz", ".parquet", ".mat")):
         raise UsageError(
             f"{path.name} is not a recording's name", step="write recording", value=path.suffix,
-            limit=".csv, .csv.gz or .parquet", remedy="choose one of these endings",
+            limit=".csv, .csv.gz, .parquet or .mat", remedy="choose one of these endings",
         )  # fmt: skip
 
 
@@ -110,7 +110,9 @@ def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str
     """Write the table whole or not at all (a temporary file is renamed into place)."""
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     with whole_file(path) as temporary:
-        if path.suffix == ".parquet":
+        if path.suffix == ".mat":
+            _write_matlab(temporary, columns, metadata)
+        elif path.suffix == ".parquet":
             schema = table.schema.with_metadata({k: str(v) for k, v in metadata.items()})
             pa_parquet.write_table(table.cast(schema), temporary, compression="zstd")
         else:
@@ -118,6 +120,14 @@ def write_table(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str
             with opener(temporary, "wb") as file:
                 file.write("".join(f"# {k}: {v}\n" for k, v in metadata.items()).encode())
                 pa_csv.write_csv(table, file, pa_csv.WriteOptions(quoting_style="none"))
+
+
+def _write_matlab(path: Path, columns: Mapping[str, Signal], metadata: Mapping[str, float | str]) -> None:
+    """MATLAB 5: a variable for each column and for each key, by the contract's names."""
+    from scipy.io import savemat
+
+    with path.open("wb") as file:
+        savemat(file, {**metadata, **columns}, long_field_names=True, oned_as="column")
 
 
 def to_standstill(table: Table) -> StandstillRecording:

@@ -1,0 +1,1 @@
+"""Pages that people keep: result documents in, self-contained HTML out."""

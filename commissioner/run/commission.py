@@ -23,12 +23,13 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal, write_recording
+from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
-from commissioner.run.operator_stop import OperatorStop
-from commissioner.run.runner import Course, Present, Runner
+from commissioner.run.runner import Course, Present, Runner, kind_of
+from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stopping.stop_file import stopped_by_file
 
 BUSY = 3.0
 """The closing diagnosis may take this much longer on a computer that does something else as well."""
@@ -43,10 +44,12 @@ class Order:
     nameplate: Nameplate
     plan: ProcedurePlan
     write_back: bool
+    key: bytes | None = None
+    """Seals the run's folder."""
 
     def open_folder(self, runs: Path, **more: object) -> RunFolder:
         """A new run folder, with the order in it; the address without what is secret."""
-        folder = RunFolder.create(runs, Path(self.profile.file).stem)
+        folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
         request = {
             "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
@@ -74,26 +77,43 @@ def commission(
     runs: Path,
     present: Present,
     diagnosis_s: float = 0.0,
+    key: bytes | None = None,
+    stop: OperatorStop | None = None,
+    begun: Callable[[Path], None] = lambda _folder: None,
+    origin: Mapping[str, Any] | None = None,
 ) -> Commissioned:
     """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
 
     `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
+    `key`: seals the folder (`archive.seal`).
+    `stop`: by which others end the run. `begun` is told the folder as soon as there is one. `origin`: who asked for the
+    run, and under which names of drive and motor; kept with the request.
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)
     parse_url(url)
-    present(WarmingUp())
-    warm_up(nameplate)
-    order = Order(url, profile, nameplate, plan, write_back)
+    order = Order(url, profile, nameplate, plan, write_back, key)
     findings = Findings()
-    folder = order.open_folder(runs)
-    with closing(folder), OperatorStop() as stop:
-        ended = carry_out(order, folder, findings, present, course, "job", stop)
+    folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
+    asked = OperatorStop() if stop is None else stop
+    with closing(folder), asked, stopped_by_file(folder.path, asked):
+        begun(folder.path)
+        _tell(folder, present, WarmingUp())
+        warm_up(nameplate)
+        ended = carry_out(order, folder, findings, present, course, "job", asked)
         result = close_run(order, folder, findings, ended)
-        if diagnosis_s > 0.0 and findings.identification is not None and not stop.asked:
-            present(Diagnosing(diagnosis_s))
-            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, stop))
+        if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
+            _tell(folder, present, Diagnosing(diagnosis_s))
+            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
+            note(folder, "diagnosed", {"verdict": result["diagnosis"]["verdict"]})
     return Commissioned(ended, folder.path, result)
+
+
+def _tell(folder: RunFolder, present: Present, state: WarmingUp | Diagnosing) -> None:
+    """A state in which nothing is energised: to the journal, which others follow, and to the screen."""
+    note(folder, kind_of(state), state)
+    with suppress(Exception):
+        present(state)
 
 
 def require_capabilities(profile: DriveProfile, *, write_back: bool) -> None:
@@ -156,11 +176,12 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
     }
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
-    write_recording(folder.path, metadata)
+    folder.write_recording(metadata)
     result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
+    folder.cover()
     return result
 
 

@@ -21,7 +21,7 @@ from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import OperatorStop
 
 
 @dataclass(frozen=True)

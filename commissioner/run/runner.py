@@ -16,23 +16,18 @@ from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBac
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
-from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
-from commissioner.run.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
+from commissioner.run.stream import Stream, stop_if
 from commissioner.safety import commands as ask
-from commissioner.safety.freshness import DriveClock
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
 from commissioner.safety.sensors import SensorWatch
-from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
+from commissioner.safety.watch import WatchLimits, judge_block, judge_status
 
 STATUS_EVERY_S = 0.25
 """Motor time between two readings of the drive's status while energised."""
-LATE_S = 0.05
-"""A sample that may be older than this: the drive is asked how many it has made, as often as this at the most."""
-EMPTY_FETCH_PAUSE_S = 0.002
-"""Wait after a window without new samples: a drive in real time needs a moment."""
 TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
 """Before the first of these the drive is somebody else's: it is only looked at, and not switched off either."""
 
@@ -54,10 +49,7 @@ class _Progress:
     session_s: float = 0.0
     flux_fraction: float = 0.0
     next_status_s: float = 0.0
-    began_s: float = 0.0
-    asked_s: float = -math.inf
-    clock: DriveClock | None = None
-    sensors: SensorWatch | None = None
+    granted: StopAsked | None = None
 
 
 class Runner:
@@ -80,7 +72,7 @@ class Runner:
         self._present = present
         self._progress = _Progress()
         self._stop = stop or OperatorStop()
-        self._cursor: StreamCursor | None = None
+        self._stream: Stream | None = None
         self._snapshot: ParameterSnapshot | None = None
 
     @property
@@ -102,6 +94,8 @@ class Runner:
             finally:
                 self._progress.facts = replace(self._progress.facts, run_ended=True)
                 live = self._disarm(error.what if error is not None else "the run has ended")
+                if self._progress.granted is not None:  # zero volts came first
+                    note(self._folder, kind_of(self._progress.granted), self._progress.granted)
         if live is not None:
             ended, error = None, still_live(live, error)
         if ended is None:
@@ -114,7 +108,8 @@ class Runner:
     def _drive(self, course: Course) -> RunEnded:
         reply: object = None
         while True:
-            if self._stop.asked and not self._progress.has_written:  # what is written ends as written
+            if self._stop.wish is not None and not self._progress.has_written:  # what is written ends as written
+                self._progress.granted = self._stop.wish
                 raise Aborted(
                     "stopped by the operator",
                     step="run",
@@ -178,7 +173,7 @@ class Runner:
                 live = self._disarm(reason)
                 if live is not None:
                     raise live
-                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+                stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
                 set_up(self._inverter, command)
 
@@ -208,76 +203,29 @@ class Runner:
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
         limits = progress.facts.drive_limits
-        progress.sensors = SensorWatch(limits.current_a if limits else math.inf)
-        progress.began_s = time.monotonic()
-        self._cursor = self._inverter.enable()
-        progress.clock = None
+        began_s = time.monotonic()
+        cursor = self._inverter.enable()
+        sensors = SensorWatch(limits.current_a if limits else math.inf)
+        self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
 
     def _fetch(self) -> SampleBlock | None:
-        """The next block with its age, archived and judged; None once the drive has ended the session."""
-        block = self._next_block()
+        """The next block, archived and judged; None once the drive has ended the session."""
+        longest_s = self._progress.facts.watchdog_s
+        assert self._stream is not None and longest_s is not None
+        block = self._stream.next_block(longest_s)
         if block is None:
             return None
         progress = self._progress
-        assert progress.sensors is not None
         self._folder.append(block, progress.segment)
         seconds = (block.count + block.lost_before) * block.sample_period_s
         progress.session_s += seconds
         progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
-        self._stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
-        self._stop_if(progress.sensors.judge(block))
+        stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
+        stop_if(self._stream.sensors.judge(block))
         if progress.session_s >= progress.next_status_s:
             progress.next_status_s = progress.session_s + STATUS_EVERY_S
-            self._ask_status()
+            self._stream.ask_status()
         return block
-
-    def _next_block(self) -> SampleBlock | None:
-        longest_s = self._progress.facts.watchdog_s
-        assert self._cursor is not None and longest_s is not None
-        asked = time.monotonic()
-        deadline = asked + longest_s
-        while asked <= deadline:
-            asked = time.monotonic()
-            window = self._inverter.fetch(self._cursor)
-            self._cursor = window.cursor
-            if window.block is not None:
-                return self._dated(window.block, asked)
-            if window.has_ended:
-                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
-                return None
-            time.sleep(EMPTY_FETCH_PAUSE_S)
-        raise DriveFault(
-            "the drive sends no samples",
-            step="stream",
-            value=f"nothing for {longest_s:g} s",
-            limit="new samples within the watchdog's time",
-            remedy="check the drive's status; the output has been switched off",
-        )
-
-    def _dated(self, block: SampleBlock, asked_s: float) -> SampleBlock:
-        """The block with the largest age its last sample can have now. A window that is not full ends with the newest."""
-        progress, cursor = self._progress, self._cursor
-        assert cursor is not None
-        if progress.clock is None:
-            progress.clock = DriveClock(progress.began_s, block.sample_period_s)
-        if block.count < cursor.stream.samples_per_window:
-            progress.clock = progress.clock.at_most(cursor.next_index, asked_s)
-        now_s = time.monotonic()
-        if progress.clock.age_s(cursor.next_index, now_s) > LATE_S and now_s - progress.asked_s > LATE_S:
-            self._ask_status()
-            now_s = time.monotonic()
-        return replace(block, age_s=progress.clock.age_s(cursor.next_index, now_s))
-
-    def _ask_status(self) -> None:
-        """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
-        progress = self._progress
-        asked_s = progress.asked_s = time.monotonic()
-        status = self._inverter.read_status()
-        self._stop_if(judge_status(status, self._watch))
-        assert progress.clock is not None and progress.sensors is not None
-        if status.samples_produced > 0:
-            progress.clock = progress.clock.at_most(status.samples_produced, asked_s)
-        progress.sensors.claim(status)
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):
@@ -291,17 +239,12 @@ class Runner:
         self._show(record)
 
     def _show(self, record: object) -> None:
-        """To the screen. A screen that has gone must not end a run."""
+        """To the screen. A screen that has gone, or that has a defect, must not end a run."""
         try:
             self._present(record)
-        except (OSError, SystemExit):
+        except (Exception, SystemExit) as gone:
             self._present = lambda _record: None
-
-    def _stop_if(self, reason: StopReason | None) -> None:
-        if reason is None:
-            return
-        kind = DriveFault if reason.is_fault else Aborted
-        raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
+            note(self._folder, "presenter_lost", {"kind": type(gone).__name__, "what": str(gone)})
 
     def _disarm(self, reason: str) -> DriveFault | None:
         """The one place that de-energises. It tries every path and says what it verified.

@@ -15,8 +15,8 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.recorded import recorded_course
 from commissioner.procedure.steps import Findings
 from commissioner.run.commission import Commissioned, Order, carry_out, close_run
-from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Present
+from commissioner.run.stopping.operator_stop import OperatorStop
 
 
 def write_recorded(

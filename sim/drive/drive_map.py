@@ -84,7 +84,7 @@ class DriveMap:
 
 def load_map(path: Path = MAP_FILE, shift: int = 0) -> DriveMap:
     """The drive's map; `shift` moves every address but the identity's (a firmware of another generation)."""
-    document = tomllib.loads(path.read_text())
+    document = tomllib.loads(path.read_text("utf-8"))
     items = {name: _item(name, entry, shift) for name, entry in document["items"].items()}
     by_address = {item.address + k: item for item in items.values() for k in range(item.words)}
     window = document["window"]

@@ -21,7 +21,7 @@ class Memory:
 
     def _load(self, path: Path) -> None:
         try:
-            saved = json.loads(path.read_text())
+            saved = json.loads(path.read_text("utf-8"))
             self.is_intact = saved.get("check") == _check(saved["content"])
             self.content = saved["content"]
         except (ValueError, KeyError):
@@ -48,7 +48,7 @@ class Memory:
         if self.path is None:
             return
         temporary = self.path.with_name(self.path.name + ".part")
-        temporary.write_text(json.dumps({"content": self.content, "check": _check(self.content)}))
+        temporary.write_text(json.dumps({"content": self.content, "check": _check(self.content)}), "utf-8")
         os.replace(temporary, self.path)  # noqa: PTH105 - Path.replace is the same call
 
 

@@ -14,7 +14,14 @@ from sim.physics import layout as at
 if TYPE_CHECKING:
     from sim.drive.firmware import Firmware
 
-NOT_NEGATIVE = ("scale_ramp_per_s", "bias_ramp_v_per_s", "duration_s", "current_limit_a", "voltage_limit_v")
+NOT_NEGATIVE = (
+    "scale_ramp_per_s",
+    "bias_ramp_v_per_s",
+    "duration_s",
+    "current_limit_a",
+    "voltage_limit_v",
+    "test_time_limit_s",
+)
 
 
 class Registers:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import termios
 import time
-import tty
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -21,6 +19,8 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from sim.wire.faults import SERVER, WIRE, Fault, deliver
 from sim.wire.station import Drive, Options, sim_device
 
+FUNCTIONS = (3, 6, 16, 23)
+
 
 class Handler(ServerRequestHandler):
     """One connection. Counts requests and lets the fault plan at the bytes."""
@@ -31,6 +31,7 @@ class Handler(ServerRequestHandler):
         self.hits: list[Fault] = []
         self.held = b""
         self.is_deaf = False
+        self.undecoded = b""
 
     def data_received(self, data: bytes) -> None:
         if self.is_deaf:
@@ -42,6 +43,7 @@ class Handler(ServerRequestHandler):
         super().data_received(data)
 
     def callback_data(self, data: bytes, addr: Any = None) -> int:
+        self.undecoded = data
         used = super().callback_data(data, addr)
         while self.last_pdu is None and used and used < len(data):  # another station's frame in front of ours
             data = data[used:]
@@ -50,6 +52,17 @@ class Handler(ServerRequestHandler):
                 break
             used += more
         return used
+
+    def server_send(self, pdu: Any, addr: Any) -> None:
+        """pymodbus 3.15 answers what it cannot decode with function 0, exception 1: here with its function and reason."""
+        at = 1 if self.line.is_rtu else 7
+        if pdu and pdu.function_code == 0x80 and len(self.undecoded) > at:
+            if self.undecoded[at - 1] != self.line.drive.map.device_id:
+                return
+            function = self.undecoded[at]
+            pdu.function_code = function | 0x80
+            pdu.exception_code = ExcCodes.ILLEGAL_VALUE if function in FUNCTIONS else ExcCodes.ILLEGAL_FUNCTION
+        super().server_send(pdu, addr)
 
     async def handle_request(self) -> None:
         pdu = self.last_pdu
@@ -146,6 +159,8 @@ class Line:
 
     def open_pty(self) -> None:
         """A pseudo terminal: ours is the master side, the path of the other is `address`."""
+        import tty  # pseudo terminals are POSIX's
+
         self.server = self.make()
         self.pty_master, slave = os.openpty()
         tty.setraw(slave)
@@ -155,6 +170,8 @@ class Line:
         self._attach_pty()
 
     def _attach_pty(self) -> None:
+        import termios
+
         termios.tcflush(self.pty_master, termios.TCIFLUSH)
         handler = Handler(self.server, self)
         transport = PtyTransport(self.pty_master, handler)

@@ -12,7 +12,7 @@ class StateLog:
     """Appends to a file, or does nothing without one. Every line is on disk's side of the process at once."""
 
     def __init__(self, path: Path | None) -> None:
-        self.file: IO[str] | None = path.open("a", buffering=1) if path else None
+        self.file: IO[str] | None = path.open("a", buffering=1, encoding="utf-8") if path else None
 
     def write(self, event: str, motor_time_s: float, **facts: Any) -> None:
         if self.file is None:

@@ -91,14 +91,16 @@ def _open_key(row: Row, case: Case, scenario: Any, seen: Any, recording: Any) ->
 
 def campaign(cases: Sequence[Case], seconds: float, jobs: int, rows_file: Path) -> list[Row]:
     """Rows of all cases; those already in the file are not run again."""
-    rows = [json.loads(line) for line in rows_file.read_text().splitlines()] if rows_file.is_file() else []
+    rows = (
+        [json.loads(line) for line in rows_file.read_text(encoding="utf-8").splitlines()] if rows_file.is_file() else []
+    )
     done = {(r["case"], r["segment_seconds"]) for r in rows}
     todo = [c for c in cases if (c.name, seconds) not in done]
     names = {c.name for c in cases}
     rows = [r for r in rows if r["case"] in names and r["segment_seconds"] == seconds]
     with (
         ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _worker, (jobs > 1,)) as pool,
-        rows_file.open("a") as file,
+        rows_file.open("a", encoding="utf-8") as file,
     ):
         waiting = [pool.submit(run, case, seconds) for case in todo]
         for count, future in enumerate(as_completed(waiting), 1):

@@ -15,9 +15,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from commissioner.errors import Aborted, CommissionerError, UsageError
-from commissioner.report.run.summary import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
-from commissioner.run.archive.folder import plain
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, standing
+from commissioner.report.run.summary import finding_sentences
+from commissioner.run.archive.documents import plain
+from commissioner.text import LONGEST
+from commissioner.text import shown as visible
 
+SENTENCE = 2000
+"""Characters of a failure's facts: they are ours, with somebody else's inside."""
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
@@ -56,15 +61,15 @@ def busy(doing: str) -> Iterator[None]:
 
 def failure(error: CommissionerError) -> None:
     """What happened, where, value, limit, remedy: a line each."""
-    err.print(f"[bold red]{escape(printable(error.what))}[/]")
-    for name, text in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
-        if text not in (None, ""):
-            err.print(f"  [dim]{name:<7}[/]{escape(printable(shown(text)))}")
+    err.print(f"[bold red]{text(error.what, SENTENCE)}[/]")
+    for name, fact in (("step", error.step), ("value", error.value), ("limit", error.limit), ("remedy", error.remedy)):
+        if fact not in (None, ""):
+            err.print(f"  [dim]{name:<7}[/]{text(shown(fact), SENTENCE)}")
 
 
-def printable(text: str) -> str:
-    """Without the control characters that a stranger's file may hold: they could steer the terminal."""
-    return "".join(character if character.isprintable() or character == "\n" else "?" for character in text)
+def text(value: object, longest: int = LONGEST) -> str:
+    """Whatever comes from outside, as it may stand in a line with markup: shown, never obeyed."""
+    return escape(visible(value, longest))
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], *, right: Iterable[int] = ()) -> Table:

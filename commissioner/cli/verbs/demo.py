@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import subprocess
 import sys
@@ -57,8 +56,9 @@ def simulated_inverter(scenario: str, speed: str, seed: int) -> Iterator[str]:
     command = [sys.executable, "-m", "sim", "--scenario", scenario, "--tcp", "0", "--speed", speed, "--seed", str(seed)]
     # its own process group: Ctrl-C in the terminal must reach the service, not cut the drive off under it
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, env=dict(os.environ)
-    )
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
+        start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+    )  # fmt: skip
     try:
         yield f"tcp://127.0.0.1:{_port(process)}?device=1"
     finally:

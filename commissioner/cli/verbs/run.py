@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
 
 from rich.markup import escape
@@ -13,8 +15,11 @@ from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import check_failed
 from commissioner.procedure.plan import ProcedurePlan
+from commissioner.run.archive.seal import read_key
 from commissioner.run.commission import Commissioned, commission, require_capabilities
 from commissioner.run.inspection import inspect_drive
+from commissioner.run.stopping.dead_man import DeadMan
+from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load_motor, load_procedure
 
 DIAGNOSIS_S = 60.0
@@ -34,8 +39,16 @@ def run(
     runs: Path,
     as_json: bool,
     diagnosis: bool,
+    seal: Path | None = None,
+    dead_man: bool = False,
 ) -> None:
     """Commission the drive; exits with the code of the outcome."""
+    if dead_man:
+        hold_and_commission(
+            url=drive, profile=profile, motor=motor, axes=parse_axes(axes), write_back=write_back, procedure=procedure,
+            runs=runs, diagnosis=diagnosis,
+        )  # fmt: skip
+        return
     commission_and_show(
         url=drive,
         profile=profile,
@@ -47,6 +60,7 @@ def run(
         runs=runs,
         as_json=as_json,
         diagnosis=diagnosis,
+        seal=seal,
     )
 
 
@@ -62,8 +76,10 @@ def commission_and_show(
     runs: Path,
     as_json: bool,
     diagnosis: bool,
+    seal: Path | None = None,
 ) -> None:
     """The part that `run` and `demo` share."""
+    key = read_key(seal) if seal is not None else None
     nameplate = load_motor(motor)
     plan = load_procedure(procedure, axes_deg=axes)
     screen.require_yes(yes, as_json=as_json)
@@ -79,8 +95,40 @@ def commission_and_show(
             runs=runs,
             present=view,
             diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0,
+            key=key,
         )
     show_and_exit(done, as_json=as_json)
+
+
+def hold_and_commission(
+    *,
+    url: str,
+    profile: str,
+    motor: str,
+    axes: tuple[float, ...] | None,
+    write_back: bool,
+    procedure: Path | None,
+    runs: Path,
+    diagnosis: bool,
+) -> None:
+    """A run that a service holds by the pipe at our standard input. Nobody is asked here; nothing is shown but two JSON
+    documents: the folder as soon as there is one, on a line of its own, and the result."""
+    nameplate = load_motor(motor)
+    plan = load_procedure(procedure, axes_deg=axes)
+    stop = OperatorStop()
+    held = DeadMan(sys.stdin.fileno(), stop)
+    held.start()
+    origin = held.wait_for_begin()
+    done = commission(
+        url, profile, nameplate, plan, write_back=write_back, runs=runs, present=lambda _record: None,
+        diagnosis_s=DIAGNOSIS_S if diagnosis else 0.0, stop=stop, begun=_say_folder, origin=origin,
+    )  # fmt: skip
+    show_and_exit(done, as_json=True)
+
+
+def _say_folder(folder: Path) -> None:
+    sys.stdout.write(json.dumps({"run": folder.name, "folder": str(folder)}) + "\n")
+    sys.stdout.flush()
 
 
 def _ask(url: str, profile: str, nameplate: Nameplate, plan: ProcedurePlan, *, write_back: bool) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import socket
 import ssl
-import termios
 import time
 from typing import NoReturn
 
@@ -130,7 +129,9 @@ class SerialClient(ModbusSerialClient):
         """Bytes on the line that nobody has read; 0 where the line is gone, which the next request will tell."""
         try:
             return int(self.socket.in_waiting) if self.socket else 0
-        except (OSError, TypeError, termios.error):
+        except (
+            Exception
+        ):  # what pyserial lets through differs by system: OSError, TypeError, termios.error, ctypes' errors
             return 0
 
     def drain(self) -> int:

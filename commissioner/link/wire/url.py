@@ -1,4 +1,4 @@
-"""Drive URLs: `tcp://host:port?device=1`, `tls://host:802?ca=..&cert=..&key=..`, `rtu:///dev/ttyUSB0?baud=115200`."""
+"""Drive URLs: `tcp://host:port?device=1`, `tls://host:802?ca=..&cert=..&key=..`, `rtu:///dev/ttyUSB0?baud=115200`, `rtu://COM3`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 from commissioner.errors import UsageError
 
 BAUD_RATES = (1200, 2400, 4800, 9600, 14400, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 921600, 1000000)
+WINDOWS_PORT = re.compile(r"COM[1-9]\d{0,2}", re.IGNORECASE)
 PARITIES = ("E", "O", "N")
 
 
@@ -112,14 +113,25 @@ def _tls(text: str, parts: SplitResult) -> TlsUrl:
 
 def _rtu(text: str, parts: SplitResult) -> RtuUrl:
     options = _options(text, parts, ("device", "baud", "parity", "stop"))
-    if parts.netloc or not parts.path.strip("/"):
-        raise _refuse(text, parts.netloc or parts.path, "three slashes and the serial device: rtu:///dev/ttyUSB0")
+    device = _serial_device(parts)
+    if not device:
+        raise _refuse(
+            text, parts.netloc or parts.path, "a serial device: rtu:///dev/ttyUSB0 (three slashes), or rtu://COM3"
+        )
     parity = options.get("parity", "E").upper()
     if parity not in PARITIES:
         raise _refuse(text, f"parity={parity}", "E, O or N")
     baud = _whole(text, options, "baud", 19200, BAUD_RATES)
     stop = _whole(text, options, "stop", 2 if parity == "N" and "parity" in options else 1, (1, 2))
-    return RtuUrl(unquote(parts.path), baud, parity, stop, _device(text, options))
+    return RtuUrl(device, baud, parity, stop, _device(text, options))
+
+
+def _serial_device(parts: SplitResult) -> str:
+    """A path behind three slashes, or a Windows port behind two or three; empty where neither stands there."""
+    named = unquote(parts.netloc or parts.path.strip("/"))
+    if WINDOWS_PORT.fullmatch(named) and parts.path.strip("/") in ("", named):
+        return named.upper()
+    return "" if parts.netloc or not named else unquote(parts.path)
 
 
 def _options(text: str, parts: SplitResult, known: tuple[str, ...]) -> dict[str, str]:

@@ -68,7 +68,7 @@ def too_little(frame: TurningFrame, part: slice, found: Found, search: ShaftSear
             f"a line {periods.SHAFT_SIGNIFICANT:g} times as strong as the noise around it",
             "record longer, with better sensors, or at a load that turns; check rated_speed_rpm and pole_pairs",
         )
-    slowest = min([f.frequency_hz for f in (found.shaft, *found.loads) if f is not None])
+    slowest = min(f.frequency_hz for f in (found.shaft, *found.loads) if f is not None)
     turns = length * slowest
     least = LEAST_TURNS if found.loads == () else LEAST_LOAD_PERIODS
     if turns < least:

@@ -9,9 +9,6 @@ from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
 from commissioner.procedure.verdict import PARAMETERS
 
-ACCEPTED, RESTORED_SINCE = "accepted, not written", "commissioned, restored since"
-"""How a run stands that ended as commissioned while the drive does not hold its values."""
-
 
 def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Mapping[str, str]) -> dict[str, Any]:
     """What `run --json` prints and `result.json` holds. `parameter_names`: the drive's name -> the contract's."""
@@ -42,12 +39,6 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "limit_wb": findings.flux_limit_wb,
     }
     return document
-
-
-def standing(result: Mapping[str, Any]) -> str:
-    """The outcome; of a result that was accepted, whether it was written as well."""
-    outcome = str(result["outcome"])
-    return ACCEPTED if outcome == "commissioned" and not result.get("written") else outcome
 
 
 def finding_sentences(result: Mapping[str, Any]) -> list[str]:

@@ -17,10 +17,12 @@ from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
-from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, WrittenParameter
+from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.report.run.summary import summarise
 from commissioner.run.acting import Announcer
-from commissioner.run.archive.folder import damaged, plain, read_blocks, read_journal, read_saved
+from commissioner.run.archive.blocks import BlockDamage, read_blocks
+from commissioner.run.archive.documents import damaged, plain, read_saved
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask
 
@@ -50,20 +52,22 @@ class _ArchiveEnds(Exception):
     pass
 
 
-def replay(folder: Path) -> Replayed:
+def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     """The decisions of the run in `folder`, made again from its archived answers.
 
-    A run that a guard, a fault or the operator ended is compared up to there. DataRefused: the folder holds no run.
+    A run that a guard, a fault or the operator ended is compared up to there; with `salvage` a damaged one up to the first
+    loss. DataRefused: the folder holds no run.
     """
     journal = read_journal(folder / "journal.jsonl")
-    _check_whole(folder, journal)
+    if not salvage:
+        _check_whole(folder, journal)
     job = read_job(folder, journal)
     if not any(line["kind"] in _DECISIONS for line in journal):
         raise damaged(folder, "journal.jsonl", "no decision behind the job")
     archived = [_decision(line["kind"], line["record"]) for line in journal if _is_compared(line)]
     announcer = Announcer(load_profile(read_saved(folder, "request.json", "profile")["profile"]))
     kinds = {line["kind"] for line in journal}
-    is_by_itself = "run_ended" in kinds and "error" not in kinds
+    is_by_itself = "run_ended" in kinds and "error" not in kinds and not salvage
     if is_by_itself:
         archived += [_end(line["record"]) for line in journal if line["kind"] == "run_ended"]
     findings = Findings()
@@ -73,7 +77,8 @@ def replay(folder: Path) -> Replayed:
         formed = summarise(findings, ended, folder.name, job.parameter_names)
         archived += _result(read_saved(folder, "result.json"), formed)
         replayed += _result(formed, formed)
-    return Replayed(len(archived), _first_difference(archived, replayed, may_go_on=not is_by_itself))
+    difference = _first_difference(archived, replayed, may_go_on=not is_by_itself or salvage, may_end=salvage)
+    return Replayed(len(replayed) if salvage else len(archived), difference)
 
 
 def _is_compared(line: Mapping[str, Any]) -> bool:
@@ -167,7 +172,7 @@ def _decide_again(
     with_end: bool = False,
 ) -> Iterator[dict[str, Any]]:
     replies = iter([line["record"] for line in journal if line["kind"] == "reply"])
-    blocks = (block for _, block in read_blocks(folder / "blocks.bin"))
+    blocks = _blocks_to_the_first_loss(folder / "blocks.bin")
     steps, reply = course(job, findings), None
     try:
         while True:
@@ -182,6 +187,14 @@ def _decide_again(
             yield _end(plain(stop.value))
     except (_ArchiveEnds, CommissionerError):
         return
+
+
+def _blocks_to_the_first_loss(path: Path) -> Iterator[SampleBlock]:
+    damage: list[BlockDamage] = []
+    for _, block in read_blocks(path, damage):
+        if damage:
+            return
+        yield block
 
 
 def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Iterator[Any]) -> Any:
@@ -202,12 +215,12 @@ def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Ite
 
 
 def _first_difference(
-    archived: list[dict[str, Any]], replayed: list[dict[str, Any]], *, may_go_on: bool
+    archived: list[dict[str, Any]], replayed: list[dict[str, Any]], *, may_go_on: bool, may_end: bool
 ) -> Difference | None:
     for number, (old, new) in enumerate(zip(archived, replayed, strict=False)):
         if old != new:
             return Difference(number, old, new)
-    if len(replayed) < len(archived):
+    if len(replayed) < len(archived) and not may_end:
         return Difference(len(replayed), archived[len(replayed)], None)
     if len(replayed) > len(archived) and not may_go_on:
         return Difference(len(archived), None, replayed[len(archived)])

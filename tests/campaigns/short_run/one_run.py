@@ -239,7 +239,7 @@ def _stopping(runner: Runner, sequence: Sequence, course: Any) -> Iterator[Any]:
         except StopIteration as stop:
             return stop.value
         if number == sequence.stop_after:
-            runner._stop.asked = "Ctrl-C"
+            runner._stop.ask("", "Ctrl-C")
         number += 1
         reply = yield command
 

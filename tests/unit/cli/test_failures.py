@@ -10,8 +10,8 @@ import typer
 
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
-from commissioner.cli.secrets import Secrets
 from commissioner.errors import DriveFault
+from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND
 
 ONE_RUN = "20260101-000000-simulated"
@@ -101,7 +101,8 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     """The verb waits at the pipe that it was given for its input."""
     os.mkfifo(tmp_path / "pipe")
     script = COMMAND[-1].replace(
-        "main()", "import commissioner.cli.verbs.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()"
+        "main()",
+        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()",
     )
     call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it

@@ -64,14 +64,21 @@ def test_a_torn_last_block_is_left_out_and_the_rest_is_whole(folder, cut):
     assert [b.first_index for _, b in read_blocks(path)] == [0, 29]
 
 
-def test_a_flipped_bit_ends_the_reading_instead_of_giving_wrong_samples(folder):
-    for n in range(2):
+@pytest.mark.parametrize("place", ["mark", "length", "check sum", "samples"])
+def test_a_flipped_bit_costs_one_block_and_its_samples_are_counted_as_lost(folder, place):
+    for n in range(4):
         folder.append(_block(29 * n), 0)
     path = folder.path / "blocks.bin"
     data = bytearray(path.read_bytes())
-    data[-100] ^= 1
+    data[len(data) // 4 + {"mark": 1, "length": 4, "check sum": 9, "samples": 400}[place]] ^= 1
     path.write_bytes(data)
-    assert len(list(read_blocks(path))) == 1
+    damage = []
+    blocks = [block for _, block in read_blocks(path, damage)]
+    assert [block.first_index for block in blocks] == [0, 58, 87]
+    assert [block.lost_before for block in blocks] == [0, 29, 0]
+    assert [(d.offset, d.size, d.after, d.lost_samples, d.is_tail) for d in damage] == [
+        (len(data) // 4, len(data) // 4, (0, 29), 29, False)
+    ]
 
 
 def test_lost_samples_are_missing_rows_in_the_recording(folder):
@@ -91,8 +98,8 @@ def test_journal_survives_a_torn_line(folder):
     path = folder.path / "journal.jsonl"
     path.write_text(path.read_text() + '{"n": 2, "ki')
     records = read_journal(path)
-    assert [r["kind"] for r in records] == ["a", "b"]
-    assert records[1]["record"] == {"x": None}
+    assert [r["kind"] for r in records] == ["run_started", "a", "b"]
+    assert records[2]["record"] == {"x": None}
 
 
 def test_json_never_holds_nan_or_arrays():
@@ -110,7 +117,8 @@ def test_what_is_added_after_a_torn_line_can_be_read(folder):
     again = RunFolder(folder.path)
     again.journal("b", 2)
     again.close()
-    assert [(r["n"], r["kind"]) for r in read_journal(path)] == [(0, "a"), (1, "b")]
+    kinds = ["run_started", "a", "folder_closed", "b", "folder_closed"]
+    assert [(r["n"], r["kind"]) for r in read_journal(path)] == list(enumerate(kinds))
 
 
 def intent(action):

@@ -14,8 +14,8 @@ from commissioner.link.files.drive_file import load_profile
 from commissioner.procedure.findings import RunEnded
 from commissioner.run import commission
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.operator_stop import OperatorStop
 from commissioner.run.runner import Runner
+from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
 from commissioner.settings import load_motor, load_procedure
 from tests.support.scripted_port import ScriptedDrive

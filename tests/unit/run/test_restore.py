@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.cli.verbs.archive import restore_run
+from commissioner.cli.verbs.archived.deciding import restore_run
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError, WriteBackFailed
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile

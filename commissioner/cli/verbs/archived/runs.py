@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused, UsageError
+from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import OLD_OR_NEW, RunSummary, find_run, read_runs
-from commissioner.run.archive.folder import damaged, read_blocks, read_saved
+from commissioner.run.archive.documents import damaged, read_saved
+from commissioner.run.archive.verify import refuse_damage, verify
 
 if TYPE_CHECKING:
     from commissioner.identify.estimate.axes import Combined
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 def list_runs(folder: Path, *, as_json: bool) -> None:
     """All runs, newest first."""
-    found = read_runs(folder)
+    found = read_runs(folder, with_results=as_json)
     if as_json:
         screen.emit({"runs": found})
         return
@@ -61,7 +63,7 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
         screen.out.print(str(report), soft_wrap=True)
 
 
-def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
+def export_run(folder: Path, name: str, out: Path, *, as_json: bool, salvage: bool = False) -> None:
     """The run's whole samples as a recording in the contract's format."""
     from commissioner.procedure.assembly import assemble, columns
     from commissioner.recordings.table import check_ending, write_table
@@ -69,6 +71,9 @@ def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
     summary = find_run(folder, name)
     check_ending(out)
     source = Path(summary.folder)
+    verified = verify(source)
+    if not salvage:
+        refuse_damage(source, verified, "export", "blocks.bin", "request.json")
     nameplate = read_saved(source, "request.json", "nameplate")["nameplate"]
     if not isinstance(nameplate, dict):
         raise damaged(source, "request.json", f"nameplate {nameplate!r}")
@@ -81,7 +86,8 @@ def export_run(folder: Path, name: str, out: Path, *, as_json: bool) -> None:
         )  # fmt: skip
     write_table(out, columns(recording), plate | {"sample_period_s": recording.sample_period_s, "run": summary.run})
     if as_json:
-        screen.emit({"run": summary.run, "recording": str(out), "samples": int(recording.time_s.size)})
+        screen.emit({"run": summary.run, "recording": str(out), "samples": int(recording.time_s.size),
+                     "losses": verified.losses})  # fmt: skip
     else:
         screen.out.print(f"{recording.time_s.size} samples in {out}", soft_wrap=True)
 

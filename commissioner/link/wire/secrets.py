@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
 
-from commissioner.link.wire.url import USERINFO
+from commissioner.link.wire.url import USERINFO, without_secrets
 
 HIDDEN = "***"
 _OPTION = re.compile(
@@ -35,6 +35,12 @@ class Secrets:
         if isinstance(value, list | tuple):
             return [self.hide(part) for part in value]
         return value
+
+
+def shown_call(arguments: Sequence[str]) -> str:
+    """The call as it may be shown and kept."""
+    hide = Secrets(arguments).hide
+    return " ".join(without_secrets(hide(argument)) for argument in arguments)
 
 
 def _found(arguments: Sequence[str]) -> Iterator[str]:

@@ -1,0 +1,91 @@
+"""`commissioner drives conformance`: every rule of the commissioning map against somebody's firmware."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from rich.markup import escape
+
+from commissioner.cli.screens import screen
+from commissioner.conformance.kit import Conformance, chosen, run_conformance
+from commissioner.conformance.records import Outcome, RuleResult
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url
+
+MARKS = {Outcome.PASS: "[green]✓[/]", Outcome.FAIL: "[red]✗[/]", Outcome.NOT_TESTED: "[yellow]–[/]"}
+SOME_FAILED = 3
+
+
+def conformance(
+    *, url: str, profile: str, energise: bool, rules: tuple[str, ...], reply_timeout_s: float, yes: bool, as_json: bool
+) -> None:
+    """Prints every rule as it ends; exits with 3 where one failed."""
+    drive_url, drive_profile = parse_url(url), load_profile(profile)
+    chosen(rules)
+    if energise:
+        _ask(yes=yes, as_json=as_json)
+    done = run_conformance(
+        drive_url,
+        drive_profile,
+        energise=energise,
+        only=rules,
+        reply_timeout_s=reply_timeout_s,
+        on_result=_keep_quiet if as_json else _show,
+    )
+    if as_json:
+        screen.emit(as_document(done))
+    else:
+        screen.out.print(f"[bold]{_counts(done)}[/]")
+    if not done.conforms:
+        raise SystemExit(SOME_FAILED)
+
+
+def as_document(done: Conformance) -> dict[str, Any]:
+    """The JSON of `--json`: outcome, counts and every rule with its evidence."""
+    return {
+        "outcome": "passed" if done.conforms else "rejected",
+        "reason": _counts(done),
+        "drive": done.drive,
+        "energised": done.energised,
+        "counts": {outcome.value: done.count(outcome) for outcome in Outcome},
+        "rules": [asdict(result) | {"outcome": result.outcome.value} for result in done.results],
+    }
+
+
+def _counts(done: Conformance) -> str:
+    passed, failed, rest = (done.count(outcome) for outcome in (Outcome.PASS, Outcome.FAIL, Outcome.NOT_TESTED))
+    return f"{passed} rules passed, {failed} failed, {rest} not tested"
+
+
+def _keep_quiet(_: RuleResult) -> None:
+    """With --json nothing but the document goes to stdout."""
+
+
+def _show(result: RuleResult) -> None:
+    """One line per rule; a failed one with its reason and the deciding request and reply."""
+    screen.out.print(f"{MARKS[result.outcome]} {result.name}", soft_wrap=True)
+    if result.outcome is Outcome.PASS:
+        return
+    screen.out.print(f"    [dim]{escape(result.claim)}[/]")
+    screen.out.print(f"    {escape(result.reason)}")
+    if result.outcome is Outcome.FAIL:
+        for exchange in result.evidence[-2:]:
+            reply = exchange.reply or "silence"
+            took = f"{1e3 * exchange.took_s:.1f} ms"
+            screen.out.print(
+                f"    [dim]{exchange.at_s:.3f} s  {exchange.request} -> {reply}  {took}[/]", soft_wrap=True
+            )
+
+
+def _ask(*, yes: bool, as_json: bool) -> None:
+    """A person says yes before the motor is energised."""
+    screen.require_yes(yes, as_json=as_json)
+    if yes:
+        return
+    screen.out.print(
+        "[bold yellow]The motor will be energised[/] at standstill, again and again for some seconds each, with a fifth of "
+        "its rated current. No torque is made on purpose, but the shaft may move.\n"
+        "Energise only with guards on, people away and the emergency stop tested."
+    )
+    screen.confirm("Energise?", otherwise="nothing was energised")

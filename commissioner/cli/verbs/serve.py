@@ -1,0 +1,117 @@
+"""`commissioner serve`: HTTP API and the technician's page; `commissioner accounts`: who may log in to it."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import sys
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from commissioner.cli.screens import screen
+from commissioner.errors import UsageError
+
+if TYPE_CHECKING:
+    from commissioner.service.access.accounts import Accounts
+
+
+def serve(*, host: str, port: int, config: Path | None, open_page: bool, runs: Path, as_json: bool) -> None:
+    """Serve until stopped. The first line on stdout says where."""
+    require_extra()
+    from commissioner.service.configuration import load_settings
+    from commissioner.service.serving import serve_until_stopped
+
+    def ready(url: str) -> None:
+        sys.stdout.write((json.dumps({"url": url}) if as_json else f"serving {url}") + "\n")
+        sys.stdout.flush()
+        if open_page:
+            webbrowser.open(url)
+
+    with suppress(KeyboardInterrupt):  # Ctrl-C and SIGTERM are how a service ends
+        serve_until_stopped(load_settings(config, host=host, port=port, runs=runs), ready)
+
+
+def add(name: str, *, role: str, password_file: Path | None, config: Path | None, runs: Path, as_json: bool) -> None:
+    """A new account; the password from a file or a prompt."""
+    from commissioner.service.access.accounts import Role
+
+    if role.upper() not in Role.__members__:
+        raise UsageError(
+            f"there is no role {role!r}",
+            step="accounts",
+            value=role,
+            limit="viewer, operator or administrator",
+            remedy="give one of these",
+        )
+    _accounts(config, runs).add(name, Role[role.upper()], _password(password_file))
+    _said({"account": name, "role": role.lower()}, f"{name} may log in as {role.lower()}", as_json)
+
+
+def list_accounts(*, config: Path | None, runs: Path, as_json: bool) -> None:
+    """Names and roles."""
+    known = [{"account": a.name, "role": a.role.name.lower()} for a in _accounts(config, runs).all()]
+    if as_json:
+        screen.emit({"accounts": known})
+    elif known:
+        screen.out.print(screen.table("", ("account", "role"), [(a["account"], a["role"]) for a in known]))
+    else:
+        screen.out.print("no accounts: whoever sits at this computer acts as operator, no other host is served")
+
+
+def remove(name: str, *, config: Path | None, runs: Path, as_json: bool) -> None:
+    """No longer an account."""
+    _accounts(config, runs).remove(name)
+    _said({"removed": name}, f"{name} is removed", as_json)
+
+
+def _accounts(config: Path | None, runs: Path) -> Accounts:
+    require_extra()
+    from commissioner.service.access.accounts import Accounts
+    from commissioner.service.configuration import load_settings
+
+    settings = load_settings(config, host="127.0.0.1", port=0, runs=runs)
+    return Accounts(settings.data / "accounts.json")
+
+
+def require_extra() -> None:
+    """UsageError where the packages of the extra `serve` are not installed."""
+    try:
+        import argon2  # noqa: F401
+        import fastapi  # noqa: F401
+        import uvicorn  # noqa: F401
+    except ImportError as missing:
+        raise UsageError(
+            "the service is not installed",
+            step="serve",
+            value=str(missing.name),
+            limit="the extra `serve`",
+            remedy="pip install 'commissioner[serve]'",
+        ) from missing
+
+
+def _password(file: Path | None) -> str:
+    if file is not None:
+        return file.read_text("utf-8").splitlines()[0] if file.stat().st_size else ""
+    if not sys.stdin.isatty():
+        raise UsageError(
+            "nobody can be asked for a password",
+            step="accounts",
+            value="no terminal",
+            limit="a terminal, or --password-file",
+            remedy="write the password into a file that only you may read and give it with --password-file",
+        )
+    first = getpass.getpass("Password: ")
+    if first != getpass.getpass("Again: "):
+        raise UsageError(
+            "the two passwords differ", step="accounts", value=None, limit="twice the same", remedy="try again"
+        )
+    return first
+
+
+def _said(document: dict[str, str], words: str, as_json: bool) -> None:
+    if as_json:
+        screen.emit(document)
+    else:
+        screen.out.print(words, markup=False)

@@ -1,0 +1,30 @@
+"""All rules, in the order they are tried: what only asks first, what writes next, what energises last."""
+
+from __future__ import annotations
+
+from commissioner.conformance.records import Rule
+from commissioner.conformance.rules import (
+    enabling,
+    excitation,
+    identity,
+    parameters,
+    protocol,
+    states,
+    stopping,
+    supervision,
+    trips,
+    window,
+)
+
+RULES: tuple[Rule, ...] = (
+    *protocol.RULES,
+    *identity.RULES,
+    *supervision.RULES,
+    *states.RULES,
+    *parameters.RULES,
+    *stopping.RULES,
+    *enabling.RULES,
+    *excitation.RULES,
+    *window.RULES,
+    *trips.RULES,
+)

@@ -1,0 +1,178 @@
+"""The samples of a run on the disk: each block framed by a mark, its length and its check sum.
+
+A damaged frame costs the one block in it: the reader looks for the next mark whose frame is whole, says what lies between,
+and counts the samples that are missing there as lost.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.records import SampleBlock
+
+MARK = b"BLK1"
+_FRAME = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
+_HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
+_AGE = struct.Struct("<d")  # behind the signals, where the flags say so
+_CLIPPED, _HAS_W, _HAS_AGE = 1, 2, 4
+LARGEST_BLOCK = 1 << 20
+"""Payload bytes; the largest window of a drive makes 4 kB."""
+
+Placed = tuple[int, SampleBlock]
+"""Segment and block."""
+
+
+@dataclass(frozen=True)
+class BlockDamage:
+    """Bytes of `blocks.bin` that hold no whole block. `after`: segment and next sample index of the last whole one before;
+    `lost_samples` where the next whole block is of the same segment. `is_tail`: nothing whole follows."""
+
+    offset: int
+    size: int
+    after: tuple[int, int] | None
+    lost_samples: int | None
+    is_tail: bool
+
+    @property
+    def where(self) -> str:
+        """The place in words."""
+        place = (
+            "before the first whole block" if self.after is None else "after segment {} sample {}".format(*self.after)
+        )
+        lost = "" if self.lost_samples is None else f", {self.lost_samples} samples lost"
+        return f"bytes {self.offset} to {self.offset + self.size - 1}, {place}{lost}"
+
+
+def frame(block: SampleBlock, segment: int) -> bytes:
+    """The bytes that `blocks.bin` takes for the block."""
+    payload = _encode(block, segment)
+    return _FRAME.pack(MARK, len(payload), zlib.crc32(payload)) + payload
+
+
+def append_frame(descriptor: int, record: bytes, written: int) -> None:
+    """Make sure that a frame of which `written` bytes got to the disk is there whole or not at all. OSError: it is not."""
+    if written != len(record):  # what follows a torn frame would have to be looked for
+        os.ftruncate(descriptor, os.fstat(descriptor).st_size - written)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def read_blocks(path: Path, damage: list[BlockDamage] | None = None) -> Iterator[Placed]:
+    """Every whole (segment, block) in order; what lies between them is told in `damage`.
+
+    A block behind a damaged one counts the samples that are missing before it. DataRefused: a whole frame holds no block.
+    """
+    data = path.read_bytes() if path.is_file() else b""
+    blocks, _ = whole_blocks(data, damage)
+    yield from blocks
+
+
+def follow_blocks(path: Path, offset: int, most: int) -> tuple[list[Placed], int]:
+    """The whole blocks from byte `offset` on, `most` at a time, and where to go on: a frame that is still being written is left for later."""
+    if not path.is_file():
+        return [], offset
+    with path.open("rb") as file:
+        file.seek(offset)
+        data = file.read()
+    found: list[Placed] = []
+    at = 0
+    while len(found) < most and (payload := _payload(data, at)) is not None:
+        found.append(_decode(payload))
+        at += _FRAME.size + len(payload)
+    return found, offset + at
+
+
+def whole_blocks(data: bytes, damage: list[BlockDamage] | None = None) -> tuple[Iterator[Placed], int]:
+    """As `read_blocks`, of bytes; and how many bytes there are."""
+    return _walk(data, [] if damage is None else damage), len(data)
+
+
+def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:
+    at = 0
+    after: tuple[int, int] | None = None
+    while at < len(data):
+        payload = _payload(data, at)
+        if payload is not None:
+            segment, block = _decode(payload)
+            yield segment, block
+            at += _FRAME.size + len(payload)
+            after = segment, block.first_index + block.count
+            continue
+        end = _next_whole(data, at + 1)
+        following = _payload(data, end)
+        if following is None:
+            damage.append(BlockDamage(at, len(data) - at, after, None, True))
+            return
+        segment, block = _decode(following)
+        lost = block.first_index - after[1] if after is not None and after[0] == segment else None
+        damage.append(BlockDamage(at, end - at, after, lost, False))
+        yield segment, block if lost is None else replace(block, lost_before=max(lost, block.lost_before))
+        at = end + _FRAME.size + len(following)
+        after = segment, block.first_index + block.count
+
+
+def _next_whole(data: bytes, at: int) -> int:
+    """Where the next whole frame begins at `at` or later; the end of the data where there is none."""
+    while (at := data.find(MARK, at)) >= 0:
+        if _payload(data, at) is not None:
+            return at
+        at += 1
+    return len(data)
+
+
+def _payload(data: bytes, at: int) -> bytes | None:
+    """The payload of the whole frame at `at`; None where there is none."""
+    if at + _FRAME.size > len(data):
+        return None
+    mark, size, check = _FRAME.unpack_from(data, at)
+    start = at + _FRAME.size
+    if mark != MARK or size > LARGEST_BLOCK or start + size > len(data):
+        return None
+    payload = data[start : start + size]
+    return payload if zlib.crc32(payload) == check else None
+
+
+def _encode(block: SampleBlock, segment: int) -> bytes:
+    flags = _HAS_AGE | (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
+    header = _HEADER.pack(
+        segment, block.session, block.first_index, block.count, block.lost_before, block.sample_period_s,
+        block.axis_deg, block.dc_link_v, flags,
+    )  # fmt: skip
+    signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
+    if block.current_w_a is not None:
+        signals.append(block.current_w_a)
+    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals) + _AGE.pack(block.age_s)
+
+
+def _decode(payload: bytes) -> Placed:
+    if len(payload) < _HEADER.size:
+        raise _no_block(len(payload), f"at least {_HEADER.size} bytes")
+    segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
+    channels = 4 if flags & _HAS_W else 3
+    signals_end = _HEADER.size + 8 * channels * count
+    has_age = bool(flags & _HAS_AGE)
+    if len(payload) != signals_end + _AGE.size * has_age:
+        raise _no_block(len(payload), f"{channels} signals of {count} samples")
+    numbers = np.frombuffer(payload, "<f8", channels * count, _HEADER.size)
+    signals = numbers.reshape(channels, count).astype(np.float64)
+    return segment, SampleBlock(
+        session=session, first_index=first, sample_period_s=period, axis_deg=axis, voltage_axis_v=signals[0],
+        current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
+        dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
+        age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
+    )  # fmt: skip
+
+
+def _no_block(size: int, expected: str) -> DataRefused:
+    return DataRefused(
+        "the archived samples are not this program's", step="read the archive", value=f"{size} bytes", limit=expected,
+        remedy="use the run folder as the run left it",
+    )  # fmt: skip

@@ -1,0 +1,80 @@
+"""The JSON of a run folder: records as plain types, documents read with care, and what is raised where they are not whole."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from commissioner.errors import CommissionerError, DataRefused
+
+
+def plain(value: Any) -> Any:
+    """A record as JSON types; arrays become lists, NaN and infinity become null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def read_document(text: str) -> dict[str, Any]:
+    """The JSON object in `text`; empty where it holds none, or one nested deeper than any of ours."""
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
+    """The JSON document `name` of a run. DataRefused: missing, damaged, or without one of the `needed` keys."""
+    path = folder / name
+    document = read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
+    missing = [key for key in needed if key not in document]
+    if missing or not document:
+        raise damaged(
+            folder, name, f"no {missing[0]}" if document else "not readable" if path.is_file() else "no such file"
+        )
+    return document
+
+
+def damaged(folder: Path, name: str, seen: str) -> DataRefused:
+    """What is raised where an archived file is not as a run leaves it."""
+    return DataRefused(
+        f"{folder.name}: {name} is damaged or missing", step="read the archive", value=seen,
+        limit="the file as the run left it", remedy="use the run folder as the run left it, or another run",
+    )  # fmt: skip
+
+
+def archive_lost(folder: Path, failure: OSError, so_far: str = "") -> CommissionerError:
+    """The disk took no more of a run."""
+    return CommissionerError(
+        f"the run's archive cannot be written: {failure.strerror or failure}{so_far}", step="archive",
+        value=str(folder), limit="a disk with room that this user may write",
+        remedy="make room or give another folder with --runs, then start again",
+    )  # fmt: skip
+
+
+def open_no_link(path: str, flags: int) -> int:
+    """An `opener` that never writes through a symbolic link."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)

@@ -1,0 +1,116 @@
+"""The journal of a run: one record a line, each with the digest of the line before it, so that no line can be changed,
+added or taken out without the next one showing it.
+
+A line: `{"n", "utc", "previous", "blocks", "kind", "record"}`. `previous`: SHA-256 of the line before, without its line feed;
+64 zeros for the first. `blocks`: bytes of `blocks.bin` written by then and the SHA-256 over them.
+Journals of version 0.1.0 have neither `previous` nor `blocks`: they are read, and called unverified.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+import json
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from commissioner.run.archive.documents import open_no_link, plain, read_document
+
+FIRST = 64 * "0"
+"""What stands for the digest of the line before the first."""
+Record = dict[str, Any]
+
+
+class Journal:
+    """A journal open for adding. What a power loss left of a torn last line is cut off first."""
+
+    def __init__(self, path: Path) -> None:
+        whole = _drop_torn_line(path)
+        self.records = whole.count(b"\n")
+        self.head = digest(whole.rstrip(b"\n").rpartition(b"\n")[2]) if whole else FIRST
+        self._file: TextIO = open(path, "a", encoding="utf-8", newline="\n", opener=open_no_link)  # noqa: SIM115
+
+    def write(self, kind: str, record: object, blocks: tuple[int, str], *, durable: bool) -> None:
+        """Append one record; `durable` returns only when it is on the disk."""
+        line = {
+            "n": self.records, "utc": dt.datetime.now(dt.UTC).isoformat(), "previous": self.head, "blocks": blocks,
+            "kind": kind, "record": plain(record),
+        }  # fmt: skip
+        text = json.dumps(line, allow_nan=False)
+        self._file.write(text + "\n")
+        self._file.flush()
+        self.records, self.head = self.records + 1, digest(text.encode())
+        if durable:
+            os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        with suppress(OSError):
+            self._file.close()
+
+
+def digest(data: bytes) -> str:
+    """SHA-256 in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def read_journal(path: Path) -> list[Record]:
+    """The journal's records, up to the first line that is not a whole one."""
+    return _records(path.read_bytes())[0] if path.is_file() else []
+
+
+def follow_journal(path: Path, offset: int) -> tuple[list[Record], int]:
+    """The whole records from byte `offset` on, and where to go on: a line that is still being written is left for later."""
+    if not path.is_file():
+        return [], offset
+    with path.open("rb") as file:
+        file.seek(offset)
+        records, size = _records(file.read())
+    return records, offset + size
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line as it lies in the file; `record` None: it is not a whole record. `digest` is what the next line must carry."""
+
+    record: Record | None
+    digest: str
+
+
+def read_lines(path: Path) -> tuple[list[Line], bool]:
+    """Every line, whole or not, and whether the last one is torn (no line feed: what a kill leaves)."""
+    data = path.read_bytes() if path.is_file() else b""
+    *lines, rest = data.split(b"\n")
+    return [Line(_record(line), digest(line)) for line in lines], bool(rest)
+
+
+def _records(data: bytes) -> tuple[list[Record], int]:
+    """Records up to the first line that is none or has no end, and the bytes they take."""
+    records: list[Record] = []
+    size = 0
+    *lines, _ = data.split(b"\n")
+    for line in lines:
+        record = _record(line)
+        if record is None:
+            break
+        records.append(record)
+        size += len(line) + 1
+    return records, size
+
+
+def _record(line: bytes) -> Record | None:
+    record = read_document(line.decode("utf-8", errors="replace"))
+    return record if isinstance(record.get("kind"), str) and "record" in record else None
+
+
+def _drop_torn_line(path: Path) -> bytes:
+    """The whole lines, once what follows the last of them is cut off, so that what is added can be read."""
+    if not path.is_file():
+        return b""
+    data = path.read_bytes()
+    whole = data.rfind(b"\n") + 1
+    if whole < len(data):
+        os.truncate(path, whole)
+    return data[:whole]

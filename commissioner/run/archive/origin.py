@@ -1,0 +1,83 @@
+"""Where a run comes from: program, machine, process, person and call, as the first record of its journal has it."""
+
+from __future__ import annotations
+
+import getpass
+import hashlib
+import os
+import platform
+import sys
+import uuid
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from commissioner.link.wire.secrets import shown_call
+
+PERSON = "COMMISSIONER_PERSON"
+"""Environment: on whose behalf a run is made, where that is not the user of the process (the service's logged-in person)."""
+_MACHINE_IDS = ("/etc/machine-id", "/var/lib/dbus/machine-id")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """`person` is who asked, `user` whose process it is; they differ where a service acts for somebody."""
+
+    version: str
+    host: str
+    machine: str
+    process: int
+    user: str
+    person: str
+    command: str
+    python: str
+    system: str
+
+
+def this_process() -> Origin:
+    """Of the process that asks; its call without what is secret."""
+    user = user_name()
+    return Origin(
+        version=program_version(),
+        host=platform.node(),
+        machine=machine_part(),
+        process=os.getpid(),
+        user=user,
+        person=os.environ.get(PERSON, "").strip() or user,
+        command=shown_call([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        python=platform.python_version(),
+        system=platform.platform(),
+    )
+
+
+def user_name() -> str:
+    """The account of this process; a number where it has no name."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return str(getattr(os, "getuid", os.getpid)())
+
+
+@cache
+def program_version() -> str:
+    try:
+        return version("commissioner")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+@cache
+def machine_part() -> str:
+    """Six hexadecimal digits that tell this machine from others, so that runs of two laptops never share an id."""
+    marks = [platform.node(), *(_text(Path(path)) for path in _MACHINE_IDS)]
+    if not any(marks[1:]):
+        marks.append(f"{uuid.getnode():012x}")
+    return hashlib.sha256("\n".join(marks).encode()).hexdigest()[:6]
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8").strip()
+    except (OSError, ValueError):
+        return ""

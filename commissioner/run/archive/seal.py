@@ -1,0 +1,71 @@
+"""What closes a run folder: a last record that covers every file, and, with a key, a seal over that.
+
+The chain of digests shows damage and careless editing. It does not stop somebody who computes it anew: against that stands a
+seal (HMAC-SHA256 with a key that lies elsewhere), and, before anything is written into a drive, the plausibility box and the
+drive's own identity.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from commissioner.errors import UsageError
+
+CLOSED = "folder_closed"
+"""Kind of the record."""
+SHORTEST_KEY = 16
+NOT_COVERED = ("journal.jsonl", "blocks.bin", "summary.json")
+"""The first two by the chain itself, the third follows from the last record."""
+
+
+def read_key(path: Path) -> bytes:
+    """The bytes of a key file. UsageError: it cannot be read or is too short to be one."""
+    try:
+        key = path.read_bytes().strip()
+    except OSError as error:
+        raise UsageError(
+            f"the key file {path} cannot be read: {error.strerror or error}", step="seal", value=str(path),
+            limit="a file that this user may read", remedy="give --seal a key file, e.g. 32 random bytes",
+        ) from error  # fmt: skip
+    if len(key) < SHORTEST_KEY:
+        raise UsageError(
+            f"the key in {path} is too short", step="seal", value=f"{len(key)} bytes",
+            limit=f"at least {SHORTEST_KEY} bytes", remedy="make one of 32 random bytes and keep it off the run folders",
+        )  # fmt: skip
+    return key
+
+
+def cover(path: Path) -> dict[str, Any]:
+    """Size and SHA-256 of one file."""
+    with path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    return {"bytes": path.stat().st_size, "sha256": found}
+
+
+def covers(folder: Path, names: Iterable[str]) -> dict[str, Any]:
+    """Of each of the files that is there and that the chain does not cover by itself."""
+    wanted = [name for name in sorted(names) if name not in NOT_COVERED]
+    return {name: cover(folder / name) for name in wanted if (folder / name).is_file()}
+
+
+def seal(key: bytes, previous: str, record: Mapping[str, Any]) -> dict[str, str]:
+    """The proof that whoever closed the folder had the key: over the chain up to here and over all that is covered."""
+    return {"algorithm": "HMAC-SHA256", "mac": hmac.new(key, _sealed(previous, record), hashlib.sha256).hexdigest()}
+
+
+def is_sealed_by(key: bytes, previous: object, record: Mapping[str, Any]) -> bool:
+    """True where the closing record carries the seal of this key."""
+    found = record.get("seal")
+    mac = found.get("mac") if isinstance(found, dict) else None
+    wanted = seal(key, str(previous), record)["mac"]
+    return isinstance(mac, str) and hmac.compare_digest(mac.encode(), wanted.encode())
+
+
+def _sealed(previous: str, record: Mapping[str, Any]) -> bytes:
+    kept = {name: value for name, value in record.items() if name != "seal"}
+    return f"{previous}\n{json.dumps(kept, sort_keys=True, allow_nan=False)}".encode()

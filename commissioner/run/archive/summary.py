@@ -1,0 +1,191 @@
+"""One run in a row of a list, from its journal; kept as `summary.json`, so that a list never reads a journal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
+from commissioner.run.archive.documents import read_document
+from commissioner.run.archive.journal import Record, read_journal
+
+NAME = "summary.json"
+RESTORED, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before (restored)", "old or new", "cut off", "unreadable"
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """`written` says which parameter set the drive holds after the run, as far as the run could know. `motor`: the plate;
+    `parameters`: value and standard error of each; both empty where the run did not get so far."""
+
+    run: str
+    folder: str
+    outcome: str
+    reason: str
+    drive: str
+    energised_s: float
+    written: str
+    result: dict[str, Any] | None = None
+    serial_number: int | None = None
+    started_utc: str = ""
+    ended_utc: str = ""
+    person: str = ""
+    host: str = ""
+    version: str = ""
+    url: str = ""
+    profile: str = ""
+    motor: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def standing(self) -> str:
+        """The outcome, and whether the drive holds what came of it."""
+        if self.outcome != "commissioned" or self.is_unknown:
+            return self.outcome
+        if self.written.startswith(RESTORED):
+            return RESTORED_SINCE
+        return "commissioned" if self.written.startswith("new") else ACCEPTED
+
+    @property
+    def is_unknown(self) -> bool:
+        """Only the drive can tell which parameter set it holds."""
+        return self.written.startswith(OLD_OR_NEW)
+
+    def kept(self) -> dict[str, Any]:
+        """What `summary.json` keeps: not where the folder lies, nor the whole result."""
+        return {name: value for name, value in vars(self).items() if name not in ("folder", "result")}
+
+
+def summarise(folder: Path) -> RunSummary:
+    """The run in `folder`, from its result if it has one, else from its journal."""
+    return summary_of(folder, read_journal(folder / "journal.jsonl"))
+
+
+def summary_of(folder: Path, records: list[Record]) -> RunSummary:
+    """As `summarise`, the journal's records read already."""
+    end: Record = next(reversed(_of(records, "run_ended")), {})
+    start: Record = next(iter(_of(records, "run_started")), {})
+    identity: Record = next(iter(_of(records, "drive_identified")), {})
+    result, request = read_file(folder / "result.json"), read_file(folder / "request.json")
+    serial = identity.get("serial_number")
+    return RunSummary(
+        run=folder.name,
+        folder=str(folder),
+        outcome=_text(end, "outcome") or CUT_OFF,
+        reason=_text(end, "reason") or _last_state(records),
+        drive=_drive(identity),
+        energised_s=_seconds(end.get("energised_s")),
+        written=_written(records),
+        result=result or None,
+        serial_number=serial if isinstance(serial, int) and not isinstance(serial, bool) else None,
+        started_utc=_text(records[0], "utc") if records else "",
+        ended_utc=next((_text(line, "utc") for line in records if line["kind"] == "run_ended"), ""),
+        person=_text(start, "person"),
+        host=_text(start, "host"),
+        version=_text(start, "version"),
+        url=_text(request, "url"),
+        profile=_text(request, "profile"),
+        motor=_mapping(request.get("nameplate")),
+        parameters=_mapping(result.get("parameters")),
+    )
+
+
+def read_summary(folder: Path, journal_bytes: int) -> RunSummary | None:
+    """What the folder's `summary.json` says; None where there is none, or not of the journal as it is now."""
+    document = read_file(folder / NAME)
+    kept, journal = document.get("summary"), document.get("journal")
+    if not isinstance(kept, dict) or not isinstance(journal, dict) or journal.get("bytes") != journal_bytes:
+        return None
+    try:
+        summary = RunSummary(folder=str(folder), **kept)
+    except TypeError:
+        return None
+    return replace(summary, run=folder.name) if _is_typed(summary) else None
+
+
+def unreadable(folder: Path, error: Exception) -> RunSummary:
+    """The row of a folder that cannot be read at all."""
+    what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
+    return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", 0.0, "not known")
+
+
+def read_file(path: Path) -> dict[str, Any]:
+    """The JSON object in the file; empty where there is none."""
+    return read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
+
+
+def _is_typed(summary: RunSummary) -> bool:
+    texts = ("outcome", "reason", "drive", "written", "started_utc", "ended_utc", "person", "host", "version", "url")
+    return (
+        all(isinstance(getattr(summary, name), str) for name in (*texts, "profile"))
+        and isinstance(summary.energised_s, int | float)
+        and isinstance(summary.motor, dict)
+        and isinstance(summary.parameters, dict)
+        and isinstance(summary.serial_number, int | None)
+    )
+
+
+def _of(records: list[Record], kind: str) -> list[Record]:
+    """What was journalled as `kind`, in order."""
+    return [line["record"] for line in records if line["kind"] == kind and isinstance(line["record"], dict)]
+
+
+def _text(record: Mapping[str, Any], key: str) -> str:
+    value = record.get(key, "")
+    return value if isinstance(value, str) else ""
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
+
+
+def _seconds(value: object) -> float:
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
+
+
+def _drive(identity: Record) -> str:
+    if not identity:
+        return "not identified"
+    number = identity.get("serial_number")
+    return (
+        f"{identity.get('drive_type')} #{number}"
+        if number
+        else f"{identity.get('drive_type')}, serial number not known"
+    )
+
+
+def _last_state(records: list[Record]) -> str:
+    states = [record.get("state") for record in _of(records, "state_entered")]
+    return f"the service ended while {states[-1]}" if states else "the service ended before it connected"
+
+
+def _written(records: list[Record]) -> str:
+    """Old, new, or unknown: the last announcement or confirmation in the journal decides."""
+    said = "as before"
+    for line in records:
+        if line["kind"] == "parameters_written":
+            said = "new" + _kept(line["record"]) + _wear(line["record"])
+        elif line["kind"] == "snapshot_restored":
+            said = RESTORED + _wear(line["record"])
+        elif line["kind"] == "about_to" and _touches_parameters(line["record"]):
+            said = f"{OLD_OR_NEW}: read the drive, or `commissioner restore` this run"
+    return said
+
+
+def _kept(report: Any) -> str:
+    is_stored = not isinstance(report, dict) or report.get("is_stored", True)
+    return ", read back and stored" if is_stored else ", read back; not stored, so lost at power-off"
+
+
+def _wear(report: Any) -> str:
+    """How much of the drive's non-volatile memory is used up, where the drive counts its writes."""
+    facts = report if isinstance(report, dict) else {}
+    used, endurance = facts.get("store_count_after"), facts.get("endurance_writes")
+    return f"; {used} of {endurance} writes of the drive's memory used" if used and endurance else ""
+
+
+def _touches_parameters(intent: Any) -> bool:
+    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store")

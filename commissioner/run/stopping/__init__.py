@@ -1,0 +1,1 @@
+"""How a run is ended from outside: signals, the dead man's pipe of a service, a file in its folder."""

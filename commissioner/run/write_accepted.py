@@ -1,0 +1,213 @@
+"""The accepted result of an archived run into the drive it was measured on: first as a table, then, if that still holds, for good."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError
+from commissioner.link.drive.facts import WriteReport
+from commissioner.link.drive.inverter import Inverter
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.url import TlsUrl, parse_url
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.records import ParameterSnapshot
+from commissioner.registers.convention import drive_values
+from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
+from commissioner.run.archive.catalogue import RunSummary
+from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
+from commissioner.run.archive.replay import read_snapshot
+from commissioner.run.ending import note, write_lost
+from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.safety.commands import WriteParameters
+from commissioner.safety.limits import Bounds, SafetyFacts, permit
+
+REPLY_TIMEOUT_S = 0.5
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """One register: what the drive holds now and what it would hold, in the drive's own unit and convention."""
+
+    name: str
+    register: int
+    now: float
+    will_be: float
+    unit: str
+    convention: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A table that somebody is asked to agree to. `token` stands for exactly this table."""
+
+    run: str
+    what: str
+    drive_type: str
+    serial_number: int
+    rows: tuple[PlannedRow, ...]
+
+    @property
+    def token(self) -> str:
+        text = json.dumps([self.run, self.what, self.serial_number, [asdict(row) for row in self.rows]])
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """All that is needed to act, read from the run's folder."""
+
+    folder: Path
+    profile: DriveProfile
+    url: str
+    plate: Nameplate
+    snapshot: ParameterSnapshot
+
+
+def plan_write_back(run: RunSummary, url: str | None) -> Plan:
+    """What writing this run's result would change. Reads the drive, changes nothing."""
+    ready, circuit = _ready(run, url), _circuit(run)
+    with _drive(ready) as inverter:
+        return _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.plate).values)
+
+
+def plan_restore(run: RunSummary, url: str | None) -> Plan:
+    """What restoring the set this run found would change. Reads the drive, changes nothing."""
+    ready = _ready(run, url)
+    with _drive(ready) as inverter:
+        return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
+
+
+def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
+    """The run's result into its drive, verified and stored, where the table of `token` still holds.
+
+    Aborted: it does not. IdentityMismatch: another drive. The run's journal says so before and after.
+    """
+    ready, circuit = _ready(run, url), _circuit(run)
+    _check_bounds(circuit, ready.plate)
+    with closing(RunFolder(ready.folder)) as journal, OperatorStop():
+        port = open_port(parse_url(ready.url), ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
+        with closing(port):
+            inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
+            wanted = drive_values(ready.profile, circuit, ready.plate).values
+            check_token(_plan(run, ready, inverter, "write back", wanted), token)
+            try:
+                report = inverter.write_circuit(circuit, ready.plate, ready.snapshot)
+            except OSError as failure:
+                raise write_lost(failure, journal) from failure
+        note(journal, "parameters_written", report)
+    return report
+
+
+def check_token(plan: Plan, token: str) -> None:
+    """Aborted where somebody agreed to another table than this one."""
+    if plan.token != token:
+        raise Aborted(
+            "the table has changed since it was shown; nothing was written",
+            step="compare with the table",
+            value=plan.token,
+            limit=token,
+            remedy="look at the new table, then decide again",
+        )
+
+
+def _ready(run: RunSummary, url: str | None) -> _Ready:
+    folder = Path(run.folder)
+    request = read_saved(folder, "request.json", "profile", "url", "nameplate")
+    if not (folder / "snapshot.json").is_file():
+        raise DataRefused(
+            f"{run.run} holds no snapshot",
+            step="write parameters",
+            value="no snapshot.json",
+            limit="a run that reached its checks",
+            remedy="choose another run",
+        )
+    address = url or str(request["url"])
+    if isinstance(parse_url(address), TlsUrl) and url is None:
+        raise UsageError(
+            f"the archive of {run.run} keeps no TLS files",
+            step="write parameters",
+            value=address,
+            limit="an address with ca=, cert= and key=",
+            remedy="give the drive's whole address with --drive",
+        )
+    snapshot = read_snapshot(folder, read_journal(folder / "journal.jsonl"))
+    try:
+        plate = Nameplate(**request["nameplate"])
+    except TypeError as error:
+        raise damaged(folder, "request.json", str(error)) from error
+    return _Ready(folder, load_profile(str(request["profile"])), address, plate, snapshot)
+
+
+def _circuit(run: RunSummary) -> InverseGamma:
+    """The accepted values. DataRefused: the run accepted none, or the drive holds them already."""
+    parameters = (run.result or {}).get("parameters") or {}
+    if run.standing not in (ACCEPTED, RESTORED_SINCE) or not all(name in parameters for name in PARAMETERS):
+        raise DataRefused(
+            f"{run.run} has nothing to write",
+            step="write parameters",
+            value=run.standing,
+            limit=ACCEPTED,
+            remedy="choose a run whose result was accepted and is not in the drive",
+        )
+    return InverseGamma(*(float(parameters[name]["value"]) for name in PARAMETERS))
+
+
+def _check_bounds(circuit: InverseGamma, plate: Nameplate) -> None:
+    """The same last gate as in a run."""
+    facts = SafetyFacts(checks_passed=True, snapshot_taken=True, writing_allowed=True)
+    bounds = Bounds(0.0, 0.0, 0.0, 0.0, 0.0, prior(plate))
+    refusal = permit(WriteParameters(circuit, plate), facts, bounds)
+    if refusal is not None:
+        raise Aborted(
+            f"not sent: {refusal.what}",
+            step="WriteParameters",
+            value=refusal.value,
+            limit=refusal.limit,
+            remedy=refusal.remedy,
+        )
+
+
+@contextmanager
+def _drive(ready: _Ready) -> Iterator[Inverter]:
+    """The drive, open for reading."""
+    port = open_port(parse_url(ready.url), ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
+    with closing(port):
+        yield Inverter(port, ready.profile)
+
+
+def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
+    identity = inverter.identify()
+    if (identity.drive_type, identity.serial_number) != (
+        ready.snapshot.identity.drive_type,
+        ready.snapshot.identity.serial_number,
+    ):
+        raise IdentityMismatch(
+            "this is not the drive of the run",
+            step=what,
+            value=f"{identity.drive_type} #{identity.serial_number}",
+            limit=f"{ready.snapshot.identity.drive_type} #{ready.snapshot.identity.serial_number}",
+            remedy="connect the drive that was measured, or measure this one",
+        )
+    present = inverter.snapshot().in_use
+    rows = tuple(_row(ready.profile, name, present[name], value) for name, value in wanted.items())
+    return Plan(run.run, what, identity.drive_type, identity.serial_number, rows)
+
+
+def _row(profile: DriveProfile, name: str, now: float, will_be: float) -> PlannedRow:
+    item = profile.item(name)
+    return PlannedRow(name, item.address, now, will_be, item.unit, item.convention)
+
+
+def as_document(plan: Plan) -> dict[str, Any]:
+    """The plan with its token."""
+    return asdict(plan) | {"token": plan.token}

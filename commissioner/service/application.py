@@ -1,0 +1,72 @@
+"""The application: parts, routes, gate, and what happens at its begin and end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from importlib.metadata import version
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.middleware import Middleware
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from commissioner.service import problems
+from commissioner.service.access.gate import Gate
+from commissioner.service.page import views
+from commissioner.service.parts import Parts
+from commissioner.service.routes import all_routers
+
+STATIC = Path(__file__).parent / "page" / "static"
+
+
+def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambda: None) -> FastAPI:
+    """The service as an ASGI application; it starts its children when it begins and leaves none behind."""
+
+    @contextlib.asynccontextmanager
+    async def lifetime(_app: FastAPI) -> AsyncIterator[None]:
+        tasks = [asyncio.create_task(parts.desk.look_around()), asyncio.create_task(parts.warm.work())]
+        tell = asyncio.get_running_loop().call_later(0.0, ready)
+        try:
+            yield
+        finally:
+            tell.cancel()
+            parts.closing.set()
+            for task in tasks:
+                task.cancel()
+            await parts.desk.close()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await parts.recordings.close()
+            await parts.simulator.close()
+
+    app = FastAPI(
+        title="commissioner",
+        version=version("commissioner"),
+        lifespan=lifetime,
+        docs_url=None,
+        redoc_url=None,
+        responses=problems.RESPONSES,
+        middleware=[
+            Middleware(Gate, host_names=parts.settings.host_names(), uploads=("/api/recordings", "/recordings")),
+        ],
+    )
+    app.state.parts, app.state.url = parts, url
+    problems.install(app, views.answer)
+    views.install(app)
+    for router in all_routers():
+        app.include_router(router)
+    app.include_router(views.router, include_in_schema=False)
+    app.mount("/static", _Static(directory=STATIC), name="static")
+    return app
+
+
+class _Static(StaticFiles):
+    """Files of this version; a browser asks whether they have changed."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["cache-control"] = "no-cache"
+        return response

@@ -1,0 +1,196 @@
+"""The archive as the service shows it: the one place that knows where runs lie and how they are listed and compared."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from commissioner.errors import CommissionerError
+from commissioner.run.archive.catalogue import RunSummary, summarise
+from commissioner.run.archive.folder import read_document
+from commissioner.service.problems import Refusal
+
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+OUTCOMES = ("commissioned", "rejected", "aborted", "faulted", "cut off")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the list. `motor` is an id of the library, or empty for runs from the command line."""
+
+    run: str
+    utc: str
+    motor: str
+    motor_text: str
+    drive: str
+    person: str
+    outcome: str
+    standing: str
+    reason: str
+    energised_s: float
+    written: str
+    parameters: Mapping[str, Mapping[str, float]] | None
+    flux_wb: float | None
+    folder: Path
+
+
+class Archive:
+    """Reads each run once, and again when its journal or result has changed."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._read: dict[str, tuple[tuple[int, int], Entry]] = {}
+
+    def entries(
+        self, *, motor: str = "", drive: str = "", outcome: str = "", since: str = "", limit: int = 100
+    ) -> list[Entry]:
+        """Newest first."""
+        found: list[Entry] = []
+        for name in self._names():
+            entry = self._entry(name)
+            if entry is not None and _matches(entry, motor, drive, outcome, since):
+                found.append(entry)
+                if len(found) >= limit:
+                    break
+        return found
+
+    def find(self, run: str) -> Entry:
+        """Refusal 404 where there is none of this id."""
+        entry = self._entry(run) if _is_name(run) else None
+        if entry is None:
+            raise Refusal(
+                404,
+                f"there is no run {run[:80]}",
+                step="archive",
+                value=run[:80],
+                limit="a run of this archive",
+                remedy="GET /api/runs lists them",
+            )
+        return entry
+
+    def summary(self, run: str) -> RunSummary:
+        return summarise(self.find(run).folder)
+
+    def result(self, run: str) -> dict[str, Any]:
+        """The result document; of a run without one, what its journal says."""
+        entry = self.find(run)
+        path = entry.folder / "result.json"
+        document = read_document(path.read_text("utf-8", "replace")) if path.is_file() else {}
+        if document:
+            return document
+        return {
+            "run": entry.run,
+            "outcome": entry.outcome,
+            "reason": entry.reason,
+            "energised_s": entry.energised_s,
+            "parameters": None,
+            "written": [],
+            "holds": entry.written,
+        }
+
+    def request(self, run: str) -> dict[str, Any]:
+        """What the run was asked to do."""
+        path = self.find(run).folder / "request.json"
+        return read_document(path.read_text("utf-8", "replace")) if path.is_file() else {}
+
+    def file(self, run: str, name: str) -> Path:
+        """A file of the run. Refusal 404 where the run left none of this name."""
+        path = self.find(run).folder / name
+        if not path.is_file():
+            raise Refusal(
+                404,
+                f"{run} has no {name}",
+                step="archive",
+                value=name,
+                limit="a file of this run",
+                remedy="a run makes it at its end; a run that was cut off may lack it",
+            )
+        return path
+
+    def _names(self) -> list[str]:
+        try:
+            with os.scandir(self.root) as entries:
+                return sorted((e.name for e in entries if _is_name(e.name)), reverse=True)
+        except OSError:
+            return []
+
+    def _entry(self, name: str) -> Entry | None:
+        folder = self.root / name
+        try:
+            changed = (folder / "journal.jsonl").stat().st_mtime_ns, _mtime(folder / "result.json")
+        except OSError:
+            return None
+        known = self._read.get(name)
+        if known is not None and known[0] == changed:
+            return known[1]
+        try:
+            entry = _read_entry(folder)
+        except (CommissionerError, OSError, ValueError, KeyError, TypeError):
+            return None
+        self._read[name] = (changed, entry)
+        return entry
+
+
+def _read_entry(folder: Path) -> Entry:
+    summary = summarise(folder)
+    request = folder / "request.json"
+    asked = read_document(request.read_text("utf-8", "replace")) if request.is_file() else {}
+    origin, plate = asked.get("origin") or {}, asked.get("nameplate") or {}
+    parameters = (summary.result or {}).get("parameters")
+    return Entry(
+        summary.run,
+        _utc_of(summary.run),
+        str(origin.get("motor", "")),
+        _plate_text(plate),
+        summary.drive,
+        str(origin.get("person", "")),
+        summary.outcome,
+        summary.standing,
+        summary.reason,
+        summary.energised_s,
+        summary.written,
+        parameters if isinstance(parameters, dict) else None,
+        (summary.result or {}).get("holds_for_stator_flux_wb"),
+        folder,
+    )
+
+
+def _matches(entry: Entry, motor: str, drive: str, outcome: str, since: str) -> bool:
+    return (
+        (not motor or motor.lower() in f"{entry.motor} {entry.motor_text} {entry.drive} {entry.run}".lower())
+        and (not drive or drive.lower() in entry.drive.lower())
+        and (not outcome or outcome in (entry.outcome, entry.standing))
+        and (not since or entry.utc[: len(since)] >= since)
+    )
+
+
+def _utc_of(run: str) -> str:
+    """A run's name begins with its time."""
+    try:
+        return dt.datetime.strptime(run[:15], "%Y%m%d-%H%M%S").replace(tzinfo=dt.UTC).isoformat()
+    except ValueError:
+        return ""
+
+
+def _plate_text(plate: Mapping[str, Any]) -> str:
+    try:
+        return f"{plate['rated_power_w'] / 1000:g} kW, {plate['rated_voltage_v']:g} V, {plate['rated_current_a']:g} A"
+    except (KeyError, TypeError):
+        return ""
+
+
+def _is_name(name: str) -> bool:
+    return (
+        0 < len(name) < 200 and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name
+    )
+
+
+def _mtime(path: Path) -> int:
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0

@@ -1,0 +1,214 @@
+"""The drives, motors and procedures that can be chosen: packaged, configured, or added on the page."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from commissioner.errors import CommissionerError, UsageError
+from commissioner.motor.nameplate import Nameplate, check
+from commissioner.service.configuration import DriveTable, Settings
+from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
+
+SIMULATOR = "simulator"
+PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
+TYPICAL_EFFICIENCY = ((500.0, 0.45, 0.80), (3e3, 0.65, 0.90), (30e3, 0.78, 0.955), (math.inf, 0.86, 0.98))
+"""Up to a rated power: the efficiencies of ordinary motors, IE1 (IEC 60034-30-1) less some points to the best sold."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """`origin`: configured | added | packaged (the simulator)."""
+
+    id: str
+    name: str
+    url: str
+    profile: str
+    origin: str
+
+
+@dataclass(frozen=True)
+class Motor:
+    """`source`: what `--motor` takes."""
+
+    id: str
+    name: str
+    source: str
+    origin: str
+    plate: Nameplate
+
+
+Known = TypeVar("Known", Drive, Motor)
+
+
+class Library:
+    """What there is to choose from. Added drives and motors are files in the service's own folder."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._configured = settings.file.drives
+        self._data = settings.data
+        self.simulator_url: str | None = None
+
+    def drives(self) -> list[Drive]:
+        configured = [Drive(d.id, d.name, d.url, d.profile, "configured") for d in self._configured]
+        added = [Drive(**table, origin="added") for table in map(_read_json, self._files("drives", "json")) if table]
+        simulator = Drive(SIMULATOR, "Simulator", self.simulator_url or "", "simulated", "packaged")
+        return [*configured, *added, simulator]
+
+    def drive(self, identifier: str) -> Drive:
+        """UsageError where there is none of this id."""
+        return _found(self.drives(), identifier, "drive")
+
+    def add_drive(self, table: DriveTable) -> Drive:
+        """Check and keep. UsageError: address or drive file cannot be right, or the id is taken."""
+        from commissioner.link.files.drive_file import load_profile
+        from commissioner.link.wire.url import parse_url
+
+        _must_be_new([d.id for d in self.drives()], table.id)
+        parse_url(table.url)
+        load_profile(table.profile)
+        _write(self._data / "drives" / f"{table.id}.json", json.dumps(table.model_dump(), indent=1))
+        return self.drive(table.id)
+
+    def motors(self) -> list[Motor]:
+        """Added ones first."""
+        added = [_motor(path, str(path), "added") for path in self._files("motors", "toml")]
+        packaged = [_motor(path, path.stem, "packaged") for path in sorted((CONFIG_FOLDER / "motors").glob("*.toml"))]
+        return [motor for motor in (*added, *packaged) if motor is not None]
+
+    def motor(self, identifier: str) -> Motor:
+        return _found(self.motors(), identifier, "motor")
+
+    def put_motor(self, identifier: str, table: MotorFile) -> Motor:
+        """Keep a motor's plate, new or changed. UsageError: the plate contradicts itself, or the id is a packaged one's."""
+        plate = Nameplate(**table.model_dump(exclude={"name"}))
+        for problem in check(plate):
+            raise UsageError(
+                f"{problem.key} contradicts the rest of the plate", step="nameplate", value=problem.value,
+                limit=problem.expected, remedy="read the plate again",
+            )  # fmt: skip
+        _must_be_new([m.id for m in self.motors() if m.origin == "packaged"], identifier)
+        rows = [f"{key} = {json.dumps(value)}" for key, value in table.model_dump().items() if value is not None]
+        _write(self._data / "motors" / f"{identifier}.toml", "\n".join(rows) + "\n")
+        return self.motor(identifier)
+
+    def profiles(self) -> list[str]:
+        """Names of the drive files that ship with the product."""
+        return sorted(path.stem for path in (CONFIG_FOLDER / "drives").glob("*.toml"))
+
+    def _files(self, folder: str, ending: str) -> list[Path]:
+        return sorted((self._data / folder).glob(f"*.{ending}"))
+
+
+def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Each field of a plate: ok, or what is wrong and what to do; then what the whole plate implies."""
+    fields = {name: {"ok": True, "what": "", "remedy": ""} for name in PLATE_FIELDS}
+    numbers = {key: _number(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
+    try:
+        table = MotorFile.model_validate(numbers)
+    except ValidationError as error:
+        for problem in error.errors():
+            name = str(problem["loc"][0])
+            described = MotorFile.model_fields[name].description if name in MotorFile.model_fields else None
+            missing = problem["type"] == "missing" or values.get(name) in (None, "")
+            what = "is missing" if missing else str(problem["msg"])
+            if name in fields:
+                fields[name] = {"ok": False, "what": what, "remedy": described or "read the plate again"}
+        return {"ok": False, "fields": fields, "efficiency": None, "questions": []}
+    plate = Nameplate(**table.model_dump(exclude={"name"}))
+    for contradiction in check(plate):
+        fields[contradiction.key] = {
+            "ok": False,
+            "what": "contradicts the rest of the plate",
+            "remedy": contradiction.expected,
+        }
+    efficiency = efficiency_of(plate)
+    return {
+        "ok": all(field["ok"] for field in fields.values()), "fields": fields, "efficiency": round(efficiency, 4),
+        "slip": round(plate.rated_slip, 5), "questions": questions(plate),
+    }  # fmt: skip
+
+
+def efficiency_of(plate: Nameplate) -> float:
+    """Shaft power over electrical power at rated load."""
+    return plate.rated_power_w / (math.sqrt(3) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor)
+
+
+def usual_efficiency(plate: Nameplate) -> tuple[float, float]:
+    """What motors of this power have."""
+    return next((low, high) for power, low, high in TYPICAL_EFFICIENCY if plate.rated_power_w <= power)
+
+
+def questions(plate: Nameplate) -> list[str]:
+    """What a plate that is possible but unusual should be asked."""
+    low, high = usual_efficiency(plate)
+    efficiency = efficiency_of(plate)
+    if low <= efficiency <= high:
+        return []
+    if low <= efficiency * math.sqrt(3) <= high:
+        return ["star voltage with delta current?"]
+    if low <= efficiency / math.sqrt(3) <= high:
+        return ["delta voltage with star current?"]
+    return ["is a number misread?"]
+
+
+def _number(value: Any) -> Any:
+    """Text as a plate is typed: decimal comma or point."""
+    if not isinstance(value, str):
+        return value
+    text = value.strip().replace("\u00a0", "").replace(" ", "")
+    if re.fullmatch(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?", text):
+        number = float(text.replace(",", "."))
+        return int(number) if number == int(number) and abs(number) < 1e15 else number
+    return value.strip() or None
+
+
+def _motor(path: Path, source: str, origin: str) -> Motor | None:
+    """A file that somebody broke by hand is no motor to choose."""
+    try:
+        plate = load_motor(str(path))
+        return Motor(path.stem, str(read_toml(path).get("name") or path.stem), source, origin, plate)
+    except CommissionerError:
+        return None
+
+
+def plate_document(plate: Nameplate) -> dict[str, Any]:
+    """The plate as JSON."""
+    return asdict(plate)
+
+
+def _found(known: list[Known], identifier: str, what: str) -> Known:
+    for one in known:
+        if one.id == identifier:
+            return one
+    raise UsageError(
+        f"there is no {what} {identifier[:60]!r}", step="choose", value=identifier[:60],
+        limit="one of: " + ", ".join(one.id for one in known), remedy=f"choose one of these, or add the {what} first",
+    )  # fmt: skip
+
+
+def _must_be_new(taken: list[str], identifier: str) -> None:
+    if identifier in taken:
+        raise UsageError(f"the id {identifier!r} is taken", step="add", value=identifier, limit="a new id",
+                         remedy="choose another id")  # fmt: skip
+
+
+def _read_json(path: Path) -> dict[str, Any] | None:
+    try:
+        return DriveTable.model_validate(json.loads(path.read_text("utf-8"))).model_dump()
+    except ValueError:
+        return None
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)

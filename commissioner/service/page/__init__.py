@@ -1,0 +1,1 @@
+"""The technician's page, rendered here: it works without script; script makes it live."""

@@ -1,0 +1,137 @@
+"""What every page shares: template engine, session, band, language and appearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from jinja2 import ChainableUndefined, Environment, FileSystemLoader, select_autoescape
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import LOCAL, Visitor, check_role, check_token, parts_of, visitor_of
+from commissioner.service.page.band import Place, band_of
+from commissioner.service.page.texts import LANGUAGES, Texts, texts_of
+from commissioner.service.page.words import SCRIPT_TEXTS, Words
+from commissioner.service.problems import Refusal
+from commissioner.service.routes.access import set_cookie
+
+TEMPLATES = Path(__file__).parent / "templates"
+STEPS = ("Drive", "Motor", "Checks", "What will happen", "Measure", "Result", "Write back", "Done")
+THEMES = ("light", "dark")
+NOWHERE = Place()
+
+
+@dataclass(frozen=True)
+class View:
+    """Which template, and where in the work it stands: `step` 1 ... 8, or None beside the work; `nav` the menu's entry."""
+
+    template: str
+    title: str
+    step: int | None = None
+    nav: str = "commission"
+
+
+@cache
+def environment(language: str) -> Environment:
+    """Templates with the words of one language; everything that is not marked safe is escaped."""
+    made = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=select_autoescape(["html"]),
+        undefined=ChainableUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n"],
+    )
+    texts = Texts(language)
+    made.install_gettext_callables(texts.gettext, texts.ngettext, newstyle=True)  # type: ignore[attr-defined]
+    made.globals |= {"t": texts, "w": Words(texts), "n": texts.number, "signed": texts.signed, "short": texts.short}
+    return made
+
+
+def render(request: Request, view: View, place: Place = NOWHERE, *, status: int = 200, **context: Any) -> Response:
+    """The page, with a session where the browser has none yet."""
+    parts, who, texts = parts_of(request), visitor_of(request), texts_of(request)
+    is_new = who.session is None and who.role is not None
+    if is_new:
+        session = parts.sessions.begin(LOCAL, Role.OPERATOR, is_logged_in=False)
+        who = Visitor(who.person, who.role, who.address, session)
+    band = band_of(parts, who, place, texts)
+    theme = request.cookies.get("theme", "")
+    html = (
+        environment(texts.language)
+        .get_template(view.template)
+        .render(
+            view=view,
+            place=place,
+            band=band,
+            who=who,
+            csrf=who.session.csrf if who.session else "",
+            steps=STEPS,
+            roles=Role,
+            theme=theme if theme in THEMES else "",
+            language=texts.language,
+            version=request.app.version,
+            path=request.url.path + (f"?{request.url.query}" if request.url.query else ""),
+            script_texts={message: texts.gettext(message) for message in SCRIPT_TEXTS},
+            parts=parts,
+            **context,
+        )
+    )
+    response = HTMLResponse(html, status)
+    if is_new and who.session is not None:
+        set_cookie(parts, response, who.session)
+    return response
+
+
+def enter(request: Request, role: Role = Role.VIEWER) -> Visitor:
+    """Who looks at a page. Redirects to the log-in where nobody is known."""
+    who = visitor_of(request)
+    if who.role is None:
+        raise ToLogin(request.url.path)
+    check_role(who, role)
+    return who
+
+
+async def enter_form(request: Request, role: Role = Role.OPERATOR) -> tuple[Visitor, dict[str, str]]:
+    """Who sends a form, and its fields; the form carries the session's token."""
+    who = enter(request, role)
+    form = await request.form(max_files=0, max_fields=60)
+    fields = {key: value for key, value in form.items() if isinstance(value, str)}
+    check_token(who, fields.get("csrf", ""))
+    return who, fields
+
+
+class ToLogin(Exception):
+    """Nobody is known; after the log-in back to `path`."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(path)
+        self.path = path
+
+
+def local(path: str) -> str:
+    """A path of this service, whatever was asked for."""
+    return path if path.startswith("/") and not path.startswith(("//", "/\\")) else "/"
+
+
+def go(path: str) -> RedirectResponse:
+    """After a form: look at the page with GET."""
+    return RedirectResponse(local(path), 303)
+
+
+def refused(request: Request, refusal: Refusal, place: Place = NOWHERE, back: str = "/") -> Response:
+    """A refusal as a page: step, value, limit, what to do."""
+    view = View("frame/refused.html", "Not done", None)
+    return render(request, view, place, status=refusal.problem.status, problem=refusal.problem, back=local(back))
+
+
+def remember(response: Response, fields: dict[str, str]) -> None:
+    """Language and appearance, in cookies that say nothing else."""
+    if fields.get("language") in LANGUAGES:
+        response.set_cookie("language", fields["language"], max_age=31536000, samesite="strict", path="/")
+    if fields.get("theme") in THEMES:
+        response.set_cookie("theme", fields["theme"], max_age=31536000, samesite="strict", path="/")

@@ -1,0 +1,142 @@
+"""The core's names as a technician reads them: checks, parameters, causes, outcomes. Every message is a catalogue's key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from commissioner.service.page.texts import NBSP, Texts
+
+SCRIPT_TEXTS = (
+    "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
+    "State of the motor not known", "This page has lost the service", "not known", "no service", "sending …",
+    "sent; output was off already", "sent; zero volts confirmed after %s", "sent, not confirmed: emergency stop",
+    "not sent: use the emergency stop", "Not yet: confirm %s more above.", "Keep holding …", "Released before 2 s. Nothing was energised.",
+    "The run is being started …", "Type %s and confirm the points above.", "done, %s", "running", "waits", "highest", "limit",
+    "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
+    "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
+    "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
+    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing", "efficiency %s; motors of this size have %s",
+    "Reading the drive …", "The file is being sent …", "no value",
+)  # fmt: skip
+"""What scripts say; the page hands it to them in its own language."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One of the five numbers a motor is known by."""
+
+    key: str
+    symbol: str
+    name: str
+    factor: float
+    unit: str
+    digits: int
+    limit: str
+
+
+QUANTITIES = (
+    Quantity("stator_resistance_ohm", "R<sub>s</sub>", "stator resistance", 1.0, "Ω", 3, "resistance_std_percent"),
+    Quantity("rotor_resistance_ohm", "R<sub>R</sub>", "rotor resistance", 1.0, "Ω", 3, "rotor_resistance_std_percent"),
+    Quantity("leakage_inductance_h", "L<sub>σ</sub>", "leakage inductance", 1e3, "mH", 3, "leakage_std_percent"),
+    Quantity(
+        "magnetizing_inductance_h", "L<sub>M</sub>", "magnetizing inductance", 1e3, "mH", 1, "magnetizing_std_percent"
+    ),
+    Quantity("rotor_time_constant_s", "T<sub>R</sub>", "rotor time constant", 1e3, "ms", 1, ""),
+)
+UNITS: Mapping[str, tuple[str, int]] = {
+    "DC link in range": ("V", 1), "heatsink temperature": ("°C", 0), "winding temperature": ("°C", 0),
+    "drive rated for the test current": ("A", 2), "rated power in the drive": ("W", 0), "rated voltage in the drive": ("V", 0),
+    "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
+    "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
+}  # fmt: skip
+CAUSES = {
+    "dead_time": ("Dead time of the inverter legs", "Normal for an inverter. The identification takes it off; nothing to do."),
+    "device_drop": ("Voltage drop of the devices", "Normal for an inverter. The identification takes it off; nothing to do."),
+    "sensor_offset": ("Offset of the current sensors", "Zero them at the drive if it offers that."),
+    "magnetizing_saturation": ("Saturation of the main flux path", "Normal. Give the drive its saturation curve if it takes one."),
+    "sensor_gain_mismatch": ("Current sensors of unequal gain", "Values change with the axis. Beyond 1 %: have the sensors compared."),
+    "sensor_lag": ("Lag of the current sensors", "Normal where it is a part of a sample period."),
+    "sampling_delay": ("Delay of sampling", "Normal where it is a part of a sample period."),
+    "leakage_saturation": ("Saturation of the leakage path", "Normal in small motors with closed slots."),
+    "iron_loss": ("Iron loss", "Normal."), "rotor_skin_effect": ("Deep bars of the rotor", "Normal in larger motors."),
+}  # fmt: skip
+
+
+class Words:
+    """The same in one language."""
+
+    quantities = QUANTITIES
+
+    def __init__(self, texts: Texts) -> None:
+        self._t = texts
+
+    def check_name(self, name: str) -> str:
+        """`rated_power_w in the drive` -> `Rated power in the drive`."""
+        plain = re.sub(r", deg[A-Z]$", "", name)
+        plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+        said = self._t.gettext(plain)
+        return said[:1].upper() + said[1:]
+
+    def check_value(self, check: Mapping[str, Any]) -> str:
+        """With its unit."""
+        unit, digits = self._unit(check)
+        value = check["value"]
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return self._t.number(float(value), digits, unit)
+        return self._localised(str(value)) if value is not None else self._t.gettext("no value")
+
+    def check_limit(self, check: Mapping[str, Any]) -> str:
+        unit, digits = self._unit(check)
+        limit = check["limit"]
+        if isinstance(limit, int | float) and not isinstance(limit, bool):
+            return self._t.number(float(limit), digits, unit)
+        text = str(limit)
+        if " within" in text:
+            text = f"{text.split(' within', maxsplit=1)[0]} {unit} ± 5 %"
+        elif unit and not text.rstrip().endswith(unit) and re.search(r"\d$", text.strip()):
+            text = f"{text} {unit}"
+        return self._localised(text)
+
+    def sentence(self, text: str) -> str:
+        """A sentence of the core, with its first letter as a sentence has it."""
+        said = self._t.gettext(text)
+        return said[:1].upper() + said[1:]
+
+    def is_checked(self, check: Mapping[str, Any]) -> bool:
+        """A check without a value was not made: it locks like one that failed."""
+        return check["value"] is not None
+
+    def cause(self, name: str) -> str:
+        return self._t.gettext(CAUSES[name][0]) if name in CAUSES else name.replace("_", " ").capitalize()
+
+    def cause_advice(self, name: str) -> str:
+        return self._t.gettext(CAUSES[name][1]) if name in CAUSES else ""
+
+    def size(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        """Sizes of a cause, each with its 95 % interval and unit."""
+        shown = [self._one_size(size) for size in parameters.values() if isinstance(size.get("value"), int | float)]
+        return "; ".join(shown[:3])
+
+    def _one_size(self, size: Mapping[str, Any]) -> str:
+        value, std, unit = float(size["value"]), float(size.get("std") or 0.0), str(size.get("unit") or "")
+        if std <= 0.0:
+            return self._t.short(value, unit)
+        return f"{self._t.short(value)} ± {self._t.short(float(f'{1.96 * std:.2g}'), unit)}"
+
+    def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
+        plain = re.sub(r", deg[A-Z]$", "", str(check["name"]))
+        plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+        return UNITS.get(plain, ("", 1))
+
+    def _localised(self, text: str) -> str:
+        """`at most 120 degC` with marks, units and no-break spaces of the language."""
+        if (said := self._t.gettext(text)) != text:
+            return said
+        text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
+        text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)
+        for english in ("at most", "at least", "of the peak", "peak", "to"):
+            text = re.sub(rf"\b{english}\b", self._t.gettext(english), text)
+        return re.sub(r"(\d)\.(\d)", r"\1,\2", text) if self._t.language == "de" else text

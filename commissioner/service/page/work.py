@@ -1,0 +1,372 @@
+"""The pages of the work, in its order: start, motor, checks, what will happen, run, write-back, restore."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import Response
+from pydantic import ValidationError
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import parts_of
+from commissioner.service.archive import Entry
+from commissioner.service.configuration import DriveTable
+from commissioner.service.library import (
+    PLATE_FIELDS,
+    SIMULATOR,
+    Drive,
+    Motor,
+    judge_plate,
+    plate_document,
+    usual_efficiency,
+)
+from commissioner.service.page.band import Place
+from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.routes.checks import make_checks
+from commissioner.service.routes.library import start_simulator
+from commissioner.service.routes.runs import RunWish, start_run
+from commissioner.service.routes.write import Act, act, plan
+from commissioner.service.runs.control import Party
+from commissioner.service.runs.live import live_document
+from commissioner.service.simulator import SCENARIOS
+from commissioner.settings import MotorFile
+
+router = APIRouter()
+START = View("work/start.html", "What do you want to measure?", 1)
+MOTOR = View("work/motor.html", "What does the nameplate say?", 2)
+CHECKS = View("work/checks.html", "May this motor be energised?", 3)
+ENERGISE = View("work/energise.html", "What will happen to the motor", 4)
+LIVE = View("work/live.html", "Test in progress", 5)
+ENDED = View("work/ended.html", "The run has ended", 5)
+RESULT = View("work/result.html", "Result", 6)
+WRITE = View("work/write.html", "What would be written into the drive", 7)
+WRITTEN = View("work/written.html", "Written, read back and stored", 8)
+
+
+@router.get("/")
+async def start(request: Request) -> Response:
+    """Where to begin: a drive, the simulator, a recording."""
+    enter(request)
+    parts = parts_of(request)
+    drives = [drive for drive in parts.library.drives() if drive.id != SIMULATOR]
+    newest = await asyncio.to_thread(lambda: parts.archive.entries(limit=8))
+    live = parts.desk.live()
+    cut = [entry for entry in newest if entry.outcome == "cut off" and entry.run not in {run.id for run in live}]
+    return render(
+        request,
+        START,
+        drives=drives,
+        newest=newest,
+        live=live,
+        cut=cut,
+        scenarios=SCENARIOS,
+        profiles=parts.library.profiles(),
+        scenario=parts.simulator.scenario,
+        motors=parts.library.motors(),
+    )
+
+
+@router.post("/simulator")
+async def simulator(request: Request) -> Response:
+    """Try it without a drive."""
+    who, fields = await enter_form(request)
+    await start_simulator(request, fields.get("scenario", "default"), who)
+    return go(f"/drives/{SIMULATOR}")
+
+
+@router.post("/drives")
+async def add_drive(request: Request) -> Response:
+    """Keep a drive, then its motor."""
+    who, fields = await enter_form(request)
+    parts = parts_of(request)
+    name = fields.get("name", "").strip()
+    table = _drive_table(parts, name, fields)
+    parts.library.add_drive(table)
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, "added a drive", drive=table.id)
+    return go(f"/drives/{table.id}")
+
+
+def _drive_table(parts: Parts, name: str, fields: dict[str, str]) -> DriveTable:
+    identifier = _slug(name, {drive.id for drive in parts.library.drives()})
+    try:
+        return DriveTable(
+            id=identifier, name=name, url=fields.get("url", "").strip(), profile=fields.get("profile", "")
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = str(first["loc"][0])
+        raise Refusal(
+            422,
+            f"{key} cannot be used",
+            step="add a drive",
+            value=str(first["input"])[:100],
+            limit=str(first["msg"]),
+            remedy=f"correct {key}",
+        ) from error
+
+
+@router.get("/drives/{drive}")
+async def motor(request: Request, drive: str, motor: str = "") -> Response:
+    """The nameplate, as a form."""
+    enter(request, Role.OPERATOR)
+    parts = parts_of(request)
+    known = parts.library.drive(drive)
+    chosen = next((m for m in parts.library.motors() if m.id == motor), None) or parts.library.motors()[0]
+    values = {key: _plain(value) for key, value in plate_document(chosen.plate).items()}
+    values["rated_power_kw"] = _plain(chosen.plate.rated_power_w / 1000)
+    return _motor_page(request, known, chosen, values, judge_plate(plate_document(chosen.plate)), chosen.name)
+
+
+def _motor_page(
+    request: Request,
+    drive: Drive,
+    chosen: Motor | None,
+    values: dict[str, str],
+    judged: dict[str, Any],
+    name: str,
+    status: int = 200,
+) -> Response:
+    parts = parts_of(request)
+    usual = usual_efficiency(chosen.plate) if chosen else None
+    return render(
+        request,
+        MOTOR,
+        Place(drive=drive.id),
+        status=status,
+        drive=drive,
+        chosen=chosen,
+        values=values,
+        judged=judged,
+        motors=parts.library.motors(),
+        name=name,
+        usual=usual,
+    )
+
+
+@router.post("/drives/{drive}/motor")
+async def take_motor(request: Request, drive: str) -> Response:
+    """Keep the plate, then check the drive: the next page is the answer."""
+    who, fields = await enter_form(request)
+    parts = parts_of(request)
+    known = parts.library.drive(drive)
+    values = {key: fields.get(key, "").strip() for key in (*PLATE_FIELDS, "rated_power_kw")}
+    judged = judge_plate(_si(values))
+    name = fields.get("name", "").strip()[:80]
+    if not judged["ok"]:
+        return _motor_page(request, known, None, values, judged, name, 422)
+    chosen = _kept(parts, fields.get("known", ""), name, values)
+    return await _checked(request, parts, known, chosen, Party(who.session.id if who.session else "", who.person))
+
+
+def _si(values: dict[str, str]) -> dict[str, Any]:
+    """The form in the plate's own keys: power from kilowatts to watts."""
+    plate: dict[str, Any] = {key: value for key, value in values.items() if key in PLATE_FIELDS and value != ""}
+    text = values.get("rated_power_kw", "").replace(",", ".").strip()
+    try:
+        plate["rated_power_w"] = float(f"{1000 * float(text):.10g}")
+    except ValueError:
+        plate["rated_power_w"] = text
+    return plate
+
+
+def _kept(parts: Parts, known: str, name: str, values: dict[str, str]) -> Motor:
+    """The motor of the form: a known one where nothing differs, else kept under its name."""
+    from commissioner.service.library import _number
+
+    table = MotorFile.model_validate({key: _number(value) for key, value in _si(values).items()} | {"name": name})
+    found = next((m for m in parts.library.motors() if m.id == known), None)
+    plate = table.model_dump(exclude={"name"})
+    if found is not None and plate == plate_document(found.plate) and name in ("", found.name):
+        return found
+    if found is not None and found.origin == "added" and name == found.name:
+        return parts.library.put_motor(found.id, table)
+    identifier = _slug(name, {m.id for m in parts.library.motors()})
+    return parts.library.put_motor(identifier, table)
+
+
+async def _checked(request: Request, parts: Parts, drive: Drive, motor: Motor, party: Party) -> Response:
+    """The checks, made now; the page that shows them. A drive that does not answer is shown as what it is."""
+    place, back = Place(drive=drive.id), f"/drives/{drive.id}?motor={motor.id}"
+    try:
+        parts.desk.control(drive.id).take(party)
+        await make_checks(parts, drive, motor)
+    except Refusal as refusal:
+        return refused(request, refusal, place, back)
+    return go(f"/drives/{drive.id}/checks?motor={motor.id}")
+
+
+@router.post("/drives/{drive}/checks")
+async def check_again(request: Request, drive: str) -> Response:
+    """The same checks once more."""
+    who, fields = await enter_form(request)
+    parts = parts_of(request)
+    motor = parts.library.motor(fields.get("motor", ""))
+    party = Party(who.session.id if who.session else "", who.person)
+    return await _checked(request, parts, parts.library.drive(drive), motor, party)
+
+
+@router.get("/drives/{drive}/checks")
+async def checks(request: Request, drive: str, motor: str) -> Response:
+    """What was seen, with the time; exceptions first."""
+    enter(request, Role.OPERATOR)
+    parts = parts_of(request)
+    known, chosen = parts.library.drive(drive), parts.library.motor(motor)
+    document = parts.checks.get(f"{known.id} {chosen.id}")
+    if document is None:
+        return go(f"/drives/{known.id}?motor={chosen.id}")
+    return render(request, CHECKS, Place(drive=known.id), drive=known, motor=chosen, document=document)
+
+
+@router.get("/drives/{drive}/energise")
+async def energise(request: Request, drive: str, motor: str) -> Response:
+    """What will happen to the motor, in volts, amperes and seconds; then the button to hold."""
+    enter(request, Role.OPERATOR)
+    parts = parts_of(request)
+    return _energise_page(request, parts.library.drive(drive), parts.library.motor(motor))
+
+
+def _energise_page(request: Request, drive: Drive, motor: Motor, message: str = "", status: int = 200) -> Response:
+    parts = parts_of(request)
+    document = parts.checks.get(f"{drive.id} {motor.id}")
+    if document is None or document["outcome"] != "passed" or not document.get("limits"):
+        return go(f"/drives/{drive.id}/checks?motor={motor.id}")
+    return render(
+        request,
+        ENERGISE,
+        Place(drive=drive.id),
+        status=status,
+        drive=drive,
+        motor=motor,
+        limits=document["limits"],
+        document=document,
+        message=message,
+        page_lost_s=parts.settings.file.service.page_lost_s,
+    )
+
+
+@router.post("/drives/{drive}/energise")
+async def energise_by_word(request: Request, drive: str) -> Response:
+    """For whoever cannot hold a button: the motor's name typed, three points confirmed."""
+    who, fields = await enter_form(request)
+    parts = parts_of(request)
+    known, motor = parts.library.drive(drive), parts.library.motor(fields.get("motor", ""))
+    confirmed = all(fields.get(f"confirm{k}") == "yes" for k in (1, 2, 3))
+    if not confirmed or fields.get("word", "").strip() != motor.id:
+        message = "Nothing was energised: confirm the three points and type the motor’s name."
+        return _energise_page(request, known, motor, message, 422)
+    wish = RunWish(drive=known.id, motor=motor.id, write_back=fields.get("write_back") == "yes", confirm=True)
+    try:
+        run = await start_run(parts, wish, who)
+    except Refusal as refusal:
+        return refused(request, refusal, Place(drive=known.id), f"/drives/{known.id}/checks?motor={motor.id}")
+    return go(f"/runs/{run.id}")
+
+
+@router.get("/runs/{run}")
+async def run(request: Request, run: str) -> Response:
+    """A run, whatever state it is in."""
+    enter(request)
+    parts = parts_of(request)
+    live = parts.desk.runs.get(run)
+    if live is not None and not live.is_over and not live.feed.state.is_over:
+        state = live.feed.state
+        document = live_document(state, live.feed.current_now_a)
+        return render(request, LIVE, Place(run=run, drive=live.drive), state=state, live=document, run=live)
+    entry = parts.archive.find(run)
+    asked, result = parts.archive.request(run), parts.archive.result(run)
+    place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
+    state = live.feed.state if live is not None else _told(entry)
+    facts: dict[str, Any] = {
+        "entry": entry,
+        "result": result,
+        "asked": asked,
+        "state": state,
+        "is_diagnosing": bool(live and not live.is_over),
+        "has_report": (entry.folder / "report.html").is_file(),
+        "has_snapshot": (entry.folder / "snapshot.json").is_file(),
+    }
+    if result.get("parameters") and entry.outcome in ("commissioned", "rejected"):
+        return render(request, RESULT, place, **facts)
+    return render(request, ENDED, place, **facts)
+
+
+def _told(entry: Entry) -> Any:
+    """An archived run's state, folded again from its journal."""
+    from commissioner.service.runs.feed import Feed
+
+    feed = Feed(entry.folder)
+    while feed.poll():
+        pass
+    return feed.state
+
+
+@router.get("/runs/{run}/write-back")
+async def write_back(request: Request, run: str) -> Response:
+    return await _table(request, run, "write-back")
+
+
+@router.get("/runs/{run}/restore")
+async def restore(request: Request, run: str) -> Response:
+    return await _table(request, run, "restore")
+
+
+async def _table(request: Request, run: str, what: Act) -> Response:
+    """Register, now, will be: the table is the question."""
+    enter(request, Role.OPERATOR)
+    parts = parts_of(request)
+    place = _place(parts, run)
+    try:
+        table = await plan(parts, run, what)
+    except Refusal as refusal:
+        return refused(request, refusal, place, f"/runs/{run}")
+    return render(request, WRITE, place, run=run, what=what, table=table)
+
+
+@router.post("/runs/{run}/write-back")
+async def do_write_back(request: Request, run: str) -> Response:
+    return await _act(request, run, "write-back")
+
+
+@router.post("/runs/{run}/restore")
+async def do_restore(request: Request, run: str) -> Response:
+    return await _act(request, run, "restore")
+
+
+async def _act(request: Request, run: str, what: Act) -> Response:
+    who, fields = await enter_form(request)
+    parts = parts_of(request)
+    place = _place(parts, run)
+    try:
+        done = await act(parts, run, what, fields.get("token", ""), who)
+    except Refusal as refusal:
+        return refused(request, refusal, place, f"/runs/{run}/{what}")
+    return render(
+        request,
+        WRITTEN,
+        place,
+        run=run,
+        what=what,
+        done=done.get("report") or done,
+        who_wrote=who.person,
+        motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
+    )
+
+
+def _place(parts: Parts, run: str) -> Place:
+    return Place(run=run, drive=str((parts.archive.request(run).get("origin") or {}).get("drive", "")))
+
+
+def _slug(name: str, taken: set[str]) -> str:
+    """An id from a name that a person gave, not taken yet."""
+    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:30] or "motor"
+    return next(one for one in (plain, *(f"{plain}_{k}" for k in range(2, 1000))) if one not in taken)
+
+
+def _plain(value: Any) -> str:
+    """A number as it stands in a form's field."""
+    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

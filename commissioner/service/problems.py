@@ -1,0 +1,121 @@
+"""Every refusal of the API as a problem document (RFC 9457) with step, value, limit and remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
+
+from commissioner.errors import Aborted, CommissionerError, DataRefused, DriveError, UsageError
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class Problem(BaseModel):
+    """RFC 9457, extended by the four facts of every error of this program."""
+
+    type: str = "about:blank"
+    title: str
+    status: int
+    detail: str = ""
+    step: str = ""
+    value: Any = None
+    limit: Any = None
+    remedy: str = ""
+
+
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    status: {"model": Problem, "description": what, "content": {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}}
+    for status, what in (
+        (400, "The request cannot be read."),
+        (401, "Nobody is logged in."),
+        (403, "Not allowed: role, origin or token."),
+        (404, "There is no such thing."),
+        (409, "The state of run or drive does not allow it."),
+        (413, "Too large."),
+        (415, "Another media type is wanted."),
+        (422, "A field cannot be right."),
+        (429, "Too often."),
+        (502, "The drive or the link failed."),
+        (503, "Not ready yet."),
+    )
+}
+"""For OpenAPI: what any route may answer beside its success."""
+
+
+class Refusal(Exception):
+    """A request that is refused, with its HTTP status."""
+
+    def __init__(self, status: int, title: str, *, headers: Mapping[str, str] | None = None, **facts: Any) -> None:
+        super().__init__(title)
+        self.headers = dict(headers or {})
+        self.problem = Problem(title=title, status=status, **facts)
+
+
+def refusal_of(error: CommissionerError) -> Refusal:
+    """An error of the core as a refusal."""
+    status = next((code for kind, code in _STATUS if isinstance(error, kind)), 500)
+    return Refusal(
+        status, error.what, detail=error.what, step=error.step, value=_shown(error.value), limit=_shown(error.limit),
+        remedy=error.remedy,
+    )  # fmt: skip
+
+
+_STATUS: Sequence[tuple[type[CommissionerError], int]] = (
+    (UsageError, 422), (DataRefused, 422), (Aborted, 409), (DriveError, 502), (CommissionerError, 409),
+)  # fmt: skip
+
+
+def respond(refusal: Refusal) -> Response:
+    """The problem document."""
+    return JSONResponse(
+        refusal.problem.model_dump(mode="json"), refusal.problem.status, headers=refusal.headers, media_type=MEDIA_TYPE
+    )
+
+
+def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> None:
+    """Every way a request can fail, answered in one form."""
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(request: Request, error: RequestValidationError) -> Response:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
+        unreadable = first["type"] == "json_invalid"
+        return answer(
+            request,
+            Refusal(
+                400 if unreadable else 422,
+                f"{where or 'the body'} cannot be used",
+                detail=str(first["msg"]),
+                step="read the request",
+                value=_shown(first.get("input")),
+                limit=str(first["msg"]),
+                remedy=f"correct {where or 'the body'}; /openapi.json describes it",
+            ),
+        )
+
+    @app.exception_handler(HTTPException)
+    async def plain(request: Request, error: HTTPException) -> Response:
+        title = {404: "there is no such page or route", 405: "this method is not offered here"}.get(
+            error.status_code, str(error.detail)
+        )
+        headers = dict(error.headers or {})
+        return answer(
+            request,
+            Refusal(
+                error.status_code, title, headers=headers, step="route", remedy="/openapi.json lists what there is"
+            ),
+        )
+
+
+def _shown(value: Any) -> Any:
+    """A value that fits into JSON and onto a screen."""
+    if isinstance(value, bool | int | type(None)) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    return str(value)[:200]

@@ -1,0 +1,24 @@
+"""The HTTP contract, a file for each noun."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+
+def all_routers() -> list[APIRouter]:
+    """Every route of the API."""
+    from commissioner.service.routes import (
+        access,
+        checks,
+        control,
+        events,
+        health,
+        history,
+        library,
+        recordings,
+        runs,
+        write,
+    )
+
+    modules = (health, library, checks, runs, control, events, write, history, recordings, access)
+    return [module.router for module in modules]

@@ -1,0 +1,103 @@
+"""Log in, log out, and the audit."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.sessions import Session
+from commissioner.service.access.visitors import COOKIE, Visitor, check_token, parts_of, require, visitor_of
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+
+router = APIRouter()
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+
+
+class Credentials(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    name: Annotated[str, Field(max_length=200)]
+    password: Annotated[str, Field(max_length=1000)]
+
+
+@router.post("/api/login")
+async def login(request: Request, response: Response, credentials: Credentials) -> dict[str, Any]:
+    """A session as a cookie; `csrf` goes into the header X-CSRF-Token of every request that changes something."""
+    session = await log_in(request, credentials)
+    set_cookie(parts_of(request), response, session)
+    return {"person": session.person, "role": session.role.name.lower(), "csrf": session.csrf}
+
+
+async def log_in(request: Request, credentials: Credentials) -> Session:
+    """A new session. Refusal 401: name or password is wrong; 429: too many wrong ones."""
+    parts = parts_of(request)
+    address = request.client.host if request.client else ""
+    keys = (f"address {address}", f"name {credentials.name}")
+    wait_s = max(parts.login_tries.wait_s(key) for key in keys)
+    if wait_s > 0.0:
+        raise Refusal(
+            429,
+            "too many wrong passwords",
+            step="log in",
+            value=f"{wait_s:.0f} s to wait",
+            limit="5 a minute",
+            remedy="wait, then try again",
+            headers={"retry-after": str(int(wait_s) + 1)},
+        )
+    for key in keys:
+        parts.login_tries.count(key)
+    account = await asyncio.to_thread(parts.accounts.verify, credentials.name, credentials.password)
+    if account is None:
+        await asyncio.to_thread(parts.audit.write, credentials.name[:40], address, "log-in refused")
+        raise Refusal(
+            401,
+            "name or password is wrong",
+            step="log in",
+            value=credentials.name[:40],
+            limit="an account and its password",
+            remedy="try again; `commissioner accounts list` shows the names",
+        )
+    for key in keys:
+        parts.login_tries.forget(key)
+    old = visitor_of(request).session
+    if old is not None:
+        parts.sessions.end(old.id)
+    await asyncio.to_thread(parts.audit.write, account.name, address, "logged in", role=account.role.name.lower())
+    return parts.sessions.begin(account.name, account.role, is_logged_in=True)
+
+
+def set_cookie(parts: Parts, response: Response, session: Session) -> None:
+    response.set_cookie(
+        COOKIE, session.id, httponly=True, samesite="strict", secure=parts.settings.file.tls is not None, path="/"
+    )
+
+
+@router.post("/api/logout")
+async def logout(request: Request, response: Response) -> dict[str, Any]:
+    """The session ends."""
+    who = visitor_of(request)
+    check_token(who, request.headers.get("x-csrf-token", ""))
+    await log_out(parts_of(request), who)
+    response.delete_cookie(COOKIE, path="/")
+    return {"logged_out": who.person or None}
+
+
+async def log_out(parts: Parts, who: Visitor) -> None:
+    if who.session is not None:
+        parts.sessions.end(who.session.id)
+        if who.session.is_logged_in:
+            await asyncio.to_thread(parts.audit.write, who.person, who.address, "logged out")
+
+
+@router.get("/api/audit")
+async def audit(request: Request, _who: Operator, limit: Annotated[int, Query(ge=1, le=5000)] = 200) -> dict[str, Any]:
+    """Newest first, and whether the whole chain is intact."""
+    parts = parts_of(request)
+    chain = await asyncio.to_thread(parts.audit.verify)
+    entries = await asyncio.to_thread(parts.audit.newest, limit)
+    facts = {"lines": chain.lines, "head": chain.head, "is_intact": chain.is_intact, "broken_at": chain.broken_at}
+    return {"chain": facts, "entries": entries}

@@ -1,0 +1,75 @@
+"""Everything that can be known without energising or writing."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime as dt
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Request
+from pydantic import BaseModel, ConfigDict, Field
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.library import Drive, Motor
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.child import ask, refusal_from
+
+router = APIRouter()
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+
+
+class CheckWish(BaseModel):
+    """Which drive and which motor, by their ids."""
+
+    model_config = ConfigDict(extra="forbid")
+    drive: Annotated[str, Field(max_length=60)]
+    motor: Annotated[str, Field(max_length=60)]
+
+
+@router.post("/api/checks")
+async def checks(request: Request, wish: CheckWish, _who: Operator) -> dict[str, Any]:
+    """The checks, each with value, limit and remedy; energises and writes nothing. 502: the drive does not answer."""
+    parts = parts_of(request)
+    return await make_checks(parts, parts.library.drive(wish.drive), parts.library.motor(wish.motor))
+
+
+async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> dict[str, Any]:
+    """The document of `commissioner check`, with the time it was made. Refusal: a run has the drive, or it is silent."""
+    if not drive.url:
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="check",
+            value=drive.id,
+            limit="a drive with an address",
+            remedy="start the simulator first",
+        )
+    live = parts.desk.live_on(drive.id)
+    if live is not None or parts.desk.is_starting(drive.id):
+        raise Refusal(
+            409,
+            f"{drive.name} is in use by a run",
+            step="check",
+            value=live.id if live else "starting",
+            limit="no run on this drive",
+            remedy="wait for its end, or stop it",
+        )
+    watch, log = parts.desk.watch(drive), parts.desk.log("check", drive.id)
+    await asyncio.to_thread(watch.pause)
+    try:
+        code, document = await ask(
+            ["check", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, "--json"], log
+        )
+    finally:
+        watch.resume()
+    if "checks" not in document:
+        import json
+
+        raise refusal_from(code, json.dumps(document).encode(), log)
+    document["checked_utc"] = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
+    parts.checks[f"{drive.id} {motor.id}"] = document
+    while len(parts.checks) > 200:
+        parts.checks.pop(next(iter(parts.checks)))
+    return document

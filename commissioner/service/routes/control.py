@@ -1,0 +1,253 @@
+"""STOP, by WebSocket, POST and plain form; and who operates a drive."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
+
+from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import RedirectResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.requests import HTTPConnection
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require, visitor_of
+from commissioner.service.page.band import Place, band_of
+from commissioner.service.page.texts import texts_of
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.control import Party
+from commissioner.service.runs.desk import LiveRun, Stopped
+from commissioner.service.runs.feed import Feed
+
+router = APIRouter()
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+BAND_S = 0.4
+"""The band is sent anew so often: its age must not be older than a second."""
+UNKNOWN = "somebody at a page"
+
+
+class StopWish(BaseModel):
+    """Why; may stay empty."""
+
+    model_config = ConfigDict(extra="ignore")
+    reason: Annotated[str, Field(max_length=300)] = ""
+
+
+class ControlWish(BaseModel):
+    """ask | grant | refuse | release."""
+
+    model_config = ConfigDict(extra="forbid")
+    do: Literal["ask", "grant", "refuse", "release"]
+
+
+async def stop_runs(connection: HTTPConnection, reason: str, how: str, run: str = "", drive: str = "") -> list[Stopped]:
+    """STOP for one run, one drive, or everything here. Needs no log-in; asked before anything is written down."""
+    parts, who = parts_of(connection), visitor_of(connection)
+    person = who.person or UNKNOWN
+    live = parts.desk.runs.get(run)
+    word = reason or f"STOP ({how})"
+    if live is not None:
+        stopped = [await parts.desk.stop(live, person, word)]
+    else:
+        stopped = await parts.desk.stop_all(person, word, drive or None)
+    if parts.stop_tries.wait_s(who.address) == 0.0:
+        parts.stop_tries.count(who.address)
+        with contextlib.suppress(OSError):
+            named = ", ".join(one.run for one in stopped) or "nothing was running"
+            await asyncio.to_thread(
+                parts.audit.write,
+                person,
+                who.address,
+                "STOP",
+                by=how,
+                run=named,
+                reason=reason,
+                zero_volts=all(one.zero_volts for one in stopped),
+            )
+    return stopped
+
+
+@router.post("/api/runs/{run}/stop")
+async def stop(request: Request, run: str, wish: StopWish | None = None) -> dict[str, Any]:
+    """The operator's stop. 200 says when the drive confirmed zero volts; 502: it did not. Needs no log-in."""
+    parts = parts_of(request)
+    if run not in parts.desk.runs:
+        parts.archive.find(run)
+        return {
+            "run": run,
+            "asked_utc": None,
+            "zero_volts": True,
+            "confirmed_utc": None,
+            "after_s": 0.0,
+            "state": "ended before",
+        }
+    stopped = await stop_runs(request, wish.reason if wish else "", "POST", run)
+    _check_confirmed(stopped)
+    return asdict(stopped[0])
+
+
+@router.post("/api/stop")
+async def stop_everything(request: Request, wish: StopWish | None = None) -> dict[str, Any]:
+    """STOP for every run of this service, also one that is only starting. Needs no log-in."""
+    stopped = await stop_runs(request, wish.reason if wish else "", "POST")
+    _check_confirmed(stopped)
+    return {"stopped": [asdict(one) for one in stopped]}
+
+
+@router.post("/stop", include_in_schema=False)
+async def stop_by_form(
+    request: Request, run: Annotated[str, Form(max_length=200)] = "", drive: Annotated[str, Form(max_length=60)] = ""
+) -> Response:
+    """The same from a page without script; back to where it came from."""
+    await stop_runs(request, "", "form", run, drive)
+    back = urlsplit(request.headers.get("referer", "/")).path or "/"
+    return RedirectResponse(back if back.startswith("/") and not back.startswith("//") else "/", 303)
+
+
+def _check_confirmed(stopped: list[Stopped]) -> None:
+    silent = [one for one in stopped if not one.zero_volts]
+    if silent:
+        raise Refusal(
+            502,
+            "STOP was sent; the drive has not confirmed that its output is off",
+            step="stop",
+            value=silent[0].state or "no word",
+            limit="a status that says so",
+            remedy="take the motor as live: use the emergency stop, then isolate the drive's supply",
+        )
+
+
+@router.post("/api/drives/{drive}/control")
+async def control(request: Request, drive: str, wish: ControlWish, who: Operator) -> dict[str, Any]:
+    """Ask for control of a drive, or answer who asks."""
+    parts = parts_of(request)
+    parts.library.drive(drive)
+    return change_control(parts, drive, wish.do, Party(who.session.id if who.session else "", who.person))
+
+
+def change_control(parts: Parts, drive: str, do: str, party: Party) -> dict[str, Any]:
+    """What there is to control, after the wish was granted or not."""
+    held = parts.desk.control(drive)
+    if do == "ask":
+        held.ask(party)
+    elif do == "release" and held.is_held_by(party) and parts.desk.live_on(drive) is None:
+        held.release()
+    elif do in ("grant", "refuse"):
+        held.answer(party, grants=do == "grant")
+    asking = held.asking
+    return {
+        "holder": held.holder.person if held.holder else None,
+        "asking": asking.person if asking else None,
+        "you": held.is_held_by(party),
+        "wait_s": round(held.wait_s, 1),
+    }
+
+
+@router.websocket("/api/runs/{run}/control")
+async def run_socket(socket: WebSocket, run: str) -> None:
+    """A page at a run, or a script: `{"stop": reason}` stops it."""
+    await _Socket(socket, run, socket.query_params.get("drive", "")).serve()
+
+
+@router.websocket("/api/control")
+async def page_socket(socket: WebSocket) -> None:
+    """Any other page: the band of its drive, and STOP for what goes on."""
+    await _Socket(socket, "", socket.query_params.get("drive", "")).serve()
+
+
+class _Socket:
+    """One page's line to the service: the band and the numbers out, STOP and control in."""
+
+    def __init__(self, socket: WebSocket, run: str, drive: str) -> None:
+        self._socket, self._run, self._drive = socket, run[:200], drive[:60]
+        self._parts = parts_of(socket)
+        self._who = visitor_of(socket)
+        self._sending = asyncio.Lock()
+        self._last = ""
+
+    async def serve(self) -> None:
+        await self._socket.accept()
+        session = self._who.session.id if self._who.session else ""
+        pages = self._parts.desk.pages
+        if session:
+            pages.opened(session)
+        sending = [asyncio.create_task(self._send_band()), asyncio.create_task(self._send_numbers())]
+        closing = asyncio.create_task(self._parts.closing.wait())
+        hearing = asyncio.create_task(self._hear())
+        try:
+            await asyncio.wait([closing, hearing], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            if session:
+                pages.closed(session)
+            for task in (*sending, closing, hearing):
+                task.cancel()
+            await asyncio.gather(*sending, closing, hearing, return_exceptions=True)
+            with contextlib.suppress(Exception):
+                await self._socket.close(1012 if self._parts.closing.is_set() else 1000)
+
+    async def _hear(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                text = await self._socket.receive_text()
+                with contextlib.suppress(ValueError):
+                    said = json.loads(text)
+                    if isinstance(said, dict):
+                        await self._take(said)
+
+    async def _take(self, said: dict[str, Any]) -> None:
+        if "stop" in said:
+            run = self._run or str(said.get("run") or "")
+            stopped = await stop_runs(self._socket, str(said["stop"] or "")[:300], "WebSocket", run, self._drive)
+            await self._send({"stopped": [asdict(one) for one in stopped]})
+        elif "control" in said:
+            try:
+                await self._change_control(str(said["control"]))
+            except Refusal as refusal:
+                await self._send({"refused": refusal.problem.model_dump(mode="json")})
+
+    async def _change_control(self, do: str) -> None:
+        live = self._parts.desk.runs.get(self._run)
+        drive = self._drive or (live.drive if live else "")
+        if self._who.may(Role.OPERATOR) and drive and do in ("ask", "grant", "refuse", "release"):
+            party = Party(self._who.session.id if self._who.session else "", self._who.person)
+            await self._send({"control": change_control(self._parts, drive, do, party)})
+
+    async def _send(self, document: dict[str, Any] | str) -> None:
+        text = document if isinstance(document, str) else json.dumps(document, separators=(",", ":"))
+        async with self._sending:
+            with contextlib.suppress(Exception):
+                await self._socket.send_text(text)
+
+    async def _send_band(self) -> None:
+        texts = texts_of(self._socket)
+        while True:
+            who = visitor_of(self._socket)
+            band = band_of(self._parts, who, Place(self._run, self._drive), texts)
+            await self._send({"band": asdict(band)})
+            await asyncio.sleep(BAND_S)
+
+    async def _send_numbers(self) -> None:
+        feed = await self._feed()
+        if feed is None or not self._who.may(Role.VIEWER):
+            return
+        await self._send({"history": feed.state.history})
+        with feed.watch(is_page=True) as watcher:
+            while not watcher.is_lost and (message := await watcher.queue.get()) is not None:
+                await self._send(f'{{"{message.event}":{message.text}}}')
+        await self._send({"over": True})
+
+    async def _feed(self) -> Feed | None:
+        """Of the run, once the service knows it."""
+        if not self._run:
+            return None
+        for _ in range(30):
+            live: LiveRun | None = self._parts.desk.runs.get(self._run)
+            if live is not None:
+                return None if live.is_over else live.feed
+            await asyncio.sleep(0.1)
+        return None

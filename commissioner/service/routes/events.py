@@ -1,0 +1,58 @@
+"""The journal's records as server-sent events, resumable; the samples beside them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Request
+from sse_starlette import EventSourceResponse, ServerSentEvent
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.parts import Parts
+from commissioner.service.runs.feed import Feed
+
+router = APIRouter()
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+
+
+@router.get("/api/runs/{run}/events", response_class=EventSourceResponse)
+async def events(
+    request: Request, run: str, _who: Viewer, last_event_id: Annotated[str, Header(max_length=20)] = ""
+) -> EventSourceResponse:
+    """Every record of the run from its begin, or after `Last-Event-ID`; `samples` while it lives; `end` when it is over."""
+    parts = parts_of(request)
+    after = int(last_event_id) if last_event_id.isascii() and last_event_id.isdigit() else -1
+    live = parts.desk.runs.get(run)
+    feed = live.feed if live is not None else _archived(parts, run)
+    return EventSourceResponse(_stream(parts, feed, after), ping=5)
+
+
+def _archived(parts: Parts, run: str) -> Feed:
+    feed = Feed(parts.archive.find(run).folder)
+    while feed.poll():
+        pass
+    feed.close()
+    return feed
+
+
+async def _stream(parts: Parts, feed: Feed, after: int) -> AsyncIterator[ServerSentEvent]:
+    closing = asyncio.create_task(parts.closing.wait())
+    try:
+        with feed.watch(after) as watcher:
+            while not watcher.is_lost:
+                taking = asyncio.create_task(watcher.queue.get())
+                await asyncio.wait([taking, closing], return_when=asyncio.FIRST_COMPLETED)
+                if closing.done():
+                    taking.cancel()
+                    return
+                message = taking.result()
+                if message is None:
+                    yield ServerSentEvent(data="{}", event="end")
+                    return
+                number = None if message.number is None else str(message.number)
+                yield ServerSentEvent(data=message.text, event=message.event, id=number)
+    finally:
+        closing.cancel()

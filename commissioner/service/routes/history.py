@@ -1,0 +1,81 @@
+"""Two runs beside each other, and a motor over the years."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.archive import PARAMETERS, Entry
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.child import ask, refusal_from
+
+router = APIRouter()
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+Run = Annotated[str, Query(min_length=1, max_length=200)]
+_compared: dict[tuple[str, str], dict[str, Any]] = {}
+
+
+@router.get("/api/compare")
+async def compare(request: Request, a: Run, b: Run, _who: Viewer) -> dict[str, Any]:
+    """Same motor, changed (which parameter, how significant), or another one."""
+    return await compared(parts_of(request), a, b)
+
+
+async def compared(parts: Parts, a: str, b: str) -> dict[str, Any]:
+    """What `commissioner runs compare` says of the two, the earlier one first."""
+    first, second = sorted((parts.archive.find(a).run, parts.archive.find(b).run))
+    if first == second:
+        raise Refusal(
+            422,
+            "a run cannot be compared with itself",
+            step="compare",
+            value=first,
+            limit="two runs",
+            remedy="choose another one",
+        )
+    if (first, second) not in _compared:
+        log = parts.desk.log("compare")
+        arguments = ["runs", "compare", first, second, "--runs", str(parts.archive.root), "--json"]
+        code, document = await ask(arguments, log)
+        if "comparison" not in document:
+            raise refusal_from(code, json.dumps(document).encode(), log)
+        if len(_compared) > 500:
+            _compared.clear()
+        _compared[first, second] = document
+    return _compared[first, second]
+
+
+@router.get("/api/motors/{motor}/trend")
+async def trend(request: Request, motor: str, _who: Viewer) -> dict[str, Any]:
+    """Every accepted result of a motor with its standard errors, oldest first."""
+    parts = parts_of(request)
+    return await asyncio.to_thread(trend_of, parts, motor)
+
+
+def trend_of(parts: Parts, motor: str) -> dict[str, Any]:
+    """The points, and of each parameter the change from the first to the last in units of their joint standard error."""
+    entries = [
+        e
+        for e in parts.archive.entries(limit=1000)
+        if e.motor == motor and e.parameters and e.outcome == "commissioned"
+    ]
+    points = [_point(entry) for entry in reversed(entries)]
+    changes = {name: _change(points, name) for name in PARAMETERS} if len(points) > 1 else {}
+    return {"motor": motor, "points": points, "changes": changes}
+
+
+def _point(entry: Entry) -> dict[str, Any]:
+    return {"run": entry.run, "utc": entry.utc, "flux_wb": entry.flux_wb, "parameters": entry.parameters}
+
+
+def _change(points: list[dict[str, Any]], name: str) -> dict[str, float]:
+    first, last = points[0]["parameters"][name], points[-1]["parameters"][name]
+    joint = (first["std"] ** 2 + last["std"] ** 2) ** 0.5
+    change = last["value"] - first["value"]
+    return {"relative": change / first["value"], "sigmas": abs(change) / joint if joint > 0 else 0.0}

@@ -1,0 +1,153 @@
+"""Drives, motors, procedures, and the judgement of a nameplate."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Depends, Request
+from pydantic import BaseModel, ConfigDict
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.configuration import DriveTable, Identifier
+from commissioner.service.library import SIMULATOR, judge_plate, plate_document
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.watch import describe
+from commissioner.service.simulator import SCENARIOS
+from commissioner.settings import CONFIG_FOLDER, MotorFile
+
+router = APIRouter()
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+
+
+class NewMotor(MotorFile):
+    """A motor's plate with the id under which it is kept."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    id: Identifier
+
+
+class SimulatorWish(BaseModel):
+    """Which simulated inverter is wanted."""
+
+    model_config = ConfigDict(extra="forbid")
+    scenario: str = "default"
+
+
+@router.get("/api/drives")
+async def drives(request: Request, _who: Viewer) -> dict[str, Any]:
+    """All drives; addresses without what is secret."""
+    from commissioner.link.wire.url import without_secrets
+
+    parts = parts_of(request)
+    return {"drives": [asdict(d) | {"url": without_secrets(d.url)} for d in parts.library.drives()]}
+
+
+@router.post("/api/drives", status_code=201)
+async def add_drive(request: Request, table: DriveTable, who: Operator) -> dict[str, Any]:
+    """Check and keep a drive. It is not asked for yet: POST /api/checks does."""
+    parts = parts_of(request)
+    drive = parts.library.add_drive(table)
+    parts.audit.write(who.person, who.address, "added a drive", drive=drive.id)
+    return asdict(drive)
+
+
+@router.get("/api/drives/{drive}/state")
+async def drive_state(request: Request, drive: str, _who: Viewer) -> dict[str, Any]:
+    """The drive's own word while no run has it, and how old that is. The first call begins to look."""
+    parts = parts_of(request)
+    found = _drive(parts.library, drive)
+    if not found.url:
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="drive",
+            value=drive,
+            limit="a drive with an address",
+            remedy="POST /api/simulator starts it",
+        )
+    watch = parts.desk.watch(found)
+    watch.want()
+    live = parts.desk.live_on(found.id)
+    return describe(watch.seen) | {"run": live.id if live else None}
+
+
+@router.get("/api/motors")
+async def motors(request: Request, _who: Viewer) -> dict[str, Any]:
+    """All motors with their plates."""
+    found = parts_of(request).library.motors()
+    return {
+        "motors": [
+            {"id": m.id, "name": m.name, "origin": m.origin, "nameplate": plate_document(m.plate)} for m in found
+        ]
+    }
+
+
+@router.post("/api/motors", status_code=201)
+async def put_motor(request: Request, motor: NewMotor, _who: Operator) -> dict[str, Any]:
+    """Check and keep a plate."""
+    table = MotorFile(**motor.model_dump(exclude={"id"}))
+    kept = parts_of(request).library.put_motor(motor.id, table)
+    return {"id": kept.id, "name": kept.name, "origin": kept.origin, "nameplate": plate_document(kept.plate)}
+
+
+@router.get("/api/procedures")
+async def procedures(_who: Viewer) -> dict[str, Any]:
+    """The procedure that ships with the product, as its file says."""
+    import tomllib
+
+    with (CONFIG_FOLDER / "procedure.toml").open("rb") as file:
+        return {"procedures": [{"id": "standard", "origin": "packaged", "procedure": tomllib.load(file)}]}
+
+
+@router.post("/api/nameplates/validate")
+async def validate(plate: Annotated[dict[str, Any], Body()], _who: Viewer) -> dict[str, Any]:
+    """Per field: ok, or what is wrong and the remedy; then what the whole plate implies."""
+    return judge_plate(plate)
+
+
+@router.post("/api/simulator", status_code=201)
+async def simulator(request: Request, wish: SimulatorWish, who: Operator) -> dict[str, Any]:
+    """Start the packaged simulator, or change what it is."""
+    return await start_simulator(request, wish.scenario, who)
+
+
+async def start_simulator(request: Request, scenario: str, who: Visitor) -> dict[str, Any]:
+    """The simulator's drive. Refusal where a run has it."""
+    parts = parts_of(request)
+    if scenario not in SCENARIOS:
+        raise Refusal(
+            422,
+            "there is no such scenario",
+            step="simulator",
+            value=scenario[:40],
+            limit=", ".join(SCENARIOS),
+            remedy="choose one of these",
+        )
+    if parts.desk.live_on(SIMULATOR) or parts.desk.is_starting(SIMULATOR):
+        raise Refusal(
+            409,
+            "the simulator is in use",
+            step="simulator",
+            value="a run goes on",
+            limit="no run",
+            remedy="wait for its end, or stop it",
+        )
+    is_new = not parts.simulator.is_running or parts.simulator.scenario != scenario
+    await parts.simulator.start(scenario)
+    if is_new:
+        parts.audit.write(who.person, who.address, "started the simulator", scenario=scenario)
+    return asdict(parts.library.drive(SIMULATOR))
+
+
+def _drive(library: Any, identifier: str) -> Any:
+    from commissioner.errors import UsageError
+
+    try:
+        return library.drive(identifier)
+    except UsageError as error:
+        raise Refusal(
+            404, error.what, step=error.step, value=error.value, limit=error.limit, remedy=error.remedy
+        ) from None

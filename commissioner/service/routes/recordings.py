@@ -1,0 +1,72 @@
+"""Recordings: uploaded, identified, diagnosed or monitored. Touches no drive."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, File, Form, Request, UploadFile
+from fastapi.responses import FileResponse, Response
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.gate import REPORT_CSP
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.recordings import Job
+
+router = APIRouter()
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+PIECE = 1 << 20
+
+
+@router.post("/api/recordings", status_code=201)
+async def upload(
+    request: Request,
+    _who: Operator,
+    files: Annotated[list[UploadFile], File(max_length=12)],
+    verb: Annotated[Literal["identify", "diagnose", "monitor"], Form()] = "identify",
+    motor: Annotated[str, Form(max_length=60)] = "",
+) -> dict[str, Any]:
+    """Keep the files and begin; GET the id for the result."""
+    job = await take(parts_of(request), files, verb, motor)
+    return job.as_dict()
+
+
+async def take(parts: Parts, files: list[UploadFile], verb: str, motor: str) -> Job:
+    """The job, begun; `motor`: an id of the library, or empty."""
+    plate = parts.library.motor(motor).source if motor else None
+    return await parts.recordings.take(verb, plate, _named(files))
+
+
+async def _named(files: list[UploadFile]) -> AsyncIterator[tuple[str, AsyncIterator[bytes]]]:
+    for file in files:
+        yield file.filename or "", _pieces(file)
+
+
+async def _pieces(file: UploadFile) -> AsyncIterator[bytes]:
+    while piece := await file.read(PIECE):
+        yield piece
+
+
+@router.get("/api/recordings/{recording}")
+async def one(request: Request, recording: str, _who: Viewer) -> dict[str, Any]:
+    """How far it is; the verb's own document once it is done."""
+    return parts_of(request).recordings.find(recording).as_dict()
+
+
+@router.get("/api/recordings/{recording}/report", response_class=Response)
+async def report(request: Request, recording: str, _who: Viewer) -> Response:
+    """The report with its pictures, as one HTML file."""
+    path = parts_of(request).recordings.find(recording).report
+    if path is None:
+        raise Refusal(
+            404,
+            "there is no report of this recording",
+            step="recordings",
+            value=recording[:60],
+            limit="a verb that is done and makes one",
+            remedy="wait, or look at the result",
+        )
+    return FileResponse(path, media_type="text/html", headers={"content-security-policy": REPORT_CSP})

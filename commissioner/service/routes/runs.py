@@ -1,0 +1,156 @@
+"""Runs: start, list, look at, take away."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from fastapi.responses import FileResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.gate import REPORT_CSP
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.archive import Entry
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.child import ask, refusal_from
+from commissioner.service.runs.control import Party
+from commissioner.service.runs.desk import LiveRun
+from commissioner.service.runs.live import live_document
+
+router = APIRouter()
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+
+
+class RunWish(BaseModel):
+    """A commissioning that somebody takes responsibility for: `confirm` must be true."""
+
+    model_config = ConfigDict(extra="forbid")
+    drive: Annotated[str, Field(max_length=60)]
+    motor: Annotated[str, Field(max_length=60)]
+    axes_deg: Annotated[list[Angle], Field(max_length=12)] = []
+    write_back: bool = False
+    confirm: Literal[True]
+
+
+@router.post("/api/runs", status_code=201)
+async def start(request: Request, wish: RunWish, who: Operator) -> dict[str, Any]:
+    """Energises the motor, after the run has made its checks. 409 names who has the drive."""
+    run = await start_run(parts_of(request), wish, who)
+    return {"id": run.id, "url": f"/runs/{run.id}"}
+
+
+async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
+    """The run, begun. The audit says so before anything moves."""
+    drive, motor = parts.library.drive(wish.drive), parts.library.motor(wish.motor)
+    if not drive.url:
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step="start a run",
+            value=drive.id,
+            limit="a drive with an address",
+            remedy="start the simulator first",
+        )
+    party = Party(who.session.id if who.session else "", who.person)
+    parts.audit.write(
+        who.person, who.address, "asked to energise", drive=drive.id, motor=motor.id, write_back=wish.write_back
+    )
+    run = await parts.desk.start(drive, motor, wish.axes_deg, write_back=wish.write_back, party=party)
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, "run begun", run=run.id)
+    return run
+
+
+@router.get("/api/runs")
+async def runs(
+    request: Request,
+    _who: Viewer,
+    motor: Annotated[str, Query(max_length=80)] = "",
+    drive: Annotated[str, Query(max_length=80)] = "",
+    outcome: Annotated[str, Query(max_length=40)] = "",
+    since: Annotated[str, Query(max_length=32, pattern=r"^[0-9TZ:.+\-]*$")] = "",
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+) -> dict[str, Any]:
+    """The archive, newest first."""
+    parts = parts_of(request)
+    found = await asyncio.to_thread(
+        lambda: parts.archive.entries(motor=motor, drive=drive, outcome=outcome, since=since, limit=limit)
+    )
+    return {"runs": [_row(entry) for entry in found]}
+
+
+@router.get("/api/runs/{run}")
+async def one(request: Request, run: str, _who: Viewer) -> dict[str, Any]:
+    """The result document; of a run that goes on, its state under `live`."""
+    parts = parts_of(request)
+    live = parts.desk.runs.get(run)
+    if live is not None and not live.is_over and not live.feed.state.is_over:
+        return {"run": run, "outcome": None, "live": live_document(live.feed.state, live.feed.current_now_a)}
+    return parts.archive.result(run)
+
+
+@router.get("/api/runs/{run}/report", response_class=Response)
+async def report(request: Request, run: str, _who: Viewer) -> Response:
+    """The report as one HTML file; made again where the run could not make it."""
+    parts = parts_of(request)
+    entry = parts.archive.find(run)
+    if not (entry.folder / "report.html").is_file():
+        arguments = ["runs", "report", entry.run, "--runs", str(parts.archive.root), "--json"]
+        code, document = await ask(arguments, parts.desk.log("report"))
+        if "report" not in document:
+            import json
+
+            raise refusal_from(code, json.dumps(document).encode(), parts.desk.log("report"))
+    return FileResponse(
+        parts.archive.file(run, "report.html"), media_type="text/html", headers={"content-security-policy": REPORT_CSP}
+    )
+
+
+@router.get("/api/runs/{run}/export/{format}", response_class=Response)
+async def export(
+    request: Request, run: str, format: Literal["csv", "json", "mat", "parquet"], _who: Viewer
+) -> Response:
+    """The samples as CSV, MATLAB 5 or Parquet, or the result as JSON."""
+    parts = parts_of(request)
+    entry = parts.archive.find(run)
+    if format == "json":
+        return FileResponse(parts.archive.file(run, "result.json"), filename=f"{run}.json")
+    target = await _exported(parts, entry, format)
+    return FileResponse(target, filename=f"{run}.{format}")
+
+
+async def _exported(parts: Parts, entry: Entry, ending: str) -> Path:
+    """The file, made by the command line's own export; kept beside the service's logs for the next time."""
+    target = parts.settings.data / "exports" / f"{entry.run}.{ending}"
+    if target.is_file():
+        return target
+    target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    arguments = ["runs", "export", entry.run, str(target), "--runs", str(parts.archive.root), "--json"]
+    code, document = await ask(arguments, parts.desk.log("export"))
+    if code != 0:
+        import json
+
+        raise refusal_from(code, json.dumps(document).encode(), parts.desk.log("export"))
+    return target
+
+
+def _row(entry: Entry) -> dict[str, Any]:
+    return {
+        "run": entry.run,
+        "utc": entry.utc,
+        "motor": entry.motor,
+        "nameplate": entry.motor_text,
+        "drive": entry.drive,
+        "person": entry.person,
+        "outcome": entry.outcome,
+        "standing": entry.standing,
+        "reason": entry.reason,
+        "energised_s": entry.energised_s,
+        "holds": entry.written,
+        "parameters": entry.parameters,
+    }

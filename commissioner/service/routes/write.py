@@ -1,0 +1,114 @@
+"""What a run learnt, written into its drive; what it found there, written back. The table is the question."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Request
+from pydantic import BaseModel, ConfigDict, Field
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.library import Drive
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.child import ask, refusal_from
+
+router = APIRouter()
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+Act = Literal["write-back", "restore"]
+DONE = {"write-back": "wrote", "restore": "restored"}
+
+
+class Agreement(BaseModel):
+    """`token` of the table that was shown."""
+
+    model_config = ConfigDict(extra="forbid")
+    token: Annotated[str, Field(min_length=1, max_length=64)]
+
+
+@router.get("/api/runs/{run}/write-back")
+async def write_back_table(request: Request, run: str, _who: Operator) -> dict[str, Any]:
+    """Register, now, will be, unit and convention in the drive, and the token of this table. Writes nothing."""
+    return await plan(parts_of(request), run, "write-back")
+
+
+@router.get("/api/runs/{run}/restore")
+async def restore_table(request: Request, run: str, _who: Operator) -> dict[str, Any]:
+    """The same for the set that the run found."""
+    return await plan(parts_of(request), run, "restore")
+
+
+@router.post("/api/runs/{run}/write-back")
+async def write_back(request: Request, run: str, agreement: Agreement, who: Operator) -> dict[str, Any]:
+    """Write the accepted values: only if the drive still holds what the table showed; read back, stored."""
+    return await act(parts_of(request), run, "write-back", agreement.token, who)
+
+
+@router.post("/api/runs/{run}/restore")
+async def restore(request: Request, run: str, agreement: Agreement, who: Operator) -> dict[str, Any]:
+    """Write the set that the run found."""
+    return await act(parts_of(request), run, "restore", agreement.token, who)
+
+
+async def plan(parts: Parts, run: str, what: Act) -> dict[str, Any]:
+    """The table, read from the drive afresh."""
+    entry = parts.archive.find(run)
+    drive = _drive_of(parts, run)
+    return await _with_drive(parts, drive, [what, entry.run, *_address(drive), "--plan", *_runs(parts), "--json"])
+
+
+async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> dict[str, Any]:
+    """Write what the table of `token` showed; the audit has it before and after."""
+    entry = parts.archive.find(run)
+    drive = _drive_of(parts, run)
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, f"asked to {what}", run=run, table=token)
+    arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
+    done = await _with_drive(parts, drive, arguments)
+    rows = (done.get("report") or done).get("written") or []
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, DONE[what], run=run, registers=len(rows))
+    return done
+
+
+async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -> dict[str, Any]:
+    if drive is not None and (parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id)):
+        raise Refusal(
+            409,
+            f"{drive.name} is in use by a run",
+            step=arguments[0],
+            value="a run goes on",
+            limit="no run on this drive",
+            remedy="wait for its end, or stop it",
+        )
+    watch = parts.desk.watch(drive) if drive is not None else None
+    log = parts.desk.log(arguments[0])
+    if watch is not None:
+        await asyncio.to_thread(watch.pause)
+    try:
+        code, document = await ask(arguments, log)
+    finally:
+        if watch is not None:
+            watch.resume()
+    if code != 0:
+        raise refusal_from(code, json.dumps(document).encode(), log)
+    return document
+
+
+def _drive_of(parts: Parts, run: str) -> Drive | None:
+    """The drive of this library that the run was made on; None for one that is not in it."""
+    asked = parts.archive.request(run)
+    name = (asked.get("origin") or {}).get("drive")
+    for drive in parts.library.drives():
+        if drive.url and (drive.id == name or drive.url == asked.get("url")):
+            return drive
+    return None
+
+
+def _address(drive: Drive | None) -> list[str]:
+    return ["--drive", drive.url] if drive is not None else []
+
+
+def _runs(parts: Parts) -> list[str]:
+    return ["--runs", str(parts.archive.root)]

@@ -1,0 +1,1 @@
+"""Runs as the service sees them: started as child processes, followed by their journals, stopped by a word."""

@@ -1,0 +1,155 @@
+"""A run as a child process: exactly what `commissioner run` is, held by a pipe that beats."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from commissioner.run.stopping.dead_man import BEAT_S
+from commissioner.service.problems import Refusal
+
+BEGIN_S = 60.0
+"""Until a run has its folder: imports on a slow disk included."""
+SENT_BACK = {2: 422, 3: 409, 4: 409, 5: 502}
+
+
+def program(*arguments: str) -> list[str]:
+    """The command line that runs this product."""
+    return [sys.executable, "-m", "commissioner", *arguments]
+
+
+class Child:
+    """One `commissioner run --dead-man`. Its end of the pipe going away, or falling silent, means zero volts."""
+
+    def __init__(self, process: asyncio.subprocess.Process, log: Path) -> None:
+        self._process, self._log = process, log
+        self._beating = asyncio.create_task(self._beat())
+        self.said: dict[str, Any] = {}
+
+    @classmethod
+    async def start(cls, arguments: Sequence[str], log: Path) -> Child:
+        """The process, in a session of its own: Ctrl-C at the service reaches it by the pipe alone."""
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("wb") as errors:
+            process = await asyncio.create_subprocess_exec(
+                *program(*arguments), stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=errors,
+                start_new_session=True, limit=2**24,
+            )  # fmt: skip
+        return cls(process, log)
+
+    async def begin(self, origin: Mapping[str, Any]) -> Path:
+        """Let the run begin; its folder. Refusal, as the run itself says it, where it did not come to that."""
+        self._say("begin", origin)
+        assert self._process.stdout is not None
+        try:
+            line = await asyncio.wait_for(self._process.stdout.readline(), BEGIN_S)
+        except TimeoutError:
+            self.kill()
+            raise Refusal(503, "the run did not begin", step="start a run", value=f"nothing within {BEGIN_S:g} s",
+                          limit="a run folder", remedy="look at the computer's load and disk, then try again") from None  # fmt: skip
+        with contextlib.suppress(ValueError):
+            said = json.loads(line)
+            if isinstance(said, dict) and "folder" in said:
+                return Path(said["folder"])
+        rest = line + await self._process.stdout.read()
+        raise await self._failure(rest)
+
+    def stop(self, person: str, reason: str) -> None:
+        """The operator's word."""
+        self._say("stop", {"person": person, "reason": reason})
+
+    async def wait(self) -> int:
+        """The exit code; what the run said at its end is in `said`."""
+        assert self._process.stdout is not None
+        text = await self._process.stdout.read()
+        code = await self._process.wait()
+        self._beating.cancel()
+        with contextlib.suppress(ValueError):
+            said = json.loads(text)
+            self.said = said if isinstance(said, dict) else {}
+        return code
+
+    @property
+    def is_alive(self) -> bool:
+        return self._process.returncode is None
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def kill(self) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+
+    def let_go(self) -> None:
+        """Close the pipe: the run ends by itself, at zero volts first."""
+        self._beating.cancel()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    async def _beat(self) -> None:
+        while self.is_alive:
+            self._write(b"beat\n")
+            await asyncio.sleep(BEAT_S)
+
+    def _say(self, word: str, facts: Mapping[str, Any]) -> None:
+        self._write(f"{word} {json.dumps(dict(facts))}\n".encode())
+
+    def _write(self, line: bytes) -> None:
+        if self._process.stdin is not None and not self._process.stdin.is_closing():
+            with contextlib.suppress(OSError, RuntimeError):
+                self._process.stdin.write(line)
+
+    async def _failure(self, text: bytes) -> Refusal:
+        code = await self._process.wait()
+        self._beating.cancel()
+        return refusal_from(code, text, self._log)
+
+
+async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, dict[str, Any]]:
+    """A verb with --json as a process: exit code and document. Refusal where it answered none."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("wb") as errors:
+        process = await asyncio.create_subprocess_exec(
+            *program(*arguments), stdin=subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=errors,
+            start_new_session=True, limit=2**24,
+        )  # fmt: skip
+    try:
+        text, _ = await asyncio.wait_for(process.communicate(), timeout_s)
+    except BaseException as broken:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+        if not isinstance(broken, TimeoutError | asyncio.TimeoutError):
+            raise
+        raise Refusal(503, f"`commissioner {arguments[0]}` took too long", step=arguments[0], value=f"{timeout_s:g} s",
+                      limit="an answer", remedy="try again") from broken  # fmt: skip
+    code = process.returncode or 0
+    try:
+        document = json.loads(text)
+    except ValueError:
+        raise refusal_from(code, text, log) from None
+    return code, document if isinstance(document, dict) else {}
+
+
+def refusal_from(code: int, text: bytes, log: Path) -> Refusal:
+    """What a verb says under `error`, as a refusal."""
+    document: dict[str, Any] = {}
+    with contextlib.suppress(ValueError):
+        read = json.loads(text)
+        document = read if isinstance(read, dict) else {}
+    error = document.get("error") or {}
+    if not error:
+        said = log.read_text("utf-8", "replace").strip().splitlines() if log.is_file() else []
+        error = {"what": "the process ended without a word", "step": "run", "value": (said or ["nothing"])[-1][:200],
+                 "limit": "a result", "remedy": f"see {log}"}  # fmt: skip
+    return Refusal(
+        SENT_BACK.get(code, 503), str(error.get("what", "")), detail=str(error.get("what", "")), step=str(error.get("step") or ""),
+        value=error.get("value"), limit=error.get("limit"), remedy=str(error.get("remedy") or ""),
+    )  # fmt: skip

@@ -1,0 +1,305 @@
+"""All runs of this computer: started, followed, stopped; one at a time for each drive."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import datetime as dt
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from commissioner.run.archive.folder import read_document
+from commissioner.run.stopping.dead_man import SERVICE
+from commissioner.run.stopping.stop_file import ask_to_stop
+from commissioner.service.audit import Audit
+from commissioner.service.configuration import Settings
+from commissioner.service.library import Drive, Library, Motor
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.child import Child
+from commissioner.service.runs.control import Control, Pages, Party
+from commissioner.service.runs.feed import Feed
+from commissioner.service.runs.watch import DriveWatch
+
+POLL_S, SUMMARY_S = 0.04, 0.095
+CONFIRM_S = 3.0
+"""A stop waits so long for the drive's word before it says that there was none."""
+FRESH_S, STALE_S = 5.0, 10.0
+"""A run that somebody else started is taken as live while its journal is so young."""
+KEPT = 40
+"""Feeds of ended runs that stay in memory."""
+
+
+@dataclass
+class LiveRun:
+    """A run that goes on, or did lately. `child` None: started elsewhere on this computer."""
+
+    id: str
+    drive: str
+    motor: str
+    feed: Feed
+    party: Party | None
+    child: Child | None = None
+    exit_code: int | None = None
+    stop_asked_by: str = ""
+    has_freed_drive: bool = False
+    is_over: bool = False
+    follower: asyncio.Task[None] | None = None
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Its process is gone, and it has no end."""
+        return self.is_over and self.feed.state.end is None
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """What became of a STOP. `after_s`: from the asking to the journalled word of the drive; 0 where it was off before."""
+
+    run: str
+    asked_utc: str
+    zero_volts: bool
+    confirmed_utc: str
+    after_s: float
+    state: str
+
+
+@dataclass
+class _Pending:
+    party: Party
+    child: Child
+
+
+@dataclass
+class Desk:
+    """The one place that starts and stops runs."""
+
+    settings: Settings
+    library: Library
+    audit: Audit
+    pages: Pages = field(default_factory=Pages)
+    runs: dict[str, LiveRun] = field(default_factory=dict)
+    _pending: dict[str, _Pending] = field(default_factory=dict)
+    _controls: dict[str, Control] = field(default_factory=dict)
+    _watches: dict[str, DriveWatch] = field(default_factory=dict)
+    is_closing: bool = False
+
+    # --- looking ------------------------------------------------------------------------------------------------
+    def live(self) -> list[LiveRun]:
+        return [run for run in self.runs.values() if not run.is_over]
+
+    def live_on(self, drive: str) -> LiveRun | None:
+        """The run that holds this drive."""
+        return next((run for run in self.live() if run.drive == drive and not run.has_freed_drive), None)
+
+    def is_starting(self, drive: str) -> bool:
+        return drive in self._pending
+
+    def control(self, drive: str) -> Control:
+        return self._controls.setdefault(drive, Control(self.pages, self.settings.file.service.hand_over_s))
+
+    def watch(self, drive: Drive) -> DriveWatch:
+        """Of a drive with this address; a new one where the address has changed."""
+        key = f"{drive.id} {drive.url}"
+        for old in [k for k in self._watches if k.startswith(f"{drive.id} ") and k != key]:
+            self._watches.pop(old).close()
+        return self._watches.setdefault(key, DriveWatch(drive.url, drive.profile))
+
+    # --- starting -----------------------------------------------------------------------------------------------
+    async def start(
+        self, drive: Drive, motor: Motor, axes_deg: Sequence[float], *, write_back: bool, party: Party
+    ) -> LiveRun:
+        """A run as a child process. Refusal 409: somebody has the drive."""
+        self._check_free(drive)
+        self.control(drive.id).take(party)
+        watch = self.watch(drive)
+        child = await Child.start(self._arguments(drive, motor, axes_deg, write_back), self._log("run", drive.id))
+        self._pending[drive.id] = _Pending(party, child)
+        try:
+            await asyncio.to_thread(watch.pause)
+            origin = {"person": party.person, "by": "service", "drive": drive.id, "motor": motor.id}
+            folder = await child.begin(origin)
+        except BaseException:
+            child.kill()
+            watch.resume()
+            raise
+        finally:
+            self._pending.pop(drive.id, None)
+        run = LiveRun(folder.name, drive.id, motor.id, Feed(folder), party, child)
+        self._add(run)
+        return run
+
+    def _check_free(self, drive: Drive) -> None:
+        holder = self.live_on(drive.id)
+        if holder is not None or drive.id in self._pending:
+            person = holder.party.person if holder and holder.party else "a run from the command line"
+            raise Refusal(409, f"{drive.name} is in use: {person}", step="start a run", value=holder.id if holder else "starting",
+                          limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
+
+    def _arguments(self, drive: Drive, motor: Motor, axes_deg: Sequence[float], write_back: bool) -> list[str]:
+        axes = ["--axes", ",".join(f"{axis:g}" for axis in axes_deg)] if axes_deg else []
+        more = ["--write-back"] if write_back else []
+        more += [] if self.settings.file.service.diagnosis else ["--no-diagnosis"]
+        return [
+            "run", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, *axes, *more, "--runs",
+            str(self.settings.runs), "--dead-man", "--json",
+        ]  # fmt: skip
+
+    def _log(self, *names: str) -> Path:
+        return self.settings.data / "logs" / ("-".join(names) + ".txt")
+
+    def log(self, *names: str) -> Path:
+        """Where a child's words of distress go."""
+        return self._log(*names)
+
+    def _add(self, run: LiveRun) -> None:
+        self.runs[run.id] = run
+        run.follower = asyncio.create_task(self._follow(run))
+        over = [one.id for one in self.runs.values() if one.is_over]
+        for old in over[: max(0, len(over) - KEPT)]:
+            del self.runs[old]
+
+    # --- following ----------------------------------------------------------------------------------------------
+    async def _follow(self, run: LiveRun) -> None:
+        waiting = asyncio.create_task(run.child.wait()) if run.child else None
+        told_s = 0.0
+        while not self._has_gone(run, waiting):
+            run.feed.poll()
+            if time.monotonic() - told_s > SUMMARY_S:
+                told_s = time.monotonic()
+                run.feed.summarise()
+            self._watch_over(run)
+            await asyncio.sleep(POLL_S)
+        while run.feed.poll():
+            pass
+        run.exit_code = waiting.result() if waiting else None
+        run.is_over = True
+        self._free_drive(run)
+        self._write_end(run)
+        run.feed.close()
+
+    def _has_gone(self, run: LiveRun, waiting: asyncio.Task[int] | None) -> bool:
+        if waiting is not None:
+            return waiting.done()
+        quiet_s = time.monotonic() - run.feed.heard_s
+        return quiet_s > (1.0 if run.feed.state.is_over else STALE_S)
+
+    def _watch_over(self, run: LiveRun) -> None:
+        state = run.feed.state
+        if state.is_over and (state.link is not None or state.phase == "diagnosing"):
+            self._free_drive(run)
+        party = run.party
+        if party is None or not party.session or state.is_over or run.child is None:
+            return
+        holder = self.control(run.drive).holder or party
+        lost_s = self.pages.lost_for_s(holder.session)
+        if lost_s > self.settings.file.service.page_lost_s:
+            run.stop_asked_by = run.stop_asked_by or SERVICE
+            run.child.stop(SERVICE, f"the operator's page was lost for {lost_s:.0f} s")
+
+    def _free_drive(self, run: LiveRun) -> None:
+        if run.has_freed_drive:
+            return
+        run.has_freed_drive = True
+        with contextlib.suppress(Exception):
+            self.watch(self.library.drive(run.drive)).resume()
+
+    def _write_end(self, run: LiveRun) -> None:
+        end = run.feed.state.end
+        outcome = end["outcome"] if end else "cut off"
+        with contextlib.suppress(OSError):
+            self.audit.write(SERVICE, "", f"run ended: {outcome}", run=run.id)
+
+    # --- stopping -----------------------------------------------------------------------------------------------
+    async def stop(self, run: LiveRun, person: str, reason: str) -> Stopped:
+        """Ask for zero volts and wait for the drive's word. Never refused; twice is harmless."""
+        asked_s, asked = time.monotonic(), dt.datetime.now(dt.UTC)
+        if not run.is_over:
+            run.stop_asked_by = run.stop_asked_by or person or SERVICE
+            if run.child is not None:
+                run.child.stop(person, reason)
+            else:
+                await asyncio.to_thread(ask_to_stop, run.feed.folder, person, reason)
+        state = run.feed.state
+        while not _is_off(run) and time.monotonic() - asked_s < CONFIRM_S:
+            run.feed.poll()
+            await asyncio.sleep(0.005)
+        is_off = _is_off(run)
+        confirmed = state.output_utc if is_off else ""
+        after_s = (dt.datetime.fromisoformat(confirmed) - asked).total_seconds() if confirmed else 0.0
+        return Stopped(run.id, asked.isoformat(), is_off, confirmed, round(max(0.0, after_s), 4), state.output_word)
+
+    async def stop_all(self, person: str, reason: str, drive: str | None = None) -> list[Stopped]:
+        """Every run of this service, or of one drive; those that are only starting never begin."""
+        for name, pending in list(self._pending.items()):
+            if drive in (None, name):
+                pending.child.stop(person, reason)
+        runs = [run for run in self.live() if drive in (None, run.drive)]
+        return list(await asyncio.gather(*(self.stop(run, person, reason) for run in runs)))
+
+    # --- runs of others, start and end --------------------------------------------------------------------------
+    async def look_around(self) -> None:
+        """Take up runs that somebody started from the command line, until the service closes."""
+        while not self.is_closing:
+            for folder in await asyncio.to_thread(_young, self.settings.runs):
+                if folder.name not in self.runs and not self._is_beginning(folder):
+                    self._take_up(folder)
+            await asyncio.sleep(1.0)
+
+    def _is_beginning(self, folder: Path) -> bool:
+        """Of our own: its child says so itself."""
+        return bool(self._pending) and bool(_origin(folder))
+
+    def _take_up(self, folder: Path) -> None:
+        request = (
+            read_document((folder / "request.json").read_text("utf-8")) if (folder / "request.json").is_file() else {}
+        )
+        feed = Feed(folder)
+        feed.poll()
+        if feed.state.is_over:
+            return
+        drive = next((d.id for d in self.library.drives() if d.url and d.url == request.get("url")), "")
+        run = LiveRun(folder.name, drive, str((request.get("origin") or {}).get("motor", "")), feed, None)
+        if drive:
+            watch = self.watch(self.library.drive(drive))
+            watch.pause(0.0)
+        self._add(run)
+
+    async def close(self) -> None:
+        """Zero volts everywhere, then the end of every child."""
+        self.is_closing = True
+        await self.stop_all(SERVICE, "the service is being shut down")
+        for run in list(self.runs.values()):
+            if run.child is not None and not run.is_over:
+                run.child.let_go()
+        followers = [run.follower for run in self.runs.values() if run.follower and run.child and not run.is_over]
+        if followers:
+            await asyncio.wait(followers, timeout=10.0)
+        for watch in self._watches.values():
+            watch.close()
+
+
+def _is_off(run: LiveRun) -> bool:
+    state = run.feed.state
+    return state.output == "off" and state.is_confirmed
+
+
+def _young(runs: Path) -> list[Path]:
+    """Folders whose journal somebody has written to just now."""
+    if not runs.is_dir():
+        return []
+    now, found = time.time(), []
+    for folder in sorted(runs.iterdir(), reverse=True)[:20]:
+        with contextlib.suppress(OSError):
+            if now - (folder / "journal.jsonl").stat().st_mtime < FRESH_S:
+                found.append(folder)
+    return found
+
+
+def _origin(folder: Path) -> dict[str, Any]:
+    with contextlib.suppress(OSError):
+        origin = read_document((folder / "request.json").read_text("utf-8")).get("origin")
+        return origin if isinstance(origin, dict) else {}
+    return {}

@@ -1,0 +1,123 @@
+"""One run, followed: its journal and blocks are read once, folded, and sent to everybody who watches."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.run.archive.follow import BlocksFollower, JournalFollower
+from commissioner.service.runs.live import live_document
+from commissioner.service.runs.samples import Envelope
+from commissioner.service.runs.state import RunState
+
+BACKLOG = 2000
+"""Messages that one watcher may be behind (some 100 s); then it is let go and can resume from where it was."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """`number`: of the journal's record, None for samples. `text`: its JSON, encoded once for all watchers."""
+
+    event: str
+    number: int | None
+    text: str
+
+
+class Watcher:
+    """One subscription: a page gets summaries, a script the records. `is_lost`: it was too slow and was let go."""
+
+    def __init__(self, is_page: bool) -> None:
+        self.is_page = is_page
+        self.queue: asyncio.Queue[Message | None] = asyncio.Queue(BACKLOG)
+        self.is_lost = False
+
+    def send(self, message: Message | None) -> None:
+        if self.is_lost:
+            return
+        try:
+            self.queue.put_nowait(message)
+        except asyncio.QueueFull:
+            self.is_lost = True
+
+
+class Feed:
+    """Follows the folder of one run. `poll` is called many times a second while the run lives."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.state = RunState(folder.name)
+        self._journal = JournalFollower(folder / "journal.jsonl")
+        self._blocks = BlocksFollower(folder / "blocks.bin")
+        self._envelope = Envelope()
+        self._watchers: set[Watcher] = set()
+        self.is_closed = self.is_news = False
+        self.current_now_a = 0.0
+        self.heard_s = time.monotonic()
+
+    @property
+    def watchers(self) -> int:
+        return len(self._watchers)
+
+    @property
+    def blocks(self) -> int:
+        """Whole blocks read so far."""
+        return self._envelope.blocks
+
+    def poll(self) -> bool:
+        """Read what is new; whether there was anything."""
+        blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
+        before = self._envelope.energised_s
+        events = self._envelope.of(blocks)
+        if events:
+            self.state.energised(self._envelope.energised_s - before)
+            self.state.current_high_a = max(
+                self.state.current_high_a, *(max(abs(x) for x in (*e["low_a"], *e["high_a"])) for e in events)
+            )
+            self.current_now_a = max(max(abs(x) for x in (*e["low_a"], *e["high_a"])) for e in events)
+        for event in events:
+            self._publish(Message("samples", None, json.dumps(event, separators=(",", ":"))))
+        lines = self._journal.new()
+        for line in lines:
+            self.state.take(line)
+            self._publish(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
+        if lines or blocks:
+            self.heard_s = time.monotonic()
+            self.is_news = True
+        return bool(lines or blocks)
+
+    def summarise(self) -> None:
+        """To the pages: what there is to show now. Called ten times a second; silent where nothing is new."""
+        if self.is_news and any(watcher.is_page for watcher in self._watchers):
+            self.is_news = False
+            document = live_document(self.state, self.current_now_a)
+            self._publish(Message("live", None, json.dumps(document, separators=(",", ":"))))
+
+    @contextmanager
+    def watch(self, after: int = -1, *, is_page: bool = False) -> Iterator[Watcher]:
+        """A subscription that begins with the records after number `after`, without a gap to what follows."""
+        watcher = Watcher(is_page)
+        for line in [] if is_page else JournalFollower(self.folder / "journal.jsonl").new():
+            if after < line["n"] < self.state.records:
+                watcher.send(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
+        if self.is_closed:
+            watcher.send(None)
+        self._watchers.add(watcher)
+        try:
+            yield watcher
+        finally:
+            self._watchers.discard(watcher)
+
+    def close(self) -> None:
+        """Nothing more will come."""
+        self.is_closed = True
+        self._publish(None)
+
+    def _publish(self, message: Message | None) -> None:
+        for watcher in self._watchers:
+            if message is None or message.event == "samples" or watcher.is_page == (message.event == "live"):
+                watcher.send(message)

@@ -1,0 +1,53 @@
+"""What a page shows of a run that goes on: one small document, the same for all who look."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from commissioner.service.runs.state import AxisTest, RunState
+
+
+def live_document(state: RunState, current_now_a: float) -> dict[str, Any]:
+    """The newest numbers. `estimate`: time, four values, four standard errors of the running test, SI."""
+    k = state.current
+    return {
+        "run": state.run,
+        "phase": state.phase,
+        "output": state.output,
+        "part": state.part,
+        "test": None if k is None else k + 1,
+        "tests": [_test(test) for test in state.tests],
+        "planned_s": state.planned_test_s,
+        "left_s": round(state.left_s, 2),
+        "current": {
+            "now_a": round(current_now_a if state.output == "on" else 0.0, 3),
+            "high_a": round(state.current_high_a, 3),
+            "limit_a": state.current_limit_a,
+        },
+        "flux": {
+            "now_wb": _rounded(state.flux_now_wb if state.output == "on" else 0.0),
+            "high_wb": _rounded(state.flux_high_wb),
+            "limit_wb": _rounded(state.flux_limit_wb),
+        },
+        "estimate": state.history[-1] if state.history else None,
+        "utc": state.utc,
+    }
+
+
+def history_document(state: RunState) -> list[list[float]]:
+    """Every estimate of the running test so far."""
+    return state.history
+
+
+def _test(test: AxisTest) -> dict[str, Any]:
+    return {
+        "axis_deg": test.axis_deg,
+        "state": test.state,
+        "energised_s": round(test.energised_s, 2),
+        "parameters": test.parameters,
+        "std": test.std,
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 5)

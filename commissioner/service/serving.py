@@ -1,0 +1,67 @@
+"""The process that serves: the socket first, so that its port is known, then uvicorn until a signal."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+
+import uvicorn
+
+from commissioner.errors import UsageError
+from commissioner.service.application import create_app
+from commissioner.service.configuration import Settings, bracketed, check_may_listen
+from commissioner.service.parts import make_parts
+
+
+def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> None:
+    """Serve; `ready` is told the address once requests are answered. UsageError: it may not, or cannot, listen there."""
+    parts = make_parts(settings)
+    check_may_listen(settings, bool(parts.accounts.all()))
+    listening = _listen(settings.host, settings.port)
+    port = listening.getsockname()[1]
+    url = f"{settings.scheme}://{bracketed(settings.host)}:{port}"
+    app = create_app(parts, url=url, ready=lambda: ready(url))
+    tls = settings.file.tls
+    config = uvicorn.Config(
+        app,
+        ws="websockets-sansio",
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        date_header=True,
+        ssl_certfile=tls.certificate if tls else None,
+        ssl_keyfile=tls.key if tls else None,
+        ws_ping_interval=1.0,
+        ws_ping_timeout=2.0,
+        ws_max_size=65536,
+        timeout_graceful_shutdown=8,
+        timeout_keep_alive=20,
+    )
+    _Server(config, parts.closing.set).run(sockets=[listening])
+
+
+class _Server(uvicorn.Server):
+    """Tells the streams that it is closing before it waits for them."""
+
+    def __init__(self, config: uvicorn.Config, closing: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._closing = closing
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._closing()
+        await super().shutdown(sockets)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        listening = socket.create_server((host.strip("[]"), port), family=family, backlog=256)
+    except OSError as failure:
+        raise UsageError(
+            f"nothing can listen on {host}:{port}: {failure.strerror or failure}",
+            step="serve",
+            value=f"{host}:{port}",
+            limit="a free port of this computer",
+            remedy="give another --port; 0 picks a free one",
+        ) from failure
+    return listening

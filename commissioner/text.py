@@ -1,0 +1,29 @@
+"""Text from outside (a drive, a file, a folder's name, an argument) is data: it is shown, and steers nothing.
+
+The one function of the boundary. Terminal, page and log add what their own markup needs (`screen.text`, the templates'
+autoescape, JSON); what no medium may get is spelled out here.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+
+LONGEST = 300
+"""Characters of one text on a terminal or page; what is longer is told by its length."""
+_NEVER = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
+"""Unicode categories that are spelled out: control (C0, DEL, C1), format (direction marks, zero width), surrogates, private
+use, unassigned, line and paragraph separators."""
+
+
+def shown(value: object, longest: int = LONGEST) -> str:
+    """`str(value)` in one line of at most about `longest` characters, each of which only shows: ESC is `\\x1b`."""
+    text = str(value)
+    cut = text[:longest]
+    kept = cut if cut.isprintable() and cut.isascii() else "".join(map(_visible, cut))
+    return kept if len(text) <= longest else f"{kept}... ({len(text)} characters)"
+
+
+def _visible(character: str) -> str:
+    if unicodedata.category(character) not in _NEVER:
+        return character
+    return character.encode("unicode_escape").decode("ascii")

@@ -1,0 +1,29 @@
+"""Every seeded defect is caught, by the rule that is about it."""
+
+import pytest
+
+from commissioner.conformance.kit import run_conformance
+from commissioner.conformance.records import Outcome
+from commissioner.conformance.rules import RULES
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url
+from tests.conformance.defects import DEFECTS
+from tests.support.reference_firmware import FirmwareProcess, build_with, needs_libmodbus
+
+pytestmark = needs_libmodbus
+
+
+@pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.name.replace(" ", "-"))
+def test_a_seeded_defect_is_caught_by_the_rule_that_names_it(defect, tmp_path):
+    with FirmwareProcess(build_with(defect.file, defect.changes, tmp_path)) as drive:
+        done = run_conformance(parse_url(drive.url), load_profile("simulated"), energise=True, only=[defect.rule])
+    result = next(result for result in done.results if result.name == defect.rule)
+    assert result.outcome is Outcome.FAIL, result
+    assert result.reason
+    assert result.evidence
+
+
+def test_at_least_forty_defects_are_told_apart_and_every_rule_that_can_fail_is_made_to():
+    assert len({defect.name for defect in DEFECTS}) == len(DEFECTS) >= 40
+    caught = {defect.rule for defect in DEFECTS}
+    assert caught <= {rule.name for rule in RULES}

@@ -1,0 +1,142 @@
+"""`commissioner serve` as a process of its own, with its archive in a folder that goes away.
+
+with ServiceProcess(tmp_path, speed="max") as service:
+    service.client.get("/api/health")
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import httpx
+
+START_S = 30.0
+
+
+class ServiceProcess:
+    """`url` is where it serves. Ended at the end, with all that it started."""
+
+    def __init__(self, folder: Path, *, speed: str = "max", more: str = "", port: int = 0, settings: str = "") -> None:
+        self.folder, self.runs = folder, folder / "runs"
+        self.config = folder / "service.toml"
+        folder.mkdir(parents=True, exist_ok=True)
+        self.config.write_text(
+            f'[service]\ndiagnosis = false\n{settings}\n[simulator]\nspeed = "{speed}"\n{more}', encoding="utf-8"
+        )
+        self._port = port
+
+    def __enter__(self) -> ServiceProcess:
+        began = time.monotonic()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "commissioner", "serve", "--port", str(self._port), "--config", str(self.config),
+             "--runs", str(self.runs), "--json"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, start_new_session=True,
+        )  # fmt: skip
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if not line.startswith('{"url"'):
+            raise AssertionError(f"the service did not start: {line}{self.process.communicate()[1]}")
+        self.ready_s = time.monotonic() - began
+        self.url: str = json.loads(line)["url"]
+        self.port = int(self.url.rsplit(":", 1)[1])
+        self.client = httpx.Client(base_url=self.url, timeout=90.0)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.client.close()
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            self.process.communicate(timeout=20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+        for pid in self._simulators():
+            os.kill(pid, signal.SIGKILL)
+
+    def start_simulator(self, scenario: str = "default") -> None:
+        answer = self.client.post("/api/simulator", json={"scenario": scenario})
+        assert answer.status_code == 201, answer.text
+
+    def start_run(self, **more: Any) -> str:
+        """A run on the simulator; its id."""
+        wish = {"drive": "simulator", "motor": "motor_2kw2", "axes_deg": [0], "confirm": True} | more
+        answer = self.client.post("/api/runs", json=wish)
+        assert answer.status_code == 201, answer.text
+        return str(answer.json()["id"])
+
+    def wait_for(self, run: str, reached: Any, timeout_s: float = 60.0) -> dict[str, Any]:
+        """The run's document as soon as `reached` says so of it."""
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            document = self.client.get(f"/api/runs/{run}").json()
+            if reached(document):
+                return document
+            time.sleep(0.02)
+        raise AssertionError(f"not reached within {timeout_s} s: {document}")
+
+    def wait_energised(self, run: str) -> None:
+        self.wait_for(run, lambda document: (document.get("live") or {}).get("output") == "on")
+
+    def wait_over(self, run: str, timeout_s: float = 90.0) -> dict[str, Any]:
+        """The result, once its process has gone."""
+        self.wait_for(run, lambda document: document.get("outcome") is not None, timeout_s)
+        end = time.monotonic() + timeout_s
+        while run in self.client.get("/api/health").json()["runs_live"] and time.monotonic() < end:
+            time.sleep(0.05)
+        return dict(self.client.get(f"/api/runs/{run}").json())
+
+    def truth(self) -> list[dict[str, Any]]:
+        """What was really true at the simulated drive so far."""
+        path = self.runs / ".service" / "logs" / "simulator.jsonl"
+        lines = path.read_text("utf-8").splitlines() if path.is_file() else []
+        return [json.loads(line) for line in lines if line.endswith("}")]
+
+    def is_energised(self) -> bool:
+        """By the simulator's own log."""
+        events = [line["event"] for line in self.truth() if line["event"] in ("energised", "de_energised")]
+        return bool(events) and events[-1] == "energised"
+
+    def wait_dead(self, since_wall: float, timeout_s: float = 5.0) -> float:
+        """Seconds from `since_wall` to zero volts by the simulator's log; zero where it was dead before."""
+        end = time.monotonic() + timeout_s
+        while self.is_energised() and time.monotonic() < end:
+            time.sleep(0.01)
+        assert not self.is_energised(), "still energised"
+        last = [line for line in self.truth() if line["event"] == "de_energised"][-1]
+        return max(0.0, float(last["wall"]) - since_wall)
+
+    def run_process(self) -> int:
+        """The process id of the run that this service has started."""
+        return self._children("--dead-man")[0]
+
+    def kill(self) -> None:
+        """SIGKILL to the service alone."""
+        self.process.kill()
+        self.process.wait()
+
+    def _children(self, word: str) -> list[int]:
+        """Processes whose command line names this archive and `word`."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                try:
+                    command = (entry / "cmdline").read_bytes().decode("utf-8", "replace")
+                except OSError:
+                    continue
+                if word in command and str(self.folder) in command:
+                    found.append(int(entry.name))
+        return found
+
+    def _simulators(self) -> list[int]:
+        return self._children("sim")
