@@ -7,6 +7,8 @@
     |-- CheckFailed                   3   a pre-energise check says no; nothing was energised
     |-- Aborted                       4   a guard or the operator stopped the run
     `-- DriveError                    5   the drive or the link failed
+        |-- DriveInUse                    another run, person or computer holds the drive; nothing was sent to it
+        |-- ForeignMaster                 somebody else wrote to the drive while it was ours
         |-- DriveFault                    the drive tripped, or does not do what it acknowledged
         |-- IdentityMismatch              not the drive, firmware or values that were expected
         |-- WriteBackFailed               read-back differs; says whether the snapshot was restored
@@ -94,6 +96,14 @@ class Aborted(CommissionerError):
 class DriveError(CommissionerError):
     exit_code = 5
     outcome = "faulted"
+
+
+class DriveInUse(DriveError):
+    pass
+
+
+class ForeignMaster(DriveError):
+    pass
 
 
 class DriveFault(DriveError):

@@ -49,6 +49,14 @@ class SampleBlock:
 
 
 @dataclass(frozen=True)
+class ReadingNote:
+    """What a reader changed in a recording, or left unused; `code` for programs, `what` for people."""
+
+    code: str
+    what: str
+
+
+@dataclass(frozen=True)
 class StandstillRecording:
     """A standstill recording in the contract's format. Missing samples are missing rows: `time_s` jumps.
 
@@ -67,6 +75,7 @@ class StandstillRecording:
     sample_period_s: float
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
+    notes: tuple[ReadingNote, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +90,7 @@ class RunningRecording:
     sample_period_s: float
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
+    notes: tuple[ReadingNote, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -121,6 +131,8 @@ class DriveStatus:
     test_time_left_s: float = 0.0
     samples_produced: int = 0
     overruns: int = 0
+    settings_count: int | None = None
+    """Changes of a setting since power-up, whoever made them; None where the drive does not count them."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import typer
 from commissioner.cli.console import degrade_output
 from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.recordings import Map, recordings_app
 
 app = typer.Typer(
     name="commissioner",
@@ -23,6 +24,7 @@ app = typer.Typer(
 runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
+app.add_typer(recordings_app, name="recordings")
 accounts_app = typer.Typer(no_args_is_help=True, help="The service's accounts: add, list, remove.")
 app.add_typer(accounts_app, name="accounts")
 
@@ -95,8 +97,9 @@ def check(
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
     from commissioner.cli.verbs.check import check as verb
+    from commissioner.operations.check import CheckRequest
 
-    verb(drive=drive, profile=profile, motor=motor, procedure=procedure, as_json=json)
+    verb(CheckRequest(drive, profile, motor, procedure), as_json=json)
 
 
 @app.command()
@@ -121,22 +124,14 @@ def run(
     json: Json = False,
 ) -> None:
     """Commission a drive. Asks before it energises; writes only with --write-back."""
+    from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.run import run as verb
+    from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
 
-    verb(
-        drive=drive,
-        profile=profile,
-        motor=motor,
-        axes=axes,
-        write_back=write_back,
-        yes=yes,
-        procedure=procedure,
-        runs=runs,
-        as_json=json,
-        diagnosis=diagnosis,
-        seal=seal,
-        dead_man=dead_man,
+    request = CommissionRequest(
+        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal
     )
+    verb(request, yes=yes, as_json=json, dead_man=dead_man)
 
 
 @app.command()
@@ -154,19 +149,19 @@ def identify(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
     procedure: Procedure = None,
     runs: Runs = RUNS,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
     from commissioner.cli.verbs.identify import identify as verb
     from commissioner.cli.verbs.identify import identify_and_write
+    from commissioner.operations.identify import IdentifyRequest
 
-    if not write_back:
-        verb(files, motor=motor, estimator=estimator, as_json=json)
-        return
-    identify_and_write(
-        files, motor=motor, estimator=estimator, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs,
-        as_json=json,
-    )  # fmt: skip
+    request = IdentifyRequest(tuple(files), motor, estimator, mapping)
+    if write_back:
+        identify_and_write(request, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs, as_json=json)
+    else:
+        verb(request, as_json=json)
 
 
 @app.command()
@@ -185,15 +180,14 @@ def monitor(
         list[float] | None, typer.Option("--load-hz", help="A known load frequency; repeatable.")
     ] = None,
     inertia: Annotated[float | None, typer.Option("--inertia", help="Total inertia in kg m2, for load torque.")] = None,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
     from commissioner.cli.verbs.monitor import monitor as verb
+    from commissioner.operations.monitor import MonitorRequest
 
-    verb(
-        file, motor=motor, out=out, baseline=baseline, learn=learn, start=start, load_hz=tuple(load_hz or ()),
-        inertia=inertia, as_json=json,
-    )  # fmt: skip
+    verb(MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping), as_json=json)
 
 
 @app.command()
@@ -209,12 +203,14 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
+    mapping: Map = None,
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
+    from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(files, motor=motor, out=out, as_json=json)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json)
 
 
 @app.command()
@@ -230,9 +226,12 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Play a drive or motor configuration, plain or extended by diagnose, into a recording."""
+    from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.simulate import simulate as verb
+    from commissioner.operations.simulate import SimulateRequest
 
-    verb(model, out, like=like, seconds=seconds, axes=axes, noise_a=noise_a, seed=seed, plain=plain, as_json=json)
+    angles = parse_axes(axes) or ()
+    verb(SimulateRequest(model, out, like, seconds, angles, noise_a, seed, plain), as_json=json)
 
 
 @runs_app.command("list")

@@ -23,12 +23,12 @@ from commissioner.diagnose.verdict.causes import (
     MOSTLY_EXPLAINED_SIGMA,
     Cause,
     causes_of,
-    doubt,
+    confidence_factor,
     explained_share,
 )
 from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
-from commissioner.diagnose.verdict.lack_of_fit import Leftover, leftover
+from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
 from commissioner.diagnose.verdict.parameter_shift import PARAMETERS
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
@@ -70,7 +70,7 @@ class Diagnosis:
     audit: Audit
     noise: Noise | None = None
     held_out: HeldOut | None = None
-    left: Leftover | None = None
+    left: LackOfFit | None = None
     parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
     parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
     next_experiment: Mapping[str, object] | None = None
@@ -127,27 +127,27 @@ def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> 
 def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str]) -> Diagnosis:
     record, layout = found.record, found.layout
     numbers = 4 + len(found.fit.model.terms)
-    rest = leftover(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
-    rest = rest.with_alien(float(np.sqrt(found.alien.chi2 / found.fit.normal.count.sum())))
+    lack = lack_of_fit(found.fit.model, record, layout, noise, numbers, audit.excited_hz)
+    lack = lack.with_ruled_out(float(np.sqrt(found.ruled_out.chi2 / found.fit.normal.count.sum())))
     held = hold_out(found.nominal, found.fit, record, layout, noise)
-    trust = doubt(rest, explained_share(found, rest, rest.sigma)) if found.accepted else 1.0
+    trust = confidence_factor(lack, explained_share(found, lack, lack.sigma)) if found.accepted else 1.0
     gained = float(np.sqrt(max(found.nominal.chi2 - found.fit.chi2, 0.0) / found.fit.normal.count.sum()))
     if held.is_measured and held.share < WORSE_THAN_NONE and gained < WEAK_SIGMA:
         trust = 0.0
-    causes, unsure = causes_of(found, rest, trust, audit, noise, excluded)
+    causes, unsure = causes_of(found, lack, trust, audit, noise, excluded)
     if all(c.from_audit for c in causes):
         # nothing is gained by causes that are not named
         held = hold_out(found.nominal, found.nominal, record, layout, noise)
     # what an unsure cause takes is left as well, yet no more than there was
     before = float(np.sqrt(max(found.nominal.normal.unexplained, 0.0) / found.nominal.normal.count.sum()))
-    left = float(np.hypot(rest.sigma, np.linalg.norm([c.strength_sigma for c in unsure])))
-    total = replace(rest, sigma=max(min(left, before), rest.sigma))
-    share, rest = explained_share(found, rest, total.sigma), total
+    left = float(np.hypot(lack.sigma, np.linalg.norm([c.strength_sigma for c in unsure])))
+    total = replace(lack, sigma=max(min(left, before), lack.sigma))
+    share, lack = explained_share(found, lack, total.sigma), total
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
-    is_seen = max(rest.from_states_sigma, rest.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
+    is_seen = max(lack.from_states_sigma, lack.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
     verdict, reason = _verdict(
-        causes, rest, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
+        causes, lack, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
     )
     experiment = next_experiment(verdict.value, causes, record)
     return Diagnosis(
@@ -158,7 +158,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
         audit,
         noise,
         held,
-        rest,
+        lack,
         _parameters(found.nominal, layout),
         _parameters(found.fit, layout),
         experiment,
@@ -172,32 +172,32 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
 
 
 def _verdict(
-    causes: Sequence[Cause], rest: Leftover, share: float, *, leaves_a_trace: bool, found: Found
+    causes: Sequence[Cause], lack: LackOfFit, share: float, *, leaves_a_trace: bool, found: Found
 ) -> tuple[Verdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
-        rest.sigma > UNEXPLAINED_SIGMA
-        or (causes and rest.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and rest.sigma > MOSTLY_EXPLAINED_SIGMA)
+        lack.sigma > UNEXPLAINED_SIGMA
+        or (causes and lack.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
+        or (not fitted and lack.sigma > MOSTLY_EXPLAINED_SIGMA)
         or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
         if not found.is_complete:
             return Verdict.UNEXPLAINED, (
-                f"Not finished: the time allowed was over before every cause was tried; a structured error of {rest.sigma:.2g} "
+                f"Not finished: the time allowed was over before every cause was tried; a structured error of {lack.sigma:.2g} "
                 f"times the noise is left so far{', beside ' + names if names else ''}."
             )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
         comes_and_goes = (
-            " It comes and goes: in some moments much more is left than in most." if rest.from_bursts_sigma else ""
+            " It comes and goes: in some moments much more is left than in most." if lack.from_bursts_sigma else ""
         )
-        alien = (
-            f" Part of it looks like {found.alien.name}, which the recorded DC link rules out."
-            if found.alien.chi2
+        ruled_out = (
+            f" Part of it looks like {found.ruled_out.name}, which the recorded DC link rules out."
+            if found.ruled_out.chi2
             else ""
         )
         return Verdict.UNEXPLAINED, (
-            f"A structured error of {rest.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{alien}{seen}"
+            f"A structured error of {lack.sigma:.2g} times the noise remains that no cause in the catalogue makes.{comes_and_goes}{ruled_out}{seen}"
         )
     if not causes:
         return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
@@ -205,9 +205,9 @@ def _verdict(
     if tied:
         classes = "; ".join(" or ".join((c.name, *c.equivalent)) for c in tied)
         return Verdict.NOT_DISTINGUISHABLE, f"These data cannot tell apart: {classes}."
-    if rest.sigma > 0.0:
+    if lack.sigma > 0.0:
         return Verdict.EXPLAINED, (
-            f"The named causes leave {rest.sigma:.2g} times the noise, {1.0 - share:.1%} of the error power that there was to explain."
+            f"The named causes leave {lack.sigma:.2g} times the noise, {1.0 - share:.1%} of the error power that there was to explain."
         )
     return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
 

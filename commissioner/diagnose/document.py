@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
+from commissioner.diagnose.contract import CauseDocument, DiagnosisDocument, Measured
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.points.diagnosis import PointsDiagnosis
 from commissioner.diagnose.verdict.causes import Cause
@@ -19,13 +19,12 @@ OF_RECORDINGS = (
 )
 
 
-def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
-    """Plain dict of a recording's diagnosis."""
+def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
+    """Document of a recording's diagnosis."""
     held, noise, left = seen.held_out, seen.noise, seen.left
-    return {
+    document: DiagnosisDocument = {
         "verdict": seen.verdict.value,
         "reason": seen.reason,
-        **_error(seen.refusal),
         "kind": "recording",
         "convention": f"{CONVENTION}; {OF_RECORDINGS}",
         "causes": [_cause(c) for c in seen.causes],
@@ -57,9 +56,12 @@ def as_document(seen: Diagnosis, model_file: str | None) -> dict[str, Any]:
         "next_experiment": dict(seen.next_experiment) if seen.next_experiment else None,
         "model_file": model_file,
     }
+    if seen.refusal is not None:
+        document["error"] = seen.refusal.as_dict()
+    return document
 
 
-def _cause(cause: Cause) -> dict[str, Any]:
+def _cause(cause: Cause) -> CauseDocument:
     return {
         "name": cause.name,
         "title": cause.title,
@@ -74,12 +76,12 @@ def _cause(cause: Cause) -> dict[str, Any]:
     }
 
 
-def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:
+def _quantities(values: Mapping[str, Quantity]) -> dict[str, Measured]:
     return {name: {"value": q.value, "std": q.std} for name, q in values.items()}
 
 
-def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
-    """Plain dict of a points table's diagnosis; errors are of the predicted line current, left-out points."""
+def points_document(seen: PointsDiagnosis) -> DiagnosisDocument:
+    """Document of a points table's diagnosis; errors are of the predicted line current, left-out points."""
     return {
         "verdict": seen.verdict,
         "reason": seen.reason,
@@ -115,7 +117,7 @@ def points_document(seen: PointsDiagnosis) -> dict[str, Any]:
     }
 
 
-def _points(seen: PointsDiagnosis) -> list[dict[str, float]]:
+def _points(seen: PointsDiagnosis) -> list[dict[str, float | None]]:
     """Every point with the relative error of its predicted current and power, left out of the fit and in it."""
     columns = {
         "frequency_hz": seen.points.frequency_hz,
@@ -130,16 +132,12 @@ def _points(seen: PointsDiagnosis) -> list[dict[str, float]]:
     return [{key: float(column[k]) for key, column in columns.items()} for k in range(seen.points.count)]
 
 
-def _error(refusal: DataRefused | None) -> dict[str, Any]:
-    return {} if refusal is None else {"error": refusal.as_dict()}
-
-
-def refused_document(refusal: DataRefused, kind: str) -> dict[str, Any]:
+def refused_document(refusal: DataRefused, kind: str) -> DiagnosisDocument:
     """The document where nothing could be answered."""
     return {
         "verdict": "refused",
         "reason": f"{refusal.what}; {refusal.remedy}",
-        **_error(refusal),
+        "error": refusal.as_dict(),
         "kind": kind,
         "convention": CONVENTION,
         "causes": [],

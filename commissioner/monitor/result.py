@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.monitor.chain import Observation, Refused
+from commissioner.monitor.contract import Measured, MonitoringDocument, RefusedMonitoring
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
@@ -25,13 +26,13 @@ WORDS = {
 }
 
 
-def quantity(value: float, std: float) -> dict[str, float]:
+def quantity(value: float, std: float) -> Measured:
     return {"value": float(value), "std": float(std)}
 
 
 def as_document(
     observation: Observation, pulses: Pulses | None, indicators: list[Indicator], verdict: Verdict | None
-) -> dict[str, object]:
+) -> MonitoringDocument:
     """The contract's `monitor` result. All quantities SI, per-phase star equivalent, referred to the stator."""
     period = observation.period
     load = None
@@ -41,8 +42,10 @@ def as_document(
         "outcome": "done",
         "refused_because": None,
         "mean_speed_rad_per_s": quantity(observation.mean_speed_rad_per_s, observation.mean_speed_std),
-        "mean_torque_nm": quantity(observation.mean_torque_nm, observation.mean_torque_std)
-        | {"std_from_sensors": observation.mean_torque_sensor_std},
+        "mean_torque_nm": {
+            **quantity(observation.mean_torque_nm, observation.mean_torque_std),
+            "std_from_sensors": observation.mean_torque_sensor_std,
+        },
         "used": {
             "start_s": float(observation.frame.time_s[0] + observation.audited.start_s),
             "end_s": float(observation.frame.time_s[-1] + observation.audited.start_s),
@@ -95,7 +98,7 @@ def why_no_load_torque(observation: Observation) -> str:
     return "not given: its uncertainty is larger than its movement within the period"
 
 
-def refused_document(refused: Refused) -> dict[str, object]:
+def refused_document(refused: Refused) -> RefusedMonitoring:
     """What was learned before the refusal, and the reason with its number."""
     reason = refused.reason
     return {
@@ -258,7 +261,7 @@ def _segment(observation: Observation) -> dict[str, float]:
     }
 
 
-def _parameters(fitted: Fitted) -> dict[str, dict[str, float]]:
+def _parameters(fitted: Fitted) -> dict[str, Measured]:
     names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
     value = np.array(fitted.circuit.as_inverse_gamma().as_tuple())
     moved = np.array([circuit_at(fitted, step).as_inverse_gamma().as_tuple() for step in steps(fitted)])
@@ -285,9 +288,9 @@ def _t_model(fitted: Fitted) -> dict[str, object]:
     return out
 
 
-def with_reference(document: dict[str, object], comparison: Mapping[str, float]) -> dict[str, object]:
+def with_reference(document: MonitoringDocument, comparison: Mapping[str, float]) -> MonitoringDocument:
     """The document with the encoder's verdict; the encoder was never an input."""
-    return document | {"reference_speed": dict(comparison)}
+    return {**document, "reference_speed": dict(comparison)}
 
 
 def _finite(value: float) -> float | None:

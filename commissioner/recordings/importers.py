@@ -1,24 +1,39 @@
-"""Recordings in other people's formats, mapped into the contract's table.
+"""One reader of recordings for every verb: the contract's own files, and other people's mapped into its table.
 
-Oscilloscope and logger CSV: any of comma, semicolon, tab; decimal commas; preface lines; a row of units; column names such
-as `Ia`, `i_L1`, `Strom U`, `CH1 (mA)`. MATLAB v5: vectors or columns of a matrix under such names, also inside structures.
-TDMS, MDF 4 and COMTRADE: channels under such names or the contract's own, by their units.
+Oscilloscope and logger CSV: any of comma, semicolon, tab; decimal commas; preface lines; a row of units; start and
+increment; UTF-8, UTF-16, GBK, Latin; column names such as `Ia`, `i_L1`, `Strom U`, `CH1 (mA)`. MATLAB v5: vectors or
+columns of a matrix under such names, also inside structures. TDMS, MDF 4 and COMTRADE: channels by name and unit.
+What was changed or left unused stands in the table's notes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
-from commissioner.recordings.formats.foreign_csv import has_other_separators, parse_csv, read_text
-from commissioner.recordings.names import is_per_minute, key_of, meaning_of, uses_rst
-from commissioner.recordings.table import CONTRACT_COLUMNS, READ, Table, read_table, to_running
-from commissioner.recordings.units import scale_of, unit_in
-from commissioner.records import RunningRecording, Signal
+from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.reading.cells import is_number
+from commissioner.recordings.reading.layout import head_lines, split
+from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
+from commissioner.recordings.reading.mend import with_time, with_whole_time, without_doubled_rows
+from commissioner.recordings.reading.preface import Clock, clock_in
+from commissioner.recordings.reading.recognise import Recognised, recognise
+from commissioner.recordings.table import (
+    CONTRACT_COLUMNS,
+    HOW_TO_MAP,
+    READ,
+    Table,
+    read_table,
+    to_running,
+    typed_metadata,
+)
+from commissioner.recordings.units import unit_in
+from commissioner.records import ReadingNote, RunningRecording, Signal
 
 _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str]]]] = {
     ".mat": lambda path: (matlab.vectors(path), {}),
@@ -29,134 +44,195 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
     ".cff": comtrade.channels,
 }
 NOT_READ = {".mdf": "MDF 3", ".xlsx": "Excel", ".xls": "Excel"}
+HEAD_BYTES = 65536
 
 
-def read_running(path: Path) -> RunningRecording:
+def read_running(path: Path, mapping: ChannelMap | None = None) -> RunningRecording:
     """The recording in `path`, whatever its format; DataRefused names the column that could not be found."""
-    return to_running(import_table(path))
+    return to_running(import_table(path, mapping))
 
 
-def contract_table(path: Path) -> Table:
-    """The table of a file whose columns or channels bear the contract's names, in any format that is read."""
-    reader = _BINARY.get(path.suffix.lower())
-    if reader is None and has_other_separators(path):
-        return Table(*parse_csv(read_text(path), str(path)), str(path))
-    if reader is None or not path.is_file():
-        return read_table(path)
-    columns, metadata = reader(path)
-    table = _ours(columns, metadata, str(path))
-    if table is None:
-        raise DataRefused(
-            f"{path}: its channels do not bear the contract's names", step="recognise columns", value=_some(columns),
-            limit="time_s, segment, axis_deg, voltage_axis_v, current_u_a, current_v_a", remedy="rename the channels",
-        )  # fmt: skip
+def import_table(path: Path, mapping: ChannelMap | None = None) -> Table:
+    """As `contract_table`, of a running motor: DataRefused where time, currents or voltages of one are missing."""
+    table = contract_table(path, mapping)
+    if "voltage_axis_v" not in table.columns and (missing := _missing(table.columns)):
+        raise _lacks(table, missing)
     return table
 
 
-def import_table(path: Path) -> Table:
-    """The table of a contract file as it stands, of any other file after its columns were recognised."""
+def contract_table(path: Path, mapping: ChannelMap | None = None) -> Table:
+    """The file's table under the contract's names, in SI, whatever its format; columns of other names under their own.
+
+    UsageError: no such file. DataRefused: no table, or one that can be read in two ways.
+    """
+    mapping = mapping or ChannelMap()
     if not path.is_file():
         raise UsageError(
-            f"there is no file {path}",
-            step="read recording",
-            value=str(path),
-            limit="an existing file",
+            f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
             remedy="check the path",
-        )
+        )  # fmt: skip
     suffix = path.suffix.lower()
     if suffix in NOT_READ:
         raise DataRefused(
-            f"{path}: {NOT_READ[suffix]} files are not read",
-            step="read recording",
-            value=suffix,
-            limit=READ,
+            f"{path}: {NOT_READ[suffix]} files are not read", step="read recording", value=suffix, limit=READ,
             remedy="export the recording as CSV or Parquet",
-        )
+        )  # fmt: skip
     if suffix in _BINARY:
-        columns, metadata = _BINARY[suffix](path)
-        return _ours(columns, metadata, str(path)) or recognise(_in_si(columns), metadata, str(path))
+        return _of_binary(path, mapping)
+    if suffix == ".parquet":
+        return _of_table(read_table(path), mapping)
     try:
-        table = read_table(path)
+        is_ours = not mapping.columns and _is_plain(path)
+        return _of_table(read_table(path), mapping) if is_ours else _of_text(path, mapping)
     except DataRefused as refusal:
-        return _foreign_csv(path, refusal)
-    if "time_s" in table.columns and any(name.startswith("current_") for name in table.columns):
-        return table
+        return _another_way(path, mapping, refusal)
+
+
+def _another_way(path: Path, mapping: ChannelMap, refusal: DataRefused) -> Table:
+    """The text read the other way: as somebody else's, or, of one column, as a table; where that fails too, the refusal
+    that says more."""
+    if mapping.columns or not _is_contract_named(path):
+        if "no rows of numbers" not in refusal.what or b"\n" not in _head(path):
+            raise refusal
+        try:
+            return _of_table(read_table(path), mapping)
+        except DataRefused:
+            raise refusal from None
     try:
-        return recognise(_in_si(table.columns), table.metadata, str(path))
-    except DataRefused as refusal:
-        return _foreign_csv(path, refusal)
+        return _of_text(path, mapping)
+    except DataRefused as second:
+        raise (second if second.step in {"read numbers", "recognise columns"} else refusal) from None
 
 
-def _ours(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], source: str) -> Table | None:
-    """The columns as they stand, where their names are the contract's."""
-    bare = {name.rpartition(".")[2].split(" [")[0]: values for name, values in columns.items()}
-    named = {name: values for name, values in bare.items() if name in CONTRACT_COLUMNS}
-    sizes = {values.size for values in named.values()}
-    if len(sizes) != 1 or not any(name.startswith("current_") for name in named):
-        return None
-    period = metadata.get("sample_period_s")
-    if "time_s" not in named and isinstance(period, float):
-        named["time_s"] = np.arange(sizes.pop(), dtype=np.float64) * period
-    return Table(named, metadata, source) if "time_s" in named else None
+def _head(path: Path) -> bytes:
+    import gzip
+    import zlib
 
-
-def _in_si(columns: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Each channel by the unit in its name; a damaged value passes as what it is, for the audit to name."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        return {name: scale_of(unit_in(name)) * values for name, values in columns.items()}
-
-
-def _foreign_csv(path: Path, refusal: DataRefused) -> Table:
-    """The file read as somebody else's CSV; where that fails too, what was wrong with it as a table stands."""
-    if path.suffix.lower() == ".parquet":
-        raise refusal
+    opener = gzip.open if path.suffix == ".gz" else open
     try:
-        columns, metadata = parse_csv(read_text(path), str(path))
-    except DataRefused:
-        raise refusal from None
-    return recognise(columns, metadata, str(path))
+        with opener(path, "rb") as file:
+            return bytes(file.read(HEAD_BYTES))
+    except (OSError, EOFError, zlib.error):
+        return b""
 
 
-def recognise(columns: Mapping[str, Signal], metadata: Mapping[str, float | str], source: str) -> Table:
-    """The contract's columns among others' names; time is made from a rate where there is no time column."""
-    kept: dict[str, Signal] = {}
-    data = dict(metadata)
-    for key, number in [*data.items(), *((name, float(v[0])) for name, v in columns.items() if v.size == 1)]:
-        found = _period_from(key, number)
-        if found is not None:
-            data.setdefault("sample_period_s", found)
-    with_s = uses_rst(columns)
-    for name, values in columns.items():
-        meaning = meaning_of(name, with_s)
-        if meaning and meaning not in kept and values.size > 1:
-            per_minute = meaning == "speed_rad_per_s" and is_per_minute(name) and scale_of(unit_in(name)) == 1.0
-            kept[meaning] = values * (np.pi / 30) if per_minute else values
-    longest = max((v.size for v in kept.values()), default=0)
-    kept = {name: values for name, values in kept.items() if values.size == longest}
-    period = data.get("sample_period_s")
-    if "time_s" not in kept and isinstance(period, float) and longest:
-        kept["time_s"] = np.arange(longest, dtype=np.float64) * period
-    missing = _missing(kept)
-    if missing:
-        raise DataRefused(
-            f"{source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
-            step="recognise columns",
-            value=_some(columns),
-            limit="time_s, three line currents and three voltages, in SI units",
-            remedy="record all six channels against time, or rename the columns to the contract's (time_s, current_u_a, "
-            "voltage_u_v or voltage_uv_v ...); without a time column give `# sample_period_s: 0.000125` as the first line",
+def _first_lines(head: bytes) -> list[str]:
+    """The first two lines below comments."""
+    text = head.decode("utf-8", errors="replace")
+    return [line.text for line in head_lines(text) if line.text.strip() and not line.text.startswith("#")][:2]
+
+
+def _is_contract_named(path: Path) -> bool:
+    lines = _first_lines(_head(path))
+    return bool(lines) and any(cell in CONTRACT_COLUMNS for cell in split(lines[0], ","))
+
+
+def _is_plain(path: Path) -> bool:
+    """Whether the file is the contract's CSV: its names between commas, then a row of numbers without quotes. Bytes that
+    are no text go the same way, to be named there."""
+    head = _head(path)
+    if b"\0" in head:
+        return head[:2] not in (b"\xff\xfe", b"\xfe\xff") and max(head[k::2].count(0) for k in (0, 1)) < 0.35 * len(
+            head
         )
-    return Table(kept, data, source)
+    lines = _first_lines(head)
+    if len(lines) < 2 or '"' in lines[1]:
+        return False
+    names, cells = (split(line, ",") for line in lines)
+    if not any(name in CONTRACT_COLUMNS for name in names) or len(names) != len(cells):
+        return False
+    plain = all(name in CONTRACT_COLUMNS or not unit_in(name) for name in names)
+    return plain and all(is_number(cell) or not cell for cell in cells)
 
 
-def _period_from(name: str, value: float | str) -> float | None:
-    """The sample period that a single number beside the columns gives: a rate in hertz, or the period in seconds."""
-    if not isinstance(value, float) or not value > 0:
-        return None
-    key = key_of(name)
-    if key in {"fs", "samplerate", "samplingrate", "samplingfrequency", "sampleratehz", "samplingratehz", "fshz"}:
-        return 1.0 / value
-    return value if key in {"ts", "dt", "tsample", "sampleperiod", "sampleinterval", "samplinginterval"} else None
+def _of_binary(path: Path, mapping: ChannelMap) -> Table:
+    columns, metadata = _BINARY[path.suffix.lower()](path)
+    single = [(name.rpartition(".")[2], str(float(v[0])), unit_in(name)) for name, v in columns.items() if v.size == 1]
+    said = clock_in([*single, *((k, str(v), "") for k, v in metadata.items())])
+    period = metadata.get("sample_period_s")
+    clock = replace(said, interval_s=float(period)) if isinstance(period, float) else said
+    several = {name: v for name, v in columns.items() if v.size > 1}
+    names = {name: _own_name(name, several) for name in several}
+    found = recognise(
+        list(names.values()), [unit_in(n) for n in several], list(several.values()),
+        {**mapping_in({}, tuple(names.values())), **mapping.columns}, str(path),
+    )  # fmt: skip
+    return _table(found, metadata, clock, mapping, str(path), ())
+
+
+def _own_name(name: str, others: Mapping[str, Signal]) -> str:
+    """A channel's name without its group where that leaves the contract's name."""
+    bare = name.rpartition(".")[2]
+    return bare if bare.split(" [")[0] in CONTRACT_COLUMNS else name
+
+
+def _of_table(table: Table, mapping: ChannelMap) -> Table:
+    names = tuple(table.columns)
+    targets = {**mapping_in(table.metadata, names), **mapping.columns}
+    found = recognise(names, ["" for _ in names], list(table.columns.values()), targets, table.source)
+    period = table.metadata.get("sample_period_s")
+    clock = Clock(float(period), said_by="sample_period_s") if isinstance(period, float) else Clock()
+    return _table(found, table.metadata, clock, mapping, table.source, ())
+
+
+def _of_text(path: Path, mapping: ChannelMap) -> Table:
+    text, encoding = read_text(path)
+    raw = parse_csv(text, encoding, str(path))
+    del text
+    metadata = typed_metadata(path, raw.metadata)
+    targets = {**mapping_in(metadata, raw.names), **mapping.columns}
+    found = recognise(raw.names, raw.units, list(raw.values), targets, str(path))
+    return _table(found, metadata, raw.clock, mapping, str(path), raw.notes)
+
+
+def _table(
+    found: Recognised, metadata: Mapping[str, float | str], clock: Clock, mapping: ChannelMap, source: str,
+    notes: tuple[ReadingNote, ...],
+) -> Table:  # fmt: skip
+    """What was recognised with a time, without doubled rows and rounded stamps."""
+    metadata = {**metadata, **mapping.metadata}
+    columns = _of_one_length(found.columns)
+    period = metadata.get("sample_period_s")
+    if clock.interval_s is None and isinstance(period, float):
+        clock = replace(clock, interval_s=period, said_by="sample_period_s")
+    made = with_time(columns, clock)
+    if clock.interval_s is not None and "sample_period_s" not in metadata and made:
+        metadata["sample_period_s"] = clock.interval_s
+    _with_constants(columns, metadata)
+    if "time_s" in columns and any(name.startswith("current_") for name in columns):
+        columns, doubled = without_doubled_rows(columns)
+        columns, whole = with_whole_time(columns)
+        made += [*doubled, *whole]
+    unnamed = [ReadingNote("unnamed_channel", f"{name}: its name does not say what it is") for name in found.unnamed]
+    return Table(columns, metadata, source, (*notes, *found.notes, *made, *unnamed), found.readings)
+
+
+def _of_one_length(columns: Mapping[str, Signal]) -> dict[str, Signal]:
+    """The columns as long as the longest of the contract's; all of them where there is none."""
+    ours = [v.size for name, v in columns.items() if name in CONTRACT_COLUMNS]
+    longest = max(ours, default=max((v.size for v in columns.values()), default=0))
+    return {name: v for name, v in columns.items() if v.size == longest}
+
+
+def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | str]) -> None:
+    """A standstill recording of one axis, or one segment, may say so once."""
+    for name in ("axis_deg", "segment"):
+        value = metadata.get(name)
+        if "voltage_axis_v" in columns and name not in columns and isinstance(value, float):
+            columns[name] = np.full(columns["voltage_axis_v"].size, value)
+
+
+def _lacks(table: Table, missing: list[str]) -> DataRefused:
+    unnamed = [note for note in table.notes if note.code == "unnamed_channel"]
+    return DataRefused(
+        f"{table.source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
+        step="recognise columns",
+        value=_some(table.columns),
+        limit="time_s, three line currents and three voltages, in SI units",
+        remedy=HOW_TO_MAP if unnamed else "record all six channels against time, or rename the columns to the contract's (time_s, "
+        "current_u_a, voltage_u_v or voltage_uv_v ...); without a time column give `# sample_period_s: 0.000125` as the "
+        "first line; or " + HOW_TO_MAP,
+    )  # fmt: skip
 
 
 def _missing(kept: Mapping[str, Signal]) -> list[str]:

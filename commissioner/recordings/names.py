@@ -22,6 +22,16 @@ PHASES = {
     "t": "w",
 }
 ALPHABETS = ("abc", "uvw", "rst", "123")
+TRANSLATED = {
+    "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
+    "电流": "current", "電流": "current", "corriente": "current", "corrente": "current", "stroom": "current",
+    "ток": "current", "strom": "strom", "ström": "current", "prad": "current", "prąd": "current",
+    "电压": "voltage", "電圧": "voltage", "電壓": "voltage", "tensión": "voltage", "tensão": "voltage",
+    "tensione": "voltage", "voltaje": "voltage", "spanning": "voltage", "напряжение": "voltage", "spänning": "voltage",
+    "napiecie": "voltage", "napięcie": "voltage", "转速": "speed", "速度": "speed", "vitesse": "speed", "velocidad": "speed",
+    "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
+}  # fmt: skip
+"""Words of other languages, as the words below; what only joins names in Chinese as a space."""
 FILLING = frozenset(
     {
         "phase",
@@ -41,7 +51,9 @@ FILLING = frozenset(
 )
 CURRENT = r"i|is|il|iph|cur|curr|current|currents|strom|courant|amps"
 VOLTAGE = r"u|v|vs|vl|ul|vph|uph|vll|ull|vol|volt|volts|voltage|voltages|spannung|tension"
-TIME = frozenset({"t", "time", "times", "zeit", "timestamp", "x", "xaxis", "second", "seconds", "sec"})
+TIME = frozenset(
+    {"t", "time", "times", "zeit", "temps", "timestamp", "x", "xaxis", "second", "seconds", "sec", "xvalue", "timesec"}
+)
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 """Without a unit of its own such a column is in 1/min."""
@@ -49,6 +61,8 @@ CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|spee
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
+_STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
+"""`isa`, `usb`; `ias`, `vbs`: stator quantities."""
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -57,8 +71,28 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     if CONTRACT.fullmatch(name):
         return name
     last = name.rsplit(".", maxsplit=1)[-1]
-    name = name if last.isdigit() else last
+    name = translated(name if last.isdigit() else last)
     return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
+
+
+def translated(name: str) -> str:
+    """The name with words of other languages replaced by those that are looked for."""
+    lower = name.lower()
+    if not any(word in lower for word in TRANSLATED):
+        return name
+    for word, ours in sorted(TRANSLATED.items(), key=lambda pair: -len(pair[0])):
+        pattern = re.escape(word) if not word.isascii() else rf"(?<![a-z]){word}(?![a-z])"
+        name = re.sub(pattern, f" {ours} ", name, flags=re.IGNORECASE)
+    return name.strip()
+
+
+def reversed_pair(name: str) -> str | None:
+    """The line-to-line voltage whose negative a name means: `Uac` is minus `voltage_wu_v`; None where it means none."""
+    found = re.fullmatch(rf"(?:{VOLTAGE})l?([abcuvwrst123])l?([abcuvwrst123])", key_of(name))
+    if not found or not any(found[1] in letters and found[2] in letters for letters in ALPHABETS):
+        return None
+    pair = PHASES[found[2]] + PHASES[found[1]]
+    return f"voltage_{pair}_v" if pair in {"uv", "vw", "wu"} else None
 
 
 def uses_rst(names: Iterable[str]) -> bool:
@@ -84,6 +118,8 @@ def _meaning(bare: str, with_s: bool) -> str | None:
         return "time_s"
     if key in SPEED | SPEED_PER_MINUTE:
         return "speed_rad_per_s"
+    if stator := _STATOR.fullmatch(key):
+        return _column(stator[1], stator[2] or stator[3])
     words = [word for word in words if word not in FILLING]
     kinds = [word for word in words if re.fullmatch(rf"{CURRENT}|{VOLTAGE}", word)]
     kind = max(kinds, key=len, default="")

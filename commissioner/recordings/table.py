@@ -21,9 +21,17 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
 from commissioner.errors import DataRefused, UsageError
+from commissioner.motor.computed import without_computed_third
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.whole import whole_file
-from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES, RunningRecording, Signal, StandstillRecording
+from commissioner.records import (
+    POINT_COLUMNS,
+    POINT_RESISTANCES,
+    ReadingNote,
+    RunningRecording,
+    Signal,
+    StandstillRecording,
+)
 
 MAX_METADATA_LINES = 1000
 KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
@@ -35,13 +43,30 @@ TEXT_KEYS = frozenset({"connection", "name", "drive", "source", "note", "motor",
 
 
 @dataclass(frozen=True)
+class ColumnReading:
+    """What a column of a file was taken for: `meaning` is the contract's name or None, `factor` goes to SI."""
+
+    name: str
+    meaning: str | None
+    unit: str
+    factor: float
+
+
+@dataclass(frozen=True)
 class Table:
     """Columns by name, `(n,)` float64 each, and the metadata as it stood in the file."""
 
     columns: Mapping[str, Signal]
     metadata: Mapping[str, float | str]
     source: str
+    notes: tuple[ReadingNote, ...] = ()
+    readings: tuple[ColumnReading, ...] = ()
 
+
+HOW_TO_MAP = (
+    "say what each channel is: comment lines at the top of the file (`# CH1: current_u_a`), or --map MAP.toml with [columns] "
+    'and lines like "CH1" = "current_u_a" ("-current_v_a * 10" turns and scales)'
+)
 
 READ = "CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4 or COMTRADE"
 
@@ -134,6 +159,15 @@ def to_standstill(table: Table) -> StandstillRecording:
     """The table as a standstill recording; refuses missing columns, NaN, and time that does not lie on a grid."""
     columns = table.columns
     needed = ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
+    running = [name for name in ("voltage_u_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s") if name in columns]
+    if running and "voltage_axis_v" not in columns:
+        raise _refuse(
+            Path(table.source),
+            f"this is a recording of a running motor (column {running[0]})",
+            ", ".join(columns),
+            "a standstill recording",
+            "use `commissioner monitor` for a running motor",
+        )
     _require(table, needed, "a standstill recording")
     optional = [name for name in ("current_w_a", "dc_link_v") if name in columns]
     _require_finite(table, [*needed, *optional])
@@ -142,7 +176,7 @@ def to_standstill(table: Table) -> StandstillRecording:
         bad = float(segment[segment != np.round(segment)][0])
         raise _refuse(table.source, "segment is not a whole number", bad, "0, 1, 2, ...", "number the segments")
     period = sample_period(table, segment)
-    return StandstillRecording(
+    recording = StandstillRecording(
         time_s=columns["time_s"],
         segment=segment.astype(np.int64),
         axis_deg=columns["axis_deg"],
@@ -154,7 +188,9 @@ def to_standstill(table: Table) -> StandstillRecording:
         sample_period_s=period,
         metadata=table.metadata,
         source=table.source,
+        notes=table.notes,
     )
+    return without_computed_third(recording)
 
 
 def to_running(table: Table) -> RunningRecording:
@@ -192,6 +228,7 @@ def to_running(table: Table) -> RunningRecording:
         sample_period_s=period,
         metadata=table.metadata,
         source=table.source,
+        notes=table.notes,
     )
 
 
@@ -255,7 +292,7 @@ def _read_parquet(path: Path) -> Table:
             raise _not_numeric(path, name, file.schema_arrow.field(name).type)
     raw = file.schema_arrow.metadata or {}
     metadata = {k.decode(): v.decode() for k, v in raw.items() if not k.startswith((b"ARROW", b"pandas"))}
-    return _as_table(path, file.read(columns=numeric), _typed(path, metadata))
+    return _as_table(path, file.read(columns=numeric), typed_metadata(path, metadata))
 
 
 def _read_csv(path: Path) -> Table:
@@ -278,7 +315,7 @@ def _read_csv(path: Path) -> Table:
         memoryview(data)[start:]
     )  # a thread that reads a Python file is cut off at exit, which then hangs or aborts
     table = pa_csv.read_csv(rest, convert_options=pa_csv.ConvertOptions(null_values=["", "nan", "NaN", "NA"]))
-    return _as_table(path, table, _typed(path, metadata))
+    return _as_table(path, table, typed_metadata(path, metadata))
 
 
 def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) -> Table:
@@ -318,7 +355,7 @@ CONTRACT_COLUMNS = frozenset(
 )  # fmt: skip
 
 
-def _typed(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
+def typed_metadata(path: Path, metadata: Mapping[str, str]) -> dict[str, float | str]:
     """Numbers as numbers; keys that are text stay text. A rated value that is no finite number is refused."""
     typed: dict[str, float | str] = {}
     for key, value in metadata.items():
@@ -353,8 +390,14 @@ def _require(table: Table, names: Sequence[str], what: str) -> None:
             f"{what} needs the column {missing[0]}",
             ", ".join(table.columns) or "no column of numbers",
             ", ".join(names),
-            "rename or add the columns: " + ", ".join(missing),
+            "rename or add the columns: " + ", ".join(missing) + _how_to_name(table),
         )
+
+
+def _how_to_name(table: Table) -> str:
+    """What to do where channels have no names that say what they are."""
+    unnamed = any(note.code == "unnamed_channel" for note in table.notes)
+    return "; or " + HOW_TO_MAP if unnamed else ""
 
 
 def _require_finite(table: Table, names: Sequence[str]) -> None:

@@ -4,23 +4,84 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
-SCALE = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
-UNIT = re.compile(r"^[\[(]?\s*(n|u|µ|μ|m|k|M)?(s|sec|a|v|rad/s|1/min|rpm|hz)\s*[\])]?$", re.IGNORECASE)
-IN_NAME = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]\s*$|_(ms|us|s|mA|A|mV|V|kV|rpm)$")
+PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "K": 1e3}
+BASE = {
+    "s": "time", "sec": "time", "secs": "time", "second": "time", "seconds": "time", "sekunden": "time",
+    "a": "current", "amp": "current", "amps": "current", "ampere": "current", "amperes": "current", "ampère": "current",
+    "v": "voltage", "volt": "voltage", "volts": "voltage", "w": "power", "watt": "power", "watts": "power",
+    "ohm": "resistance", "ohms": "resistance", "ω": "resistance", "hz": "frequency", "hertz": "frequency",
+    "nm": "torque", "va": "apparent", "var": "apparent",
+}  # fmt: skip
+"""Unit without prefix, in lower case, and what it measures."""
+WHOLE = {
+    "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "rpm": ("speed", math.pi / 30),
+    "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
+    "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
+    "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
+    "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0), "milliseconds": ("time", 1e-3),
+    "microseconds": ("time", 1e-6), "milliampere": ("current", 1e-3), "millivolt": ("voltage", 1e-3), "msec": ("time", 1e-3),
+    "usec": ("time", 1e-6), "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
+    "微秒": ("time", 1e-6), "安": ("current", 1.0), "毫安": ("current", 1e-3), "伏": ("voltage", 1.0),
+    "с": ("time", 1.0), "мс": ("time", 1e-3), "мкс": ("time", 1e-6), "а": ("current", 1.0), "ма": ("current", 1e-3),
+    "в": ("voltage", 1.0), "кв": ("voltage", 1e3), "ka": ("current", 1e3), "kv": ("voltage", 1e3),
+}  # fmt: skip
+FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw", "bit", "bits", "db", "div", "dbv"})
+"""Units that stand for something only with a factor which the file does not give."""
+IN_NAME = re.compile(
+    r"[\[(（【]\s*([^\])）】]*)\s*[\])）】]\s*$|\s+(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
+    r"|_(ms|us|s|mA|A|mV|V|kV|rpm)$"
+)
+"""A unit at the end of a name: in brackets, after `in`, after a slash, or after an underscore."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a unit measures, and its factor to SI. `is_ambiguous`: mega or milli, which only the writer knows."""
+
+    measures: str
+    scale: float
+    is_ambiguous: bool = False
 
 
 def unit_in(name: str) -> str:
+    """The text of the unit at the end of a name, or nothing."""
     found = IN_NAME.search(name)
-    return (found.group(1) or found.group(2) or "") if found else ""
+    return next((g for g in found.groups() if g), "") if found else ""
+
+
+def read_unit(text: str) -> Unit | None:
+    """The unit that a text means, in or out of brackets; None where it is none."""
+    bare = text.strip().strip("[]()（）【】").strip()
+    whole = WHOLE.get(bare.lower())
+    if whole:
+        return Unit(*whole)
+    if bare.lower() in BASE:
+        return Unit(BASE[bare.lower()], 1.0)
+    prefix, base = bare[:1], bare[1:].lower()
+    if base not in BASE:
+        return None
+    if prefix == "M":
+        return Unit(BASE[base], 1e-3, is_ambiguous=BASE[base] in {"time", "current", "voltage"})
+    return Unit(BASE[base], PREFIX[prefix]) if prefix in PREFIX else _upper(prefix, base)
+
+
+def _upper(prefix: str, base: str) -> Unit | None:
+    """`US`, `NS`: capitals of micro and nano have no other meaning."""
+    lower = prefix.lower()
+    return Unit(BASE[base], PREFIX[lower]) if lower in {"u", "n"} and len(base) == 1 else None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell of a row of units is one: nothing, a unit, or a unit that says nothing by itself."""
+    bare = text.strip().strip("[]()（）【】").strip().lower()
+    return (
+        not bare or read_unit(text) is not None or bare in FOREIGN or bare in {"-", "none", "sequence", "unit", "units"}
+    )
 
 
 def scale_of(unit: str) -> float:
     """Factor to SI: 1e-3 for mA, 2 pi / 60 for rpm; 1 where no unit is recognised."""
-    found = UNIT.match(unit.strip())
-    if not found:
-        return 1.0
-    if found.group(2).lower() in {"rpm", "1/min"}:
-        return math.pi / 30
-    prefix = found.group(1) or ""
-    return SCALE.get(prefix, SCALE.get(prefix.lower(), 1.0))
+    found = read_unit(unit)
+    return found.scale if found else 1.0

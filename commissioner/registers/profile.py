@@ -70,6 +70,8 @@ COMMISSIONING_ITEMS = (
 )
 """What a drive of kind `commissioning_map` must have, beside the watchdog's register and the parameter items."""
 
+CLAIM_ITEMS = ("owner_token", "owner_timeout_s", "owner_name", "owner_left_s")
+"""What a drive may have, all of them or none: the claim of one master against the others."""
 CIRCUIT = ("stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance")
 WINDOW_FLAGS = ("running", "clipped", "overrun", "voltage_clamped", "ended")
 
@@ -236,6 +238,11 @@ class DriveProfile:
                 remedy=self.unknown.get(capability, "use a drive or firmware whose file lists this capability"),
             )
 
+    @property
+    def has_claim(self) -> bool:
+        """True where one master can claim the drive against those on other computers."""
+        return all(name in self.items for name in CLAIM_ITEMS)
+
     def fault_text(self, code: int) -> str:
         return self.faults.get(code, f"fault code {code}, not in the drive file")
 
@@ -337,6 +344,11 @@ def _check_commissioning_map(profile: DriveProfile) -> None:
         if command not in profile.commands:
             raise _refuse(profile, f"commands.{command}", None, "the word that starts the action")
     _check_neighbours(profile, ("heartbeat", "window_index"), "one transaction writes both")
+    if any(name in profile.items for name in CLAIM_ITEMS):
+        for name in CLAIM_ITEMS:
+            if name not in profile.items:
+                raise _refuse(profile, f"items.{name}", None, "all of " + ", ".join(CLAIM_ITEMS) + ", or none")
+        _check_neighbours(profile, CLAIM_ITEMS[:3], "one transaction writes the claim")
     _check_neighbours(profile, [f"staged_{n}" for n in parameters.order], "the check sum runs over them in this order")
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
@@ -21,11 +22,14 @@ from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import Diagnosing, RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost, plain, read_journal
+from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
+from commissioner.run.holding.drive_lock import ACT, DriveLock
+from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import OperatorStop
@@ -47,9 +51,10 @@ class Order:
     key: bytes | None = None
     """Seals the run's folder."""
 
-    def open_folder(self, runs: Path, **more: object) -> RunFolder:
-        """A new run folder, with the order in it; the address without what is secret."""
+    def open_folder(self, runs: Path, lock: DriveLock, **more: object) -> RunFolder:
+        """A new run folder, with the order in it; the address without what is secret. The lock is this run's from here on."""
         folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
+        lock.name_run(folder.path.name)
         request = {
             "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
@@ -64,7 +69,7 @@ class Commissioned:
 
     ended: RunEnded
     folder: Path
-    result: Mapping[str, Any]
+    result: RunDocument
 
 
 def commission(
@@ -82,7 +87,7 @@ def commission(
     begun: Callable[[Path], None] = lambda _folder: None,
     origin: Mapping[str, Any] | None = None,
 ) -> Commissioned:
-    """The whole job. Configuration errors are raised; from the first request on, every end is a run with a folder.
+    """The whole job. Configuration errors are raised, and DriveInUse where another run has the drive; from the first request on, every end is a run with a folder.
 
     `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
     `key`: seals the folder (`archive.seal`).
@@ -91,21 +96,21 @@ def commission(
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)
-    parse_url(url)
     order = Order(url, profile, nameplate, plan, write_back, key)
     findings = Findings()
-    folder = order.open_folder(runs, **({"origin": origin} if origin else {}))
     asked = OperatorStop() if stop is None else stop
-    with closing(folder), asked, stopped_by_file(folder.path, asked):
-        begun(folder.path)
-        _tell(folder, present, WarmingUp())
-        warm_up(nameplate)
-        ended = carry_out(order, folder, findings, present, course, "job", asked)
-        result = close_run(order, folder, findings, ended)
-        if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
-            _tell(folder, present, Diagnosing(diagnosis_s))
-            result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
-            note(folder, "diagnosed", {"verdict": result["diagnosis"]["verdict"]})
+    with DriveLock.take(parse_url(url), profile, ACT) as lock:
+        folder = order.open_folder(runs, lock, **({"origin": origin} if origin else {}))
+        with closing(folder), asked, stopped_by_file(folder.path, asked):
+            begun(folder.path)
+            _tell(folder, present, WarmingUp())
+            warm_up(nameplate)
+            ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
+            result = close_run(order, folder, findings, ended)
+            if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
+                _tell(folder, present, Diagnosing(diagnosis_s))
+                result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
+                note(folder, "diagnosed", {"verdict": (result["diagnosis"] or {})["verdict"]})
     return Commissioned(ended, folder.path, result)
 
 
@@ -130,6 +135,7 @@ def carry_out(
     steps: Callable[[Job, Findings], Course],
     kind: str,
     stop: OperatorStop,
+    lock: DriveLock,
 ) -> RunEnded:
     """The steps over the order's link, each refusal and failure as the end of a run. The job is journalled as `kind`;
     a `stop` asked for before it began ends the run, too. A UsageError before the first request is raised, too."""
@@ -139,8 +145,10 @@ def carry_out(
             inverter = Inverter(port, profile, lambda intent: _announce(folder, intent))
             job = make_job(profile, order.nameplate, order.plan, port, write_back=order.write_back)
             folder.journal(kind, job, durable=True)
-            runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
-            ended = runner.perform(steps(job, findings))
+            with Mastery(inverter, lock) as mastery:
+                mastery.take(inverter.identify())
+                runner = Runner(inverter, folder, bounds(job), watch_limits(job), present, stop)
+                ended = runner.perform(steps(job, findings))
             with suppress(OSError):
                 folder.journal("link", port.stats.as_dict())
             return ended
@@ -160,7 +168,7 @@ def _announce(folder: RunFolder, intent: Intent) -> None:
     folder.journal("about_to", intent, durable=intent.action is not Action.STEER)
 
 
-def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
+def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
     """Recording, result and report, in that order: each needs only the one before."""
     try:
         return _saved(order, folder, findings, ended)
@@ -170,14 +178,14 @@ def close_run(order: Order, folder: RunFolder, findings: Findings, ended: RunEnd
         ) from failure
 
 
-def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> Mapping[str, Any]:
+def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded) -> RunDocument:
     metadata: dict[str, float | str] = {
         key: value for key, value in dataclasses.asdict(order.nameplate).items() if value is not None
     }
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
-    result: dict[str, Any] = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
+    result: RunDocument = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
     folder.save("result.json", result)
     journal = read_journal(folder.path / "journal.jsonl")
     folder.save_text("report.html", run_page(result, journal, findings))
@@ -192,12 +200,12 @@ def _time_left(seconds: float, stop: OperatorStop) -> Callable[[], bool]:
 
 
 def _with_diagnosis(
-    folder: RunFolder, result: Mapping[str, Any], findings: Findings, go_on: Callable[[], bool]
-) -> Mapping[str, Any]:
+    folder: RunFolder, result: RunDocument, findings: Findings, go_on: Callable[[], bool]
+) -> RunDocument:
     """Result and report once more, with what a four-parameter simulation would have got wrong."""
     diagnosis = diagnose_run(folder, go_on)
     remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
-    completed: dict[str, Any] = {**result, "diagnosis": diagnosis, "remarks": remarks}
+    completed: RunDocument = {**result, "diagnosis": diagnosis, "remarks": remarks}
     folder.save("result.json", completed)
     folder.save_text("report.html", run_page(completed, read_journal(folder.path / "journal.jsonl"), findings))
     return completed

@@ -7,10 +7,11 @@ from typing import Any
 
 from commissioner.diagnose.diagnosis import Diagnosis, diagnose
 from commissioner.diagnose.document import as_document
-from commissioner.diagnose.verdict.parameter_shift import moved_parameters
+from commissioner.diagnose.verdict.parameter_shift import parameter_shifts
+from commissioner.encoding import plain
 from commissioner.errors import CommissionerError
 from commissioner.recordings.table import read_table, to_standstill
-from commissioner.run.archive.folder import RunFolder, plain
+from commissioner.run.archive.folder import RunFolder
 
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
 
@@ -52,5 +53,5 @@ def _moved(seen: Diagnosis) -> list[dict[str, Any]]:
         return []
     return [
         {"parameter": m.parameter, "four_parameters": m.four_parameters, "with_causes": m.with_causes, "cause": m.cause}
-        for m in moved_parameters(seen.found.nominal, seen.found.fit, seen.found.layout)
+        for m in parameter_shifts(seen.found.nominal, seen.found.fit, seen.found.layout)
     ]

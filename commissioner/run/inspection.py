@@ -10,12 +10,15 @@ from typing import Any
 
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import CheckResult, judge_drive, judge_idle
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.profile import DriveProfile
+from commissioner.run.holding.drive_lock import LOOK, DriveLock
+from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import make_job, open_drive
 
 
@@ -34,9 +37,11 @@ class Inspection:
 def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: ProcedurePlan) -> Inspection:
     """Identity, plate, parameters and checks. Of a drive that cannot energise for us, what its file describes."""
     profile = load_profile(profile_name)
-    with open_drive(url, profile, plan) as port:
+    with DriveLock.take(parse_url(url), profile, LOOK) as lock, open_drive(url, profile, plan) as port:
         inverter = Inverter(port, profile)
         identity, plate = inverter.identify(), inverter.read_nameplate()
+        lock.identified(identity, profile)
+        Mastery(inverter, lock).look()
         statuses = [inverter.read_status()]
         time.sleep(plan.supervision.standstill_dwell_s)
         statuses.append(inverter.read_status())

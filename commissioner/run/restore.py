@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
+from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.modbus import open_port
@@ -21,7 +22,12 @@ from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
+from commissioner.run.holding.drive_lock import DriveLock
+from commissioner.run.holding.mastery import Mastery
+from commissioner.run.proof import prove, prove_verdict
 from commissioner.run.stopping.operator_stop import OperatorStop
+
+RESTORING = "restore"
 
 
 @dataclass(frozen=True)
@@ -35,10 +41,11 @@ class Restored:
     is_stored: bool
 
 
-def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> Restored:
+def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key: bytes | None = None) -> Restored:
     """The snapshot of `run` into the drive it was taken from, verified and stored.
 
-    DataRefused: the run took no snapshot, or it was changed. IdentityMismatch: another drive or firmware answers, or it
+    DataRefused: the run took no snapshot, its folder is not as the run left it, or no motor of its plate has such values.
+    DriveInUse: another run has the drive. IdentityMismatch: another drive or firmware answers, or it
     holds values that are neither the snapshot's nor this run's. What is restored is added to the run's own journal
     before and after.
     """
@@ -59,18 +66,32 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5) -> R
         )  # fmt: skip
     lines = read_journal(folder / "journal.jsonl")
     snapshot = _complete(read_snapshot(folder, lines), profile, folder)
-    with closing(RunFolder(folder)) as journal, OperatorStop():  # a set is never left half written for a Ctrl-C
+    prove_verdict(folder, prove(folder, profile, snapshot, key))
+    with (
+        DriveLock.take(address, profile, RESTORING) as lock,
+        closing(RunFolder(folder, key)) as journal,
+        OperatorStop(),  # a set is never left half written for a Ctrl-C
+    ):
+        lock.name_run(folder.name)
         port = open_port(address, profile, reply_timeout_s=reply_timeout_s)
         with closing(port):
             inverter = Inverter(port, profile, lambda intent: journal.journal("about_to", intent, durable=True))
-            present = inverter.snapshot().in_use
-            _check_known(present, snapshot, profile, lines)
-            try:
-                report = inverter.restore(snapshot, present)
-            except OSError as failure:
-                raise write_lost(failure, journal) from failure
+            with Mastery(inverter, lock) as mastery:
+                mastery.take(inverter.identify())
+                report = _bring_back(inverter, snapshot, lines, journal)
         note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
     return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)
+
+
+def _bring_back(
+    inverter: Inverter, snapshot: ParameterSnapshot, lines: list[dict[str, Any]], journal: RunFolder
+) -> WriteReport:
+    present = inverter.snapshot().in_use
+    _check_known(present, snapshot, inverter.profile, lines)
+    try:
+        return inverter.restore(snapshot, present)
+    except OSError as failure:
+        raise write_lost(failure, journal) from failure
 
 
 def _complete(snapshot: ParameterSnapshot, profile: DriveProfile, folder: Path) -> ParameterSnapshot:

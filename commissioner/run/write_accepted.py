@@ -23,9 +23,12 @@ from commissioner.registers.convention import drive_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
-from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
+from commissioner.run.archive.folder import RunFolder, read_journal, read_saved
 from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
+from commissioner.run.holding.drive_lock import LOOK, DriveLock
+from commissioner.run.holding.mastery import Mastery
+from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
 from commissioner.safety.limits import Bounds, SafetyFacts, permit
@@ -94,10 +97,17 @@ def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
     """
     ready, circuit = _ready(run, url), _circuit(run)
     _check_bounds(circuit, ready.plate)
-    with closing(RunFolder(ready.folder)) as journal, OperatorStop():
-        port = open_port(parse_url(ready.url), ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
-        with closing(port):
-            inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
+    address = parse_url(ready.url)
+    with (
+        DriveLock.take(address, ready.profile, "write back") as lock,
+        closing(RunFolder(ready.folder)) as journal,
+        OperatorStop(),
+    ):
+        lock.name_run(ready.folder.name)
+        port = open_port(address, ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
+        inverter = Inverter(port, ready.profile, lambda intent: journal.journal("about_to", intent, durable=True))
+        with closing(port), Mastery(inverter, lock) as mastery:
+            mastery.take(inverter.identify())
             wanted = drive_values(ready.profile, circuit, ready.plate).values
             check_token(_plan(run, ready, inverter, "write back", wanted), token)
             try:
@@ -141,11 +151,9 @@ def _ready(run: RunSummary, url: str | None) -> _Ready:
             remedy="give the drive's whole address with --drive",
         )
     snapshot = read_snapshot(folder, read_journal(folder / "journal.jsonl"))
-    try:
-        plate = Nameplate(**request["nameplate"])
-    except TypeError as error:
-        raise damaged(folder, "request.json", str(error)) from error
-    return _Ready(folder, load_profile(str(request["profile"])), address, plate, snapshot)
+    profile = load_profile(str(request["profile"]))
+    prove(folder, profile, snapshot)
+    return _Ready(folder, profile, address, read_plate(folder), snapshot)
 
 
 def _circuit(run: RunSummary) -> InverseGamma:
@@ -180,9 +188,13 @@ def _check_bounds(circuit: InverseGamma, plate: Nameplate) -> None:
 @contextmanager
 def _drive(ready: _Ready) -> Iterator[Inverter]:
     """The drive, open for reading."""
-    port = open_port(parse_url(ready.url), ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
-    with closing(port):
-        yield Inverter(port, ready.profile)
+    address = parse_url(ready.url)
+    with DriveLock.take(address, ready.profile, LOOK) as lock:
+        port = open_port(address, ready.profile, reply_timeout_s=REPLY_TIMEOUT_S)
+        with closing(port):
+            inverter = Inverter(port, ready.profile)
+            Mastery(inverter, lock).look()
+            yield inverter
 
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:

@@ -15,6 +15,7 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.recorded import recorded_course
 from commissioner.procedure.steps import Findings
 from commissioner.run.commission import Commissioned, Order, carry_out, close_run
+from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.runner import Present
 from commissioner.run.stopping.operator_stop import OperatorStop
 
@@ -33,13 +34,13 @@ def write_recorded(
     """Check, snapshot, verdict, write, read back, as a run with a folder, which `restore` takes. Energises nothing."""
     profile = load_profile(profile_name)
     profile.require("write_back")
-    parse_url(url)
     order = Order(url, profile, nameplate, plan, write_back=True)
     findings = Findings(identification=identification)
-    folder = order.open_folder(runs, recordings={str(path): _sha256(path) for path in recordings})
-    with closing(folder), OperatorStop() as stop:
-        ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings", stop)
-        result = close_run(order, folder, findings, ended)
+    with DriveLock.take(parse_url(url), profile, ACT) as lock:
+        folder = order.open_folder(runs, lock, recordings={str(path): _sha256(path) for path in recordings})
+        with closing(folder), OperatorStop() as stop:
+            ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings", stop, lock)
+            result = close_run(order, folder, findings, ended)
     return Commissioned(ended, folder.path, result)
 
 

@@ -41,7 +41,7 @@ class Item:
     def encode(self, value: Any) -> list[int]:
         """16-bit words of a raw value (wire units), text, or a list of raw values; high word first."""
         if self.kind == "ascii":
-            raw = str(value).encode("ascii").ljust(2 * self.length, b"\0")[: 2 * self.length]
+            raw = str(value).encode("ascii", "replace").ljust(2 * self.length, b"\0")[: 2 * self.length]
         else:
             values = value if isinstance(value, list) else [value]
             raw = b"".join(struct.pack(FORMATS[self.kind], v) for v in values)
@@ -57,6 +57,8 @@ class Item:
 
     def accepts(self, value: Any) -> bool:
         """No NaN or infinity, and inside the map's limits."""
+        if self.kind == "ascii":
+            return True
         values = value if isinstance(value, list) else [value]
         return all(math.isfinite(v) and self.lowest <= v <= self.highest for v in values)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.drive.claim import Claim
 from sim.drive.drive_map import DriveMap, Item
 from sim.drive.live import COUNTS_PER_LSB, crc16, run_interrupts
 from sim.drive.memory import Memory
@@ -76,6 +77,7 @@ class Firmware:
         self.values["decimation"], self.values["channel_mask"] = 1, 0b1111
         self.values["scale_ramp_per_s"], self.values["bias_ramp_v_per_s"] = 1.0, 20.0
         self.parameters = ParameterSet(self.values, self.map, self.setup, self.memory, self.log)
+        self.claim, self.settings_count = Claim(self.values), 0
         self.state = State.SWITCH_ON_DISABLED
         self.fault = self.trip_cause = Trip.NONE
         self.trip_value = self.trip_limit = 0.0
@@ -101,6 +103,8 @@ class Firmware:
         self._power_up()
 
     def _blank(self, item: Item) -> Any:
+        if item.kind == "ascii":
+            return ""
         return [0] * item.length if item.length > 1 else 0
 
     def _new_session(self) -> None:
@@ -131,7 +135,7 @@ class Firmware:
         if not self.is_energised and self.t < until:
             coast(self.x, self.p, until - self.t)
         self._happen()
-        self.parameters.finish_due(self.t)
+        self.settings_count = (self.settings_count + self.parameters.finish_due(self.t)) & 0xFFFF
         self.check_watchdog()
 
     def run_until_sample(self, index: int) -> None:
@@ -192,19 +196,21 @@ class Firmware:
 
     # --- watchdog -------------------------------------------------------------------------------------------------
 
-    def _now(self) -> float:
+    def now(self) -> float:
+        """Seconds of the clock that feeds watchdog and claim."""
         return self.wall_clock() if self.wall_clock else self.t
 
     def feed(self, value: int) -> None:
         """A heartbeat; only a changed one restarts the watchdog."""
         if value != self.heartbeat_echo and self.setup.heeds_heartbeat:
             self.heartbeat_echo = value
-            self.fed_at = self._now()
+            self.fed_at = self.now()
+            self.claim.renew(self.now())
 
     def check_watchdog(self) -> None:
         """Bite when due, whoever is or is not asking."""
         limit_ms = self.values["watchdog_ms"]
-        silent_ms = (self._now() - self.fed_at) * 1e3
+        silent_ms = (self.now() - self.fed_at) * 1e3
         if self.is_energised and limit_ms and silent_ms > limit_ms and not self.setup.runs_away:
             self.trip(Trip.WATCHDOG, silent_ms, float(limit_ms))
 
@@ -212,7 +218,7 @@ class Firmware:
         """Seconds until the watchdog would bite, inf when it is not running."""
         if not self.is_energised or not self.values["watchdog_ms"] or self.setup.runs_away:
             return math.inf
-        return self.fed_at + self.values["watchdog_ms"] / 1e3 - self._now()
+        return self.fed_at + self.values["watchdog_ms"] / 1e3 - self.now()
 
     # --- states --------------------------------------------------------------------------------------------------
 
@@ -258,7 +264,7 @@ class Firmware:
             why=why,
             until_zero_s=until_zero,
             session=self.session,
-            since_heartbeat_s=self._now() - self.fed_at,
+            since_heartbeat_s=self.now() - self.fed_at,
             watchdog_ms=self.values["watchdog_ms"],
         )
 
@@ -314,7 +320,7 @@ class Firmware:
         self.x[at.X_PEAK_S] = self.x[at.X_PEAK_R] = self.x[at.X_PEAK_A] = 0.0
         self.samples.has_ended = False
         self.state = State.ENABLED
-        self.fed_at = self._now()
+        self.fed_at = self.now()
         self.first_energised_s = self.t if self.first_energised_s is None else self.first_energised_s
         for hook in list(self.on_energised):
             hook()
@@ -383,6 +389,8 @@ class Firmware:
         self.values[name] = value
         if name == "heartbeat":
             self.feed(value)
+        elif name == "owner_token":
+            self.claim.renew(self.now())
         elif name == "control_word":
             self.control(value)
         elif name in LIVE:

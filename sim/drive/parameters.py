@@ -40,14 +40,16 @@ class ParameterSet:
         else:
             self.store_result, self.store_due = BUSY, t + STORE_S
 
-    def finish_due(self, t: float) -> None:
-        """End what is due at motor time `t`."""
+    def finish_due(self, t: float) -> int:
+        """End what is due at motor time `t`; how many of the two sets, in use and stored, it changed."""
+        before = [*self.in_use], [*self.memory.content["parameters"]]
         if t >= self.commit_due:
             self.commit_due = math.inf
             self._finish_commit(t)
         if t >= self.store_due:
             self.store_due = math.inf
             self._finish_store(t)
+        return (before[0] != self.in_use) + (before[1] != self.memory.content["parameters"])
 
     def _finish_commit(self, t: float) -> None:
         self.values["commit"] = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from sim.drive.claim import UNCOUNTED
 from sim.drive.drive_map import Item
 from sim.drive.parameters import PARAMETERS
 from sim.drive.samples import LINK_STEP_V, VOLTAGE_STEP_V
@@ -37,6 +38,7 @@ class Registers:
         if first <= address < first + self.drive.map.window_words:
             return self._read_window(address - first, count)
         words: list[int] = []
+        self.drive.claim.expire(self.drive.now())
         status = status_values(self.drive)
         while len(words) < count:
             item = self.drive.map.by_address.get(address + len(words))
@@ -65,6 +67,9 @@ class Registers:
                 return Answer.BAD_VALUE
             changes.append((item, value))
             at_word += used
+        held = self.drive.values
+        self.drive.settings_count += any(held[i.name] != v for i, v in changes if i.name not in UNCOUNTED)
+        self.drive.settings_count &= 0xFFFF
         for item, value in sorted(changes, key=lambda change: change[0].name == "control_word"):
             self.drive.take(item.name, value)
         return Answer.DONE
@@ -81,6 +86,8 @@ class Registers:
     def _is_allowed(self, item: Item, value: Any) -> bool:
         if not item.accepts(value) or item.name in self.drive.setup.refuses:
             return False
+        if item.name == "owner_token":
+            return self.drive.claim.admits(value, self.drive.now())
         if item.name == "watchdog_ms":
             shortest = self.drive.map.document["watchdog"]["min_ms"]
             return self.drive.setup.takes_watchdog and (value == 0 or value >= shortest)
@@ -139,6 +146,8 @@ def status_values(drive: Firmware) -> dict[str, Any]:
         "overruns": min(drive.samples.overruns, 0xFFFF),
         "test_time_left_s": max(left, 0.0) if drive.is_energised else 0.0,
         "present_bias_v": drive.e[at.E_BIAS] if drive.is_energised else 0.0,
+        "settings_count": drive.settings_count,
+        "owner_left_s": drive.claim.left_s(drive.now()),
         "current_scale_a": drive.current_scale_a,
         "voltage_scale_v": VOLTAGE_STEP_V,
         "dc_link_scale_v": LINK_STEP_V,

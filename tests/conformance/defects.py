@@ -256,8 +256,8 @@ SUPERVISION = (
     _defect(
         "watchdog is a timer from enable",
         STATES,
-        "    drive->fed_at_ms = cm_port_milliseconds();\n}\n\nstatic bool",
-        "}\n\nstatic bool",
+        "    drive->fed_at_ms = cm_port_milliseconds();\n    cm_renew_claim(drive);\n}",
+        "    cm_renew_claim(drive);\n}",
         "a-fed-watchdog-does-not-bite",
     ),
     _defect(

@@ -100,7 +100,7 @@ def test_a_cause_no_catalogue_holds_leaves_something_unexplained(seed):
 
 def test_phases_of_unequal_resistance_do_not_bend_a_dead_time_late():
     """Legs that differ took the phases' resistances, in a curve that bent too late for a leg's: dead time was no candidate any more,
-    six crumbs stood in its place, and nothing was named."""
+    six small causes stood in its place, and nothing was named."""
     seen, _ = diagnosed(Case("four", 3100004), 1.0)
     assert {"sampling_delay", "dead_time", "resistance_anisotropy"} <= {c.name for c in seen.causes}
     assert seen.verdict.value == "not_distinguishable" and seen.left.sigma < 0.05
@@ -109,7 +109,7 @@ def test_phases_of_unequal_resistance_do_not_bend_a_dead_time_late():
 def test_what_the_recorded_link_rules_out_is_somebody_elses():
     """An unknown cause that a sag of the link would imitate best: many weak causes had been fitted in its place."""
     seen, _ = diagnosed(Case("absent", 3000012), 1.0)
-    assert seen.verdict.value == "unexplained" and seen.left.from_alien_sigma > 0.03
+    assert seen.verdict.value == "unexplained" and seen.left.from_ruled_out_sigma > 0.03
     assert "looks like dc_link_sag, which the recorded DC link rules out" in seen.reason
     assert len(seen.found.accepted) <= 2
 

@@ -297,8 +297,8 @@ def test_what_needs_a_stop_is_refused_while_energised(name):
 def test_read_only_unknown_and_half_written_items_are_refused():
     firmware = drive()
     assert put(firmware, "magic", 1) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.write(90, [1]) is Answer.NO_SUCH_ADDRESS
-    assert firmware.registers.read(76, 2) is Answer.NO_SUCH_ADDRESS
+    assert firmware.registers.write(96 - 1, [1]) is Answer.NO_SUCH_ADDRESS
+    assert firmware.registers.read(77, 2) is Answer.NO_SUCH_ADDRESS
     assert firmware.registers.write(MAP.items["current_limit_a"].address, [1]) is Answer.NO_SUCH_ADDRESS
     assert firmware.registers.write(MAP.items["axis_deg"].address, floats(math.nan)) is Answer.BAD_VALUE
 

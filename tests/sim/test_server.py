@@ -49,7 +49,7 @@ def test_identity_and_nameplate_are_served_where_the_map_says(tcp):
 
 def test_exceptions_say_why(tcp):
     for action, code in (
-        (lambda: tcp.read(90, 1), 2),
+        (lambda: tcp.read(110, 1), 2),
         (lambda: tcp.write(0, [1, 2]), 2),
         (lambda: tcp.write(96, [3]), 3),
     ):

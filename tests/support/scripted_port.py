@@ -27,6 +27,8 @@ PARAMETERS = ("stator_resistance", "rotor_resistance", "leakage_inductance", "ma
 PRESENT = (3.0, 2.0, 20.0, 300.0)
 """Parameters the drive holds at first: ohm, ohm, mH, mH as on the wire."""
 
+UNCOUNTED = ("heartbeat", "window_index", "echo", "commit", "store", "owner_token", "owner_timeout_s", "owner_name")
+
 STATUS = {"disabled": 0x40, "ready": 0x21, "switched on": 0x23, "enabled": 0x27, "fault": 0x08}
 
 
@@ -75,11 +77,13 @@ class ScriptedDrive:
         failure = self.failures.popleft() if self.failures else None
         if failure is not None and not self.fails_after_acting:
             raise failure
+        before = self._settings()
         for name, item in self.items.items():
             length = item.get("length", 1) * WORDS[item["type"]]
             if address <= item["address"] < address + len(values):
                 start = item["address"] - address
                 self._take(name, tuple(values[start : start + length]))
+        self.put("settings_count", (int(self.get("settings_count")) + (self._settings() != before)) & 0xFFFF)
         if failure is not None:
             raise failure
 
@@ -153,6 +157,12 @@ class ScriptedDrive:
         for name, value in zip(PARAMETERS, PRESENT, strict=True):
             for prefix in ("", "staged_", "stored_"):
                 self.put(prefix + name, value)
+
+    def _settings(self) -> list[tuple[int, ...]]:
+        """The words of every setting whose change is counted."""
+        counted = [item for name, item in self.items.items() if "w" in item["access"] and name not in UNCOUNTED]
+        spans = [(i["address"], i.get("length", 1) * WORDS[i["type"]]) for i in counted]
+        return [tuple(self.words[start : start + count]) for start, count in spans]
 
     def _fail(self) -> None:
         failure = self.failures.popleft() if self.failures else None

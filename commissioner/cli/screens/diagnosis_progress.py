@@ -1,11 +1,11 @@
-"""What the search says while it works, in a technician's words; remembers what was named and taken back."""
+"""What the search says while it works, in a technician's words; remembers what was tried."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 
 from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.operations.events import SearchSaid
 from commissioner.report.diagnosis.names import said, spoken
 
 BEGIN = "comparing with a plain simulation, then trying the causes; this takes from seconds to some minutes"
@@ -16,16 +16,18 @@ PLAIN_ERROR = re.compile(r"^nominal fit: ([\d.e+-]+) times the noise")
 
 
 class Progress:
-    """Call it with every sentence of the search."""
+    """Call it with every record of a diagnosis."""
 
     def __init__(self, is_quiet: bool = False) -> None:
         self.is_quiet = is_quiet
         self.tried: list[str] = []
-        self.kept: list[str] = []
         self.last = ""
 
-    def __call__(self, sentence: str) -> None:
-        self.say(self.translated(sentence))
+    def __call__(self, record: object) -> None:
+        if not self.last:
+            self.say(BEGIN)
+        if isinstance(record, SearchSaid):
+            self.say(self.translated(record.sentence))
 
     def say(self, text: str) -> None:
         """On stderr, unless it is quiet or was said just now."""
@@ -45,13 +47,8 @@ class Progress:
             self.tried.append(found[1])
             return f"trying {spoken(found[1])} ...  ({len(self.tried)} of {len(CATALOGUE)} causes looked likely enough so far)"
         if found := KEPT.match(sentence):
-            self.kept.append(found[1])
             return f"{spoken(found[1])} helps"
         if found := DROPPED.match(sentence):
             return f"{spoken(found[1])} is no longer needed"
         is_arithmetic = any(word in sentence for word in ("chi2", "promised", "gained", "round "))
         return "" if is_arithmetic else said(sentence.strip())
-
-    def withdrawn(self, left: Collection[str]) -> list[str]:
-        """Named on the way and not among those that are `left`."""
-        return [name for name in dict.fromkeys(self.kept) if name not in left]

@@ -14,10 +14,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, standing
 from commissioner.report.run.summary import finding_sentences
-from commissioner.run.archive.documents import plain
 from commissioner.text import LONGEST
 from commissioner.text import shown as visible
 

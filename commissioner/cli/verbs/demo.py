@@ -12,8 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from commissioner.cli.angles import parse_axes
-from commissioner.cli.verbs.run import commission_and_show
+from commissioner.cli.verbs.run import run
 from commissioner.errors import LinkUnreachable
+from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
 
 START_S = 120.0
 """The simulator compiles its kernels at the first start; later starts take about a second."""
@@ -36,18 +37,10 @@ def demo(
     if not as_json:
         screen.out.print("[dim]starting the simulated inverter (its own process, Modbus TCP on loopback)[/]")
     with simulated_inverter(scenario, speed, seed) as url:
-        commission_and_show(
-            url=url,
-            profile="simulated",
-            motor="motor_2kw2",
-            axes=parse_axes(axes),
-            write_back=write_back,
-            yes=True,
-            procedure=None,
-            runs=runs,
-            as_json=as_json,
-            diagnosis=diagnosis,
+        request = CommissionRequest(
+            url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0
         )
+        run(request, yes=True, as_json=as_json)
 
 
 @contextmanager

@@ -1,185 +1,23 @@
-"""`monitor`: speed, torque and load torque of a running motor from its terminals."""
+"""`commissioner monitor FILE`: speed, torque and load torque of a running motor from its terminals."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from commissioner.errors import DataRefused
-
-if TYPE_CHECKING:
-    from commissioner.monitor.chain import Observation, Refused
-    from commissioner.monitor.trend.trend import Verdict
+from commissioner.cli.screens.monitoring import show, show_refused
+from commissioner.cli.screens.screen import busy, emit
+from commissioner.operations.monitor import MonitorRequest, NotMonitored
+from commissioner.operations.monitor import monitor as carry_out
 
 
-def monitor(
-    file: Path,
-    *,
-    motor: str | None = None,
-    out: Path | None = None,
-    baseline: Path | None = None,
-    learn: bool = False,
-    start: Path | None = None,
-    load_hz: tuple[float, ...] = (),
-    inertia: float | None = None,
-    as_json: bool = False,
-) -> None:
-    """Watch one recording: print the answer, write waveforms and report to `out`, compare with `baseline`.
-
-    Raises DataRefused (exit 3) where the recording cannot carry an answer; the JSON then still says what was learned.
-    """
-    from commissioner.cli.screens.screen import busy, emit
-    from commissioner.monitor.chain import Refused, Wishes, observe
-    from commissioner.monitor.result import as_document, entry_of, refused_document, with_reference
-    from commissioner.monitor.trend.indicators import pulses, trendable
-    from commissioner.monitor.trend.reference import against_encoder
-    from commissioner.recordings.baseline import update
-    from commissioner.recordings.importers import read_running
-    from commissioner.recordings.plate import plate_of, start_from
-
-    recording = read_running(file)
-    plate = plate_of(recording.metadata, str(file), motor)
-    wishes = Wishes(load_hz, inertia, start_from(start) if start else None)
+def monitor(request: MonitorRequest, *, as_json: bool) -> None:
+    """Shows the answer; exit 3 where the recording cannot carry one. The JSON then still says what was learned."""
     with busy("looking for speed and load"):
-        seen = observe(recording, plate, wishes)
-    if isinstance(seen, Refused):
-        refuse(seen, file, refused_document(seen), as_json)
-        return
-    made = pulses(seen)
-    indicators = trendable(seen, made)
-    verdict, history = (None, None)
-    if baseline is not None:
-        verdict, history = update(baseline, entry_of(seen, indicators, str(file)), learn)
-    document = as_document(seen, made, indicators, verdict)
-    comparison = against_encoder(seen, recording)
-    if comparison is not None:
-        document = with_reference(document, comparison)
-    if out is not None:
-        from commissioner.recordings.monitored import write_results
-        from commissioner.report.monitoring.page import page_of
-
-        document["files"] = write_results(
-            out, seen, page_of(seen, made, indicators, verdict, history, document, file.name)
-        )
+        done = carry_out(request)
     if as_json:
-        emit(document)
+        emit(done.document)
+    elif isinstance(done, NotMonitored):
+        show_refused(done.seen)
+        raise done.error
     else:
-        show(seen, document, verdict)
-
-
-def refuse(seen: Refused, file: Path, document: dict[str, Any], as_json: bool) -> None:
-    """Exit 3 with the reason; the JSON document still carries what was learned."""
-    import typer
-
-    from commissioner.cli.screens.screen import emit, err
-
-    reason = seen.reason
-    error = DataRefused(
-        f"{file}: {reason.what}",
-        step=f"audit ({reason.code})",
-        value=reason.value,
-        limit=reason.limit,
-        remedy=reason.remedy,
-    )
-    if as_json:
-        emit(document | {"reason": error.what, "error": error.as_dict()})
-        raise typer.Exit(error.exit_code)
-    for finding in seen.findings:
-        if not finding.stops:
-            err.print(f"[dim]{finding.kind}[/] {finding.what}")
-    f = seen.audited.fundamental
-    if f is not None:
-        err.print(
-            f"[dim]what the terminals show all the same[/] {f.frequency_hz:.4g} Hz, {abs(f.voltage_v) / 2**0.5:.4g} V a phase "
-            f"({f.voltage_unbalance:.2%} negative sequence), {abs(f.current_a) / 2**0.5:.4g} A ({f.current_unbalance:.2%}), "
-            f"{f.power_w:.4g} W, {f.reactive_var:.4g} var"
-        )
-    raise error
-
-
-def show(seen: Observation, document: dict[str, Any], verdict: Verdict | None) -> None:
-    """The human view: what turns how fast against what, how sure, and what was put right."""
-    from commissioner.cli.screens.screen import out, quantity, table
-    from commissioner.monitor.intake.findings import miswired
-
-    wiring = miswired(seen.findings)
-    for finding in wiring:
-        out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
-    period = seen.period
-    rpm = 30 / 3.141592653589793
-    rows = [
-        ("mean speed", quantity(seen.mean_speed_rad_per_s * rpm, seen.mean_speed_std * rpm, "1/min")),
-        ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
-        (
-            "speed within the period",
-            f"± {0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * rpm:.3g} 1/min "
-            f"(std {document['waveforms']['speed_rms_std_rad_per_s'] * rpm:.2g})",
-        ),
-    ]
-    if period.load_torque_nm is not None:
-        rows.append(
-            (
-                "load torque",
-                f"{period.load_torque_nm.min():.3g} ... {period.load_torque_nm.max():.3g} N m "
-                f"(std {document['waveforms']['load_torque']['rms_std_nm']:.2g})",
-            )
-        )
-    else:
-        rows.append(("load torque", document["waveforms"]["load_torque"]))
-    if seen.inertia_kg_m2 is not None:
-        rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
-    rows.append(
-        ("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)")
-    )
-    out.print(table("", ("", ""), rows))
-    out.print(
-        table(
-            "Periods",
-            ("what", "Hz", "of the shaft", "speed ripple", "varies with"),
-            [
-                (
-                    p.name,
-                    quantity(p.frequency_hz, p.frequency_std_hz, ""),
-                    f"{p.ratio_to_shaft:.4f}",
-                    f"{p.speed_ripple_rad_per_s * rpm:.3g} 1/min rms",
-                    p.follows,
-                )
-                for p in seen.load_periods
-            ],
-            right=(1, 2, 3),
-        )
-    )
-    names = {
-        "stator_resistance_ohm": "R_s",
-        "rotor_resistance_ohm": "R_R",
-        "leakage_inductance_h": "L_sigma",
-        "magnetizing_inductance_h": "L_M",
-    }
-    out.print(
-        table(
-            f"Motor (inverse-Gamma; start: {seen.start.origin})",
-            ("", ""),
-            [
-                (
-                    short,
-                    quantity(
-                        document["parameters"][key]["value"] * scale, document["parameters"][key]["std"] * scale, unit
-                    ),
-                )
-                for (key, short), (scale, unit) in zip(
-                    names.items(), ((1, "ohm"), (1, "ohm"), (1e3, "mH"), (1e3, "mH")), strict=True
-                )
-            ],
-        )
-    )
-    out.print(document["cannot_be_fixed"]["sentence"])
-    for finding in seen.findings:
-        if (finding not in wiring and finding.kind == "corrected") or (
-            finding.kind == "note" and finding.code != "frequency_wander"
-        ):
-            out.print(f"[yellow]{finding.kind}[/] {finding.what}")
-    if verdict is not None:
-        colour = "red" if verdict.names else "green"
-        out.print(f"[{colour}]{verdict.state.value}[/]" + (": " + ", ".join(verdict.names) if verdict.names else ""))
-    for name, path in document.get("files", {}).items():
-        out.print(f"[dim]{name}[/] {path}")
+        show(done.seen, done.document, done.verdict)
+    if isinstance(done, NotMonitored):
+        raise SystemExit(done.error.exit_code)

@@ -18,6 +18,8 @@ WATCHDOG = 6
 ENABLED, DISABLED, FAULT = DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
 WATCHDOG_GRACE_S = 0.15
 """Beyond its time, for the drive's own tick, the link and a busy computer."""
+FED_TIMES = 3
+"""Of the shortest watchdog time, where it must not bite: a busy computer or converter may pause longer than the shortest."""
 VITAL = ("disable-voltage-blocks-at-once", "the-watchdog-bites")
 """Without these two the kit energises nothing more."""
 
@@ -92,24 +94,22 @@ def only_a_changed_heartbeat_feeds(drive: Drive) -> Steps[None]:
 @rule
 def a_fed_watchdog_does_not_bite(drive: Drive) -> Steps[None]:
     """With changing heartbeats the test outlasts the watchdog's time."""
-    shortest, _ = drive.watchdog_range_ms
-    yield from _watched(drive, watchdog_ms=shortest)
-    for _ in range(round(2.2e-3 * shortest / 0.02)):
+    shortest, longest = drive.watchdog_range_ms
+    time_ms = min(FED_TIMES * shortest, longest)
+    yield from _watched(drive, watchdog_ms=time_ms)
+    for _ in range(round(2.2e-3 * time_ms / 0.02)):
         yield from drive.beat()
         yield Wait(0.02)
     seen = yield from drive.state()
     if seen is not ENABLED:
-        raise Broken(f"fed every 20 ms, a watchdog of {shortest} ms ended the test: '{seen.value}'")
+        raise Broken(f"fed every 20 ms, a watchdog of {time_ms} ms ended the test: '{seen.value}'")
 
 
 def must_have_tripped(drive: Drive, cause: int, by: str) -> Steps[None]:
-    """Fault state, code and cause, and a sample window that no longer runs."""
+    """Fault state, code and cause."""
     seen = yield from drive.state()
     if seen is not FAULT:
         raise Broken(f"{by} left the drive '{seen.value}', wanted a fault")
     code, kept = (yield from drive.number("fault_code")), (yield from drive.number("trip_cause"))
     if (code, kept) != (cause, cause):
         raise Broken(f"{by}: fault_code {code:g}, trip_cause {kept:g}, wanted {cause}")
-    window = yield from drive.window(0)
-    if window.flags & drive.layout.flags["running"]:
-        raise Broken(f"{by}: the output is blocked and the sample window says running")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.catalogue.effect import Effect, Setting, Sizes, effect, listed, spline_value
-from commissioner.diagnose.catalogue.regressors import FINE_HAT, HAT
+from commissioner.diagnose.catalogue.regressors import FINE_SPEED_SPLINE, SPEED_SPLINE
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.memory import loop_width
@@ -253,10 +253,10 @@ def iron_loss(setting: Setting) -> tuple[Term, ...]:
     return (Term("iron_loss", "conductance", "S", kinds.IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
 
 
-def _speed_hats(record: Record) -> list[str]:
+def _speed_splines(record: Record) -> list[str]:
     """Channels that a speed is made of: the finest there are."""
-    hats = [n for n in record.channel_names if n.startswith(HAT)]
-    return [n for n in hats if n.startswith(FINE_HAT)] or hats
+    splines = [n for n in record.channel_names if n.startswith(SPEED_SPLINE)]
+    return [n for n in splines if n.startswith(FINE_SPEED_SPLINE)] or splines
 
 
 def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
@@ -265,9 +265,9 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     for segment, channels in zip(setting.record.segments, setting.record.channels, strict=True):
         shown = segment.voltage_axis_v**2
         for name, value in values.items():
-            hat, _, uid = name.rpartition("_")
-            if uid == str(segment.uid) and hat.startswith(HAT):
-                mine = float(shown @ channels[:, setting.record.channel(hat)])
+            spline, _, uid = name.rpartition("_")
+            if uid == str(segment.uid) and spline.startswith(SPEED_SPLINE):
+                mine = float(shown @ channels[:, setting.record.channel(spline)])
                 power, weight = power + mine * value**2, weight + mine
     return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
 
@@ -278,7 +278,7 @@ def _motion_sizes(setting: Setting, values: Mapping[str, float]) -> Sizes:
     sign=0,
     family="cross",
     sizes=_motion_sizes,
-    course=HAT,
+    course=SPEED_SPLINE,
     signature="current in the axis that gets no voltage, proportional to the rotor flux",
     confounders=("sensor_offset", "sensor_drift", "inductance_anisotropy"),
     source="d psi_R/dt = ... + omega J psi_R (electrical speed); W. Leonhard, Control of Electrical Drives, ch. 10",
@@ -301,7 +301,7 @@ def shaft_motion(setting: Setting) -> tuple[Term, ...]:
             channel=n,
         )
         for s in setting.record.segments
-        for n in _speed_hats(setting.record)
+        for n in _speed_splines(setting.record)
     )
     carried = tuple(
         Term("shaft_motion", f"{name}_{s.uid}", "1", kinds.CARRY, k, 0.01, -2.0, 2.0, segment=s.uid)

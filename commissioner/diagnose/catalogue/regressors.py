@@ -1,4 +1,4 @@
-"""Known functions of time that effects ride on: heat doses, lagged power, ripple and mains lines, hats, phase patterns."""
+"""Known functions of time that effects ride on: heat doses, lagged power, ripple and mains lines, speed splines, phase patterns."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ FRESH_STATOR_HEAT, FRESH_CAGE_HEAT = "fresh", "rotor_heat_fresh"
 """Of a motor that cools in the pauses, whatever the time stamps say."""
 SETTLED = 4.0
 """Thermal time constants in a recording, for a temperature that settles within it."""
-HAT, FINE_HAT = "hat_", "hat_fine_"
-SPEED_KNOTS_S = {HAT: (0.4, 40), FINE_HAT: (0.1, 80)}
+SPEED_SPLINE, FINE_SPEED_SPLINE = "hat_", "hat_fine_"
+SPEED_KNOTS_S = {SPEED_SPLINE: (0.4, 40), FINE_SPEED_SPLINE: (0.1, 80)}
 """Spacing of a speed's cubic splines, and the most intervals of a segment. A shaft held by its load swings below about 1 Hz, which the
 
 wide ones follow to a per cent; the fine ones follow 2.5 Hz to a per cent."""
@@ -60,12 +60,12 @@ def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[
     record = _with(record, _phase_patterns(record))
     record = _with(record, _heat(record, rotor_current_a))
     record = _with(record, _sag(record))
-    return with_lines(_with(record, _hats(record, HAT)), lines)
+    return with_lines(_with(record, _speed_splines(record, SPEED_SPLINE)), lines)
 
 
-def with_fine_hats(record: Record, lines: Mapping[str, float]) -> Record:
+def with_fine_speed_splines(record: Record, lines: Mapping[str, float]) -> Record:
     """The record with splines for a faster speed as well, before its lines."""
-    return with_lines(_with(without_lines(record), _hats(record, FINE_HAT)), lines)
+    return with_lines(_with(without_lines(record), _speed_splines(record, FINE_SPEED_SPLINE)), lines)
 
 
 def _with(record: Record, named: Named) -> Record:
@@ -191,7 +191,7 @@ def behind_rectifier(powers: Sequence[Array], period_s: float, lag_s: float) -> 
     return [behind_diodes(power, period_s / lag_s) for power in powers]
 
 
-def _hats(record: Record, name: str) -> Named:
+def _speed_splines(record: Record, name: str) -> Named:
     spacing_s, most_intervals = SPEED_KNOTS_S[name]
     out = []
     for segment in record.segments:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.catalogue.regressors import FINE_HAT, with_fine_hats, with_known
+from commissioner.diagnose.catalogue.regressors import FINE_SPEED_SPLINE, with_fine_speed_splines, with_known
 from commissioner.diagnose.intake.record import Facts, Record, Segment
 from commissioner.diagnose.plant.model import NO_DICTIONARY, Layout, Model, impedance
 from commissioner.diagnose.plant.prediction import predict
@@ -77,8 +77,8 @@ def play(
     for _ in range(2):
         rotor = [predict(plain, record, k, used).rotor_current_a for k in range(len(record.segments))]
         known = with_known(replace(record, channel_names=(), channels=()), rotor, lines_hz)
-        if any(t.channel.startswith(FINE_HAT) for t in model.terms):
-            known = with_fine_hats(known, lines_hz)
+        if any(t.channel.startswith(FINE_SPEED_SPLINE) for t in model.terms):
+            known = with_fine_speed_splines(known, lines_hz)
         model = model.on_channels(known.channel_names)
         record = _filled(with_flux_before(known, model, used), model, used)
     noise = np.random.default_rng(seed + 1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from commissioner.diagnose.fit.normal_equations import Normal, Trial
+from commissioner.diagnose.fit.normal_equations import Normal, NormalEquations
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels import kinds
@@ -144,7 +144,7 @@ def fit(
     """
     damping = 1e-9
     tolerance = max(tolerance, TOLERANCE_OF_A_NUMBER * (4 + len(model.terms)))
-    normal = Trial(model, record, layout, model.terms, noise).normal()
+    normal = NormalEquations(model, record, layout, model.terms, noise).normal()
     if not np.isfinite(normal.total_gram).all():
         return Fit(model, replace(normal, chi2=np.full_like(normal.chi2, np.inf)), False, 0)
     dull = 0
@@ -162,7 +162,7 @@ def fit(
             if normal.total_chi2 - PATIENCE * promised > wanted_chi2:
                 return Fit(model, normal, False, done)
             moved = model.moved(theta + step)
-            trial = Trial(moved, record, layout, moved.terms, noise)
+            trial = NormalEquations(moved, record, layout, moved.terms, noise)
             if trial.chi2 < normal.total_chi2:
                 there = trial.normal()
                 improved = bool(np.isfinite(there.total_gram).all())

@@ -74,7 +74,7 @@ def whiten(signal: Array, is_good: NDArray[np.bool_], noise: Noise, period_s: fl
     return np.asarray(spectrum.view(np.float64).reshape(*signal.shape[:-2], -1))
 
 
-class Trial:
+class NormalEquations:
     """A model on a record: its chi2 from the trajectories alone, and the derivatives for the four and `wanted` once they are asked for.
 
     The trajectories of a long record are not held between the two: there derivatives come with the chi2.

@@ -161,14 +161,14 @@ def is_ruled_out(model: Model, name: str, record: Record) -> bool:
 
 def _link_stands_still(model: Model, name: str, record: Record) -> bool:
     """Whether the DC link was recorded and surely moves by less than LEAST_SEEN of what this cause says."""
-    share, doubt = _shown_by_the_link(model, name, record)
-    return share + CLEARLY * doubt < LEAST_SEEN
+    share, standard_error = _shown_by_the_link(model, name, record)
+    return share + CLEARLY * standard_error < LEAST_SEEN
 
 
 def _link_shows(model: Model, name: str, record: Record) -> bool:
     """Whether the DC link was recorded and surely moves by more than LEAST_SEEN of what this cause says."""
-    share, doubt = _shown_by_the_link(model, name, record)
-    return share - CLEARLY * doubt > LEAST_SEEN
+    share, standard_error = _shown_by_the_link(model, name, record)
+    return share - CLEARLY * standard_error > LEAST_SEEN
 
 
 def _shown_by_the_link(model: Model, name: str, record: Record) -> tuple[float, float]:

@@ -11,9 +11,9 @@ from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
 from commissioner.diagnose.catalogue import CATALOGUE, Setting
-from commissioner.diagnose.catalogue.regressors import with_fine_hats
+from commissioner.diagnose.catalogue.regressors import with_fine_speed_splines
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
-from commissioner.diagnose.fit.normal_equations import Trial, whiten
+from commissioner.diagnose.fit.normal_equations import NormalEquations, whiten
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import TO_PHASES, Record, each_segment
 from commissioner.diagnose.kernels import kinds
@@ -113,7 +113,7 @@ def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
     """The fit that begins with the model's curves and loops as they are or at zero, whichever is nearer."""
     starts = [model] if (flat := without_curves(model)).values == model.values else [model, flat]
     if len(starts) > 1:
-        chi2 = [Trial(m, setting.record, setting.layout, (), noise).chi2 for m in starts]
+        chi2 = [NormalEquations(m, setting.record, setting.layout, (), noise).chi2 for m in starts]
         if not chi2[0] <= chi2[1]:
             starts.reverse()
     return fit(starts[0], setting.record, setting.layout, noise)
@@ -151,7 +151,7 @@ def with_faster_speed(
 
     is left across the axes, along which no speed moves anything to first order.
     """
-    record = with_fine_hats(full, setting.lines_hz)
+    record = with_fine_speed_splines(full, setting.lines_hz)
     there = replace(setting, record=record.first(setting.record.commanded))
     speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)

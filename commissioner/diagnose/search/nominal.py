@@ -190,7 +190,7 @@ CARRY = (
 that turns meanwhile makes of its direction."""
 
 
-def is_astray(model: Model, layout: Layout) -> bool:
+def is_outside_the_box(model: Model, layout: Layout) -> bool:
     """Whether the four numbers are no motor's: one at an end of where it may be, or less magnetizing inductance than leakage."""
     box, four = np.array(layout.nominal_box), np.array(model.nominal)
     return bool(

@@ -21,8 +21,8 @@ SIDES = (0.0, 0.5, 1.0)
 NEAR = 0.1
 
 
-SETTLED_SAMPLES, PLACED_SAMPLES = 90_000, 45_000
-"""On so many, loops are settled and sides of the leakage tried."""
+REFINED_SAMPLES, LEAKAGE_SIDE_SAMPLES = 90_000, 45_000
+"""On so many, loops are refined and sides of the leakage tried."""
 CLOSER = (1.45, 1.2)
 """Ratios of neighbouring radii when loops are looked for between those that act."""
 MOST_OF_THE_FLUX = 0.75
@@ -32,14 +32,16 @@ REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (SHAPE,), kinds.L
 WARMING = frozenset({"stator_heating", "rotor_heating"})
 
 
-def settled(current: Fit, record: Record, layout: Layout, noise: Noise, *, is_placed: bool) -> tuple[Fit, Layout]:
-    """The last fit and its dictionaries: iron on its side (unless `is_placed` beside the same causes already), loops of the radii
+def refined(
+    current: Fit, record: Record, layout: Layout, noise: Noise, *, has_leakage_side: bool
+) -> tuple[Fit, Layout]:
+    """The last fit and its dictionaries: iron on its side (unless `has_leakage_side` beside the same causes already), loops of the radii
 
     they have, no idle numbers. All that is found on the first part of every segment, and fitted to the whole once.
     """
-    started, part = on_part(current, record, layout, noise, SETTLED_SAMPLES)
-    if current.model.has_kind(kinds.NU) and not is_placed:
-        started = placed(started, part, layout, noise)
+    started, part = on_part(current, record, layout, noise, REFINED_SAMPLES)
+    if current.model.has_kind(kinds.NU) and not has_leakage_side:
+        started = leakage_side(started, part, layout, noise)
     best, fine = without_idle_numbers(started, part, layout, noise), layout
     for ratio in CLOSER:
         if best.model.has_kind(kinds.STOP):
@@ -106,16 +108,16 @@ def widest_loop(iron_flux_wb: float) -> float:
     return MOST_OF_THE_FLUX * iron_flux_wb
 
 
-def placed(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
+def leakage_side(current: Fit, record: Record, layout: Layout, noise: Noise) -> Fit:
     """The best fit of those that begin with the iron on the rotor's side of the leakage, between, and on the stator's.
 
     Small tones ride on the flux of one side and hardly on the other's: a descent that begins on the wrong one ends on a
     hill between them, or is long on its way. Curves begin from zero there. Tried on the first part of every segment where that
     shows the iron as well; a side must gain what one number costs.
     """
-    started, part = on_part(current, record, layout, noise, PLACED_SAMPLES)
+    started, part = on_part(current, record, layout, noise, LEAKAGE_SIDE_SAMPLES)
     share = part.samples / record.samples
-    if not all(shows(started, share, n, loss_without(current, n)) for n in _placed_effects(current.model)):
+    if not all(shows(started, share, n, loss_without(current, n)) for n in _effects_with_a_side(current.model)):
         started, part = current, record
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
@@ -139,7 +141,7 @@ def without_curves(model: Model) -> Model:
     return replace(model, values=values)
 
 
-def _placed_effects(model: Model) -> set[str]:
+def _effects_with_a_side(model: Model) -> set[str]:
     return {t.effect for t in model.terms if t.kind == kinds.NU}
 
 

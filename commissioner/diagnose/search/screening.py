@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.catalogue import CATALOGUE, Setting
 from commissioner.diagnose.fit.gauss_newton import bounded_step
-from commissioner.diagnose.fit.normal_equations import Normal, Trial
+from commissioner.diagnose.fit.normal_equations import Normal, NormalEquations
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.model import Layout, Model, Term
@@ -89,7 +89,7 @@ def screen(
     candidates = {name: CATALOGUE[name].terms(setting) for name in absent}
     candidates = {name: terms for name, terms in candidates.items() if terms}
     wanted = [*model.terms, *(t for terms in candidates.values() for t in terms)]
-    normal = Trial(model, record, layout, wanted, noise).normal(_block(record))
+    normal = NormalEquations(model, record, layout, wanted, noise).normal(_block(record))
     return score(model, normal, candidates, setting, whole / record.samples)
 
 

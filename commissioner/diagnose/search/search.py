@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.diagnose.catalogue import CATALOGUE, Setting
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.fit.lost_samples import Loss, mend
-from commissioner.diagnose.fit.normal_equations import Trial
+from commissioner.diagnose.fit.normal_equations import NormalEquations
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, Segment
 from commissioner.diagnose.kernels import kinds
@@ -24,9 +24,9 @@ from commissioner.diagnose.search.nominal import (
     nominal_fit,
     set_up,
 )
-from commissioner.diagnose.search.refinement import settled
+from commissioner.diagnose.search.refinement import refined
 from commissioner.diagnose.search.screening import Screening
-from commissioner.diagnose.search.stepwise import Alien, Report, Steps, surely_left
+from commissioner.diagnose.search.stepwise import Report, RuledOut, Steps, surely_left
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
@@ -35,7 +35,7 @@ MENDED = 3
 MENDED_AT_ONCE = 0.5
 """A round that leaves more of the misfit than this is the last: what remains is not made by lost samples."""
 MENDED_SHARE, MENDED_LEAST_SHARE = 0.7, 0.3
-"""Of the misfit that the noise's doubt cannot make, and at the least of all of it, so much must be gone with them."""
+"""Of the misfit that the noise's own uncertainty cannot make, and at the least of all of it, so much must be gone with them."""
 UNKNOWN_SIGMA, UNKNOWN_SHARE = 0.1, 0.05
 """Where so much of the noise's rms is left, and of the error there was to explain, no cause makes it: settling the others gains nothing."""
 HOPELESS_SIGMA = 0.3
@@ -62,7 +62,7 @@ class Found:
     """Samples that stand out alone: masked as well, and no loss."""
     material_chi2: float = 0.0
     """A cause that gains less is too small to matter."""
-    alien: Alien = field(default_factory=Alien)
+    ruled_out: RuledOut = field(default_factory=RuledOut)
     is_complete: bool = True
     """False: the time allowed was over before nothing more passed the rules."""
 
@@ -111,12 +111,12 @@ def _searched(
     record, _, setting = set_up(record, noise, nominal)
     names = [name for name in CATALOGUE if name not in excluded]
     reached, first = _explored(nominal, Steps(setting, noise, names, report, record, go_on))
-    placed = reached.steps.placed
+    leakage_side = reached.steps.leakage_side
     if reached.accepted and losses:
         reached, losses = _losses_doubted(reached, raw, losses)
     if reached.accepted and "lost_samples" not in excluded:
         reached, losses = _losses_completed(reached, losses)
-    return _settled(reached, nominal, first, losses, is_placed=_is_placed(placed, reached.accepted))
+    return _refined(reached, nominal, first, losses, has_leakage_side=_has_leakage_side(leakage_side, reached.accepted))
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def _start_on(
     if reached is None or not reached.accepted:
         return fit((reached.fit if reached else nominal).model, part, layout, noise), base, ()
     start, here = _on_more(reached, base, noise)
-    if start.chi2 < Trial(nominal.model, part, layout, (), noise).chi2:
+    if start.chi2 < NormalEquations(nominal.model, part, layout, (), noise).chi2:
         return start, here, reached.accepted
     # what fitted the smaller part runs away beyond it
     start = fit(nominal.model, part, layout, noise)
@@ -188,13 +188,15 @@ def _losses_completed(reached: _Reached, losses: tuple[Loss, ...]) -> tuple[_Rea
     return (reached.again_on(mended, better), losses + more) if more else (reached, losses)
 
 
-def _settled(reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, is_placed: bool) -> Found:
-    """The last fit's sides and loops settled, unless too much is left; with all that was seen on the way."""
+def _refined(
+    reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, has_leakage_side: bool
+) -> Found:
+    """The last fit's sides and loops refined, unless too much is left; with all that was seen on the way."""
     steps, fitted, noise, layout = reached.steps, reached.fit, reached.steps.noise, reached.steps.layout
-    alien = steps.alien
-    is_alien = alien.chi2 > UNKNOWN_SHARE * (nominal.chi2 - fitted.chi2 + alien.chi2)
-    if not (is_alien or _leaves(UNKNOWN_SIGMA, fitted, nominal, noise)):
-        fitted, layout = settled(fitted, steps.record, layout, noise, is_placed=is_placed)
+    ruled_out = steps.ruled_out
+    much_is_ruled_out = ruled_out.chi2 > UNKNOWN_SHARE * (nominal.chi2 - fitted.chi2 + ruled_out.chi2)
+    if not (much_is_ruled_out or _leaves(UNKNOWN_SIGMA, fitted, nominal, noise)):
+        fitted, layout = refined(fitted, steps.record, layout, noise, has_leakage_side=has_leakage_side)
     iron_wb, leakage_wb = largest_fluxes(steps.record, fitted.model, layout)
     setting = replace(
         steps.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
@@ -203,7 +205,11 @@ def _settled(reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Lo
     most = max(nominal.chi2 - fitted.chi2, 0.0)
     gains = {name: min(loss, most) for name, loss in losses_of(fitted, reached.accepted).items()}
     # what settling gained may be the same
-    alien = replace(alien, chi2=max(alien.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0)) if alien.chi2 else alien
+    ruled_out = (
+        replace(ruled_out, chi2=max(ruled_out.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0))
+        if ruled_out.chi2
+        else ruled_out
+    )
     return Found(
         nominal,
         fitted,
@@ -218,17 +224,17 @@ def _settled(reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Lo
         tuple(x for x in losses if not x.is_spike),
         tuple(x for x in losses if x.is_spike),
         steps.material_chi2,
-        alien,
+        ruled_out,
         steps.go_on(),
     )
 
 
-def _is_placed(placed: frozenset[str], accepted: Sequence[str]) -> bool:
+def _has_leakage_side(leakage_side: frozenset[str], accepted: Sequence[str]) -> bool:
     """Whether the iron's side was sought beside these causes already, but for some that act at lines of their own."""
     return (
-        bool(placed)
-        and placed <= set(accepted)
-        and all(CATALOGUE[n].family in LINES_OF_THEIR_OWN for n in set(accepted) - placed)
+        bool(leakage_side)
+        and leakage_side <= set(accepted)
+        and all(CATALOGUE[n].family in LINES_OF_THEIR_OWN for n in set(accepted) - leakage_side)
     )
 
 
@@ -260,8 +266,8 @@ def _mended(
             break
     excess, left = current.normal.unexplained, better.normal.unexplained
     # what a noise measured too low adds to both
-    doubt = noise.uncertainty * float(current.normal.count.sum())
-    stays = max(left - doubt, 0.0) > (1.0 - MENDED_SHARE) * max(excess - doubt, 0.0)
+    by_the_noise = noise.uncertainty * float(current.normal.count.sum())
+    stays = max(left - by_the_noise, 0.0) > (1.0 - MENDED_SHARE) * max(excess - by_the_noise, 0.0)
     if not losses or stays or excess - left < max(least, MENDED_LEAST_SHARE * excess):
         return record, current, ()
     spikes = sum(x.is_spike for x in losses)

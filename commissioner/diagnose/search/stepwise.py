@@ -14,7 +14,7 @@ import numpy as np
 from commissioner.diagnose.catalogue import CATALOGUE, Setting
 from commissioner.diagnose.catalogue.magnetics import CARRIED
 from commissioner.diagnose.catalogue.mains_lines import LINES, with_clearer_lines
-from commissioner.diagnose.catalogue.regressors import FINE_HAT
+from commissioner.diagnose.catalogue.regressors import FINE_SPEED_SPLINE
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
@@ -42,8 +42,8 @@ from commissioner.diagnose.search.exchanges import (
     large_delay,
     regrouped,
 )
-from commissioner.diagnose.search.nominal import impedance_starts, is_astray, with_flux_before
-from commissioner.diagnose.search.refinement import placed
+from commissioner.diagnose.search.nominal import impedance_starts, is_outside_the_box, with_flux_before
+from commissioner.diagnose.search.refinement import leakage_side
 from commissioner.diagnose.search.screening import Score, Screening, price, required_chi2, screen
 
 MOST_CAUSES = 6
@@ -61,16 +61,16 @@ MOST_LOOKS = 3
 STEPS_GUARD = 0.5
 """As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
 slow changes from segment to segment, as a shaft's motion or a drift does."""
-LARGE_REST, CRUMB, NOISE_DOUBT = 0.1, 0.15, 2.0
-"""A rest above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
+LARGE_UNEXPLAINED, LEAST_SHARE_OF_REST, NOISE_DOUBT = 0.1, 0.15, 2.0
+"""Unexplained chi2 above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
 
 this share is left as it is; so is what a cause that was ruled out would take."""
 
 WRONG_VALLEY = 1.0
-"""A rest above this multiple of the noise, once the first cause is in the model: what it made of the currents may have led the four
-parameters astray."""
+"""Unexplained chi2 above this multiple of the noise, once the first cause is in the model: what it made of the currents may have led the four
+parameters out of the box of a motor of this kind."""
 ENTIRELY = 0.98
-"""Of a large rest: a cause that takes so much of it is no part of another's form."""
+"""Of a large unexplained chi2: a cause that takes so much of it is no part of another's form."""
 
 Report = Callable[[str], None]
 
@@ -81,7 +81,7 @@ def surely_left(fitted: Fit, noise: Noise) -> float:
 
 
 @dataclass(frozen=True)
-class Alien:
+class RuledOut:
     """A cause that was ruled out by what was measured, and the chi2 it would take: so much is real, and it is not that cause's."""
 
     name: str = ""
@@ -104,13 +104,13 @@ class Steps:
         self.names, self.report, self.full, self.go_on = names, report, full, go_on
         self.below: dict[str, float] = {}
         self.implausible: list[str] = []
-        self.ruled_out: dict[str, float] = {}
-        self.alien = Alien()
+        self.kept_of_ruled_out: dict[str, float] = {}
+        self.ruled_out = RuledOut()
         self.regrouped: set[frozenset[str]] = set()
         self.reformed: set[frozenset[str]] = set()
         self.lagging: set[frozenset[str]] = set()
         self.looks = 0
-        self.placed: frozenset[str] = frozenset()
+        self.leakage_side: frozenset[str] = frozenset()
         self.tried: tuple[Fit | None, dict[str, tuple[Fit, float]]] = (None, {})
         self.ripple_meets_tones = meets_tones(full, setting)
         self.first: Screening | None = None
@@ -131,7 +131,7 @@ class Steps:
     def continued(self, setting: Setting) -> Steps:
         """A search of more of the same record: sets of causes that were looked at as a whole are not looked at again."""
         steps = Steps(setting, self.noise, self.names, self.report, self.full, self.go_on)
-        steps.regrouped, steps.reformed, steps.placed = self.regrouped, self.reformed, self.placed
+        steps.regrouped, steps.reformed, steps.leakage_side = self.regrouped, self.reformed, self.leakage_side
         return steps
 
     @property
@@ -145,20 +145,20 @@ class Steps:
         material = (MATERIAL_SHARE * self.rms_a) ** 2 * float(np.mean(self.noise.sigma_a**-2.0))
         return self.count * max(material, STEPS_GUARD * self.noise.rounding_share)
 
-    def _guard(self, losses: Mapping[str, float], name: str, rest: float) -> float:
-        """What a cause must gain beside others that have these losses, where without it the chi2 of `rest` is not explained: no more than
+    def _guard(self, losses: Mapping[str, float], name: str, unexplained_chi2: float) -> float:
+        """What a cause must gain beside others that have these losses, where without it `unexplained_chi2` is left: no more than
 
-        nearly all of a large rest, for what the form of another cause leaves behind no simple cause takes entirely.
+        nearly all of that where it is large, for what the form of another cause leaves behind no simple cause takes entirely.
         """
         left = guard(losses, name, ripple_meets_tones=self.ripple_meets_tones)
-        return min(left, ENTIRELY * rest) if self._is_large(rest) else left
+        return min(left, ENTIRELY * unexplained_chi2) if self._is_large(unexplained_chi2) else left
 
-    def _rest(self, fitted: Fit) -> float:
+    def _unexplained_chi2(self, fitted: Fit) -> float:
         """Chi2 that is surely not explained."""
         return max(surely_left(fitted, self.noise), 0.0) * self.count
 
-    def _is_large(self, rest: float) -> bool:
-        return rest > LARGE_REST**2 * self.count
+    def _is_large(self, unexplained_chi2: float) -> bool:
+        return unexplained_chi2 > LARGE_UNEXPLAINED**2 * self.count
 
     def threshold(self, numbers: int) -> float:
         return max(required_chi2(numbers), self.material_chi2)
@@ -195,12 +195,15 @@ class Steps:
             name, current = step
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
-            if (len(accepted) == 1 and self._rest(current) > WRONG_VALLEY**2 * self.count) or is_astray(
-                current.model, self.layout
-            ):
+            if (
+                len(accepted) == 1 and self._unexplained_chi2(current) > WRONG_VALLEY**2 * self.count
+            ) or is_outside_the_box(current.model, self.layout):
                 current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
-                current, self.placed = placed(current, self.record, self.layout, self.noise), frozenset(accepted)
+                current, self.leakage_side = (
+                    leakage_side(current, self.record, self.layout, self.noise),
+                    frozenset(accepted),
+                )
             rippled = as_rippled(current, name, accepted, self.setting, self.noise, self.names, self.report)
             if rippled is not None:
                 current, accepted, self.setting = rippled
@@ -243,11 +246,11 @@ class Steps:
 
     def _with_faster_speed(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit in which a shaft swings faster, where it does; tried once something is left beside all other causes."""
-        is_left = self._rest(current) > self.threshold(1)
+        is_left = self._unexplained_chi2(current) > self.threshold(1)
         if (
             "shaft_motion" not in accepted
             or not is_left
-            or any(n.startswith(FINE_HAT) for n in self.record.channel_names)
+            or any(n.startswith(FINE_SPEED_SPLINE) for n in self.record.channel_names)
         ):
             return None
         again, self.full, self.setting = with_faster_speed(current, self.full, self.setting, self.noise, self.report)
@@ -259,8 +262,8 @@ class Steps:
             s for s in screening.ranked() if s.name not in refused and self.implausible.count(s.name) < IMPLAUSIBLE
         ]
         losses = losses_of(current, effects_of(current.model))
-        rest = self._rest(current)
-        guards = {name: self._guard(losses, name, rest) for name in screening.scores}
+        unexplained_chi2 = self._unexplained_chi2(current)
+        guards = {name: self._guard(losses, name, unexplained_chi2) for name in screening.scores}
         least = {name: max(guards[name], self.threshold(score.numbers)) for name, score in screening.scores.items()}
         promising = [s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * guards[s.name])]
         best = None if "sampling_delay" in refused else self._large_delay(current)
@@ -275,13 +278,13 @@ class Steps:
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
             is_sound = is_plausible(trial.model, score.name, self.setting)
             if not is_sound and gain >= wanted:
-                alike = self._with_legs_alike(current, score, current.chi2 - to_beat)
-                if alike is not None:
-                    trial, gain, is_sound = alike, current.chi2 - alike.chi2, True
+                equal = self._with_equal_legs(current, score, current.chi2 - to_beat)
+                if equal is not None:
+                    trial, gain, is_sound = equal, current.chi2 - equal.chi2, True
             if not is_sound:
                 self.implausible.append(score.name)
                 if is_ruled_out(trial.model, score.name, self.record):
-                    self.ruled_out[score.name] = min(gain / score.delta_chi2, 1.0)
+                    self.kept_of_ruled_out[score.name] = min(gain / score.delta_chi2, 1.0)
             if gain < wanted or not is_sound:
                 if required_chi2(score.numbers) < gain:
                     self.below[score.name] = gain
@@ -289,8 +292,12 @@ class Steps:
             net = gain - price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
-        self.alien = self._most_alien(screening, least)
-        return None if best is None or current.chi2 - best[2].chi2 < self._crumb(rest) else (best[1], best[2])
+        self.ruled_out = self._most_ruled_out(screening, least)
+        return (
+            None
+            if best is None or current.chi2 - best[2].chi2 < self._least_chi2_of_rest(unexplained_chi2)
+            else (best[1], best[2])
+        )
 
     def _tried(self, current: Fit, score: Score, wanted_chi2: float) -> Fit:
         """The refit with one more cause; lines looked for meanwhile concern only their own causes. One that was given up is begun again
@@ -305,7 +312,7 @@ class Steps:
             known[name] = last, wanted_chi2
         return last
 
-    def _with_legs_alike(self, current: Fit, score: Score, wanted_chi2: float) -> Fit | None:
+    def _with_equal_legs(self, current: Fit, score: Score, wanted_chi2: float) -> Fit | None:
         """A leg error of the same size in all legs, where that is plausible and unequal ones are not: what legs differ by may be the phases'
 
         resistances, and makes a curve that bends late.
@@ -314,7 +321,7 @@ class Steps:
         if len(form) == len(score.form):
             return None
         trial = fit(current.model.with_terms(form), self.record, self.layout, self.noise, wanted_chi2=wanted_chi2)
-        self.report(f"  {score.name} with legs alike: gained {current.chi2 - trial.chi2:.4g}")
+        self.report(f"  {score.name} with equal legs: gained {current.chi2 - trial.chi2:.4g}")
         return trial if trial.chi2 <= wanted_chi2 and is_plausible(trial.model, score.name, self.setting) else None
 
     def _with_unequal_legs(self, current: Fit, accepted: Sequence[str]) -> Fit:
@@ -345,19 +352,21 @@ class Steps:
             self.tried = (current, {})
         return self.tried[1]
 
-    def _most_alien(self, screening: Screening, least: Mapping[str, float]) -> Alien:
+    def _most_ruled_out(self, screening: Screening, least: Mapping[str, float]) -> RuledOut:
         """What of the causes that were ruled out would take most, and more than the `least` that it must gain."""
         promised = (
-            Alien(name, kept * screening.scores[name].delta_chi2)
-            for name, kept in self.ruled_out.items()
+            RuledOut(name, kept * screening.scores[name].delta_chi2)
+            for name, kept in self.kept_of_ruled_out.items()
             if name in screening.scores
         )
         beyond = (a for a in promised if a.chi2 > least[a.name])
-        return max(beyond, key=lambda a: a.chi2, default=Alien())
+        return max(beyond, key=lambda a: a.chi2, default=RuledOut())
 
-    def _crumb(self, rest: float) -> float:
-        """What the best candidate must take where much is left: else no cause makes it, and six crumbs name nothing."""
-        return CRUMB * max(rest if self._is_large(rest) else 0.0, self.alien.chi2)
+    def _least_chi2_of_rest(self, unexplained_chi2: float) -> float:
+        """What the best candidate must take where much is left: else no cause makes it, and six small causes name nothing."""
+        return LEAST_SHARE_OF_REST * max(
+            unexplained_chi2 if self._is_large(unexplained_chi2) else 0.0, self.ruled_out.chi2
+        )
 
     def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
         trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None
@@ -403,7 +412,7 @@ class Steps:
         for name in doubted:
             loss, losses = every[name], {n: x for n, x in every.items() if n != name}
             numbers = sum(1 for t in current.model.terms if t.effect == name)
-            wanted = max(self._guard(losses, name, self._rest(current) + loss), self.threshold(numbers))
+            wanted = max(self._guard(losses, name, self._unexplained_chi2(current) + loss), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
             holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
             is_sound = is_plausible(current.model, name, self.setting)

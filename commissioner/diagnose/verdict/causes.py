@@ -24,7 +24,7 @@ from commissioner.diagnose.verdict.evidence import (
     setting_for,
     sizes_with_spread,
 )
-from commissioner.diagnose.verdict.lack_of_fit import Leftover
+from commissioner.diagnose.verdict.lack_of_fit import LackOfFit
 
 MOSTLY_EXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.95
 COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
@@ -47,7 +47,7 @@ DELAY_OR_LAG_TIE = 1e-5
 SAME_ORDER_TIE = 2e-3
 NEARLY_ALL, LEFT_TIE = 0.001, 0.1
 """A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
-the unknown rest may favour either."""
+what is unknown may favour either."""
 
 
 @dataclass(frozen=True)
@@ -68,55 +68,55 @@ class Cause:
 
 
 def causes_of(
-    found: Found, rest: Leftover, trust: float, audit: Audit, noise: Noise, excluded: Sequence[str]
+    found: Found, lack: LackOfFit, trust: float, audit: Audit, noise: Noise, excluded: Sequence[str]
 ) -> tuple[list[Cause], tuple[Cause, ...]]:
     """Causes that are named, and those that were fitted but are more likely wrong than right as names.
 
-    `trust`: factor on every confidence (see `doubt`).
+    `trust`: factor on every confidence (see `confidence_factor`).
     """
     refitted = _refitted_without(
-        found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, rest, trust)]
+        found, noise, excluded, [n for n in found.accepted if _may_be_named(found, n, lack, trust)]
     )
     without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
-    causes = [_cause(found, name, rest, without[name], noise, excluded, trust) for name in found.accepted]
+    causes = [_cause(found, name, lack, without[name], noise, excluded, trust) for name in found.accepted]
     causes = _without_truncation(_with_open_ties(causes, without), audit)
-    losses = () if rest.from_bursts_sigma > 0.0 and not found.accepted else found.losses
+    losses = () if lack.from_bursts_sigma > 0.0 and not found.accepted else found.losses
     causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
         c
         for c in causes
-        if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, rest))
+        if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, lack))
     )
     return [c for c in causes if c not in unsure], unsure
 
 
-def explained_share(found: Found, rest: Leftover, left_sigma: float) -> float:
+def explained_share(found: Found, lack: LackOfFit, left_sigma: float) -> float:
     """Share of the structured error power that is not among what is left (`left_sigma`, causes not named included)."""
     count = float(found.fit.normal.count.sum())
-    structured = max(found.nominal.chi2 - found.fit.chi2, 0.0) + rest.sigma**2 * count
+    structured = max(found.nominal.chi2 - found.fit.chi2, 0.0) + lack.sigma**2 * count
     return 1.0 - min(left_sigma**2 * count / max(structured, left_sigma**2 * count, 1.0), 1.0)
 
 
-def _is_less_than_left(strength_sigma: float, rest: Leftover) -> bool:
+def _is_less_than_left(strength_sigma: float, lack: LackOfFit) -> bool:
     """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
-    return rest.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+    return lack.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
 
 
-def _may_be_named(found: Found, name: str, rest: Leftover, trust: float) -> bool:
+def _may_be_named(found: Found, name: str, lack: LackOfFit, trust: float) -> bool:
     """Whether the name is likely enough: else its alternatives need not be sought."""
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
-    sure = trust * confidence(claim_features(found.fit, found.accepted, name, rest, total), calibration.WEIGHTS)
-    is_likely = sure >= LEAST_CONFIDENCE or _is_dominant(found.gains[name], rest, count)
-    return is_likely and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), rest)
+    sure = trust * confidence(claim_features(found.fit, found.accepted, name, lack, total), calibration.WEIGHTS)
+    is_likely = sure >= LEAST_CONFIDENCE or _is_dominant(found.gains[name], lack, count)
+    return is_likely and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), lack)
 
 
-def _is_dominant(gain: float, rest: Leftover, count: float) -> bool:
+def _is_dominant(gain: float, lack: LackOfFit, count: float) -> bool:
     """Whether so much is left that nothing like it was among what the confidence learned from, and yet one cause alone takes nearly all of
 
     the error that is not another's: then it is there, whatever else is.
     """
-    return MUCH_LEFT_SIGMA**2 * count < rest.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
+    return MUCH_LEFT_SIGMA**2 * count < lack.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
 
 
 def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
@@ -140,7 +140,7 @@ def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked
 def _cause(
     found: Found,
     name: str,
-    rest: Leftover,
+    lack: LackOfFit,
     without: Dropped,
     noise: Noise,
     excluded: Sequence[str],
@@ -151,15 +151,15 @@ def _cause(
     # where the way to a cause bends, the loss foretold at its end falls short of a fit's
     gain = total if found.accepted == (name,) else max(found.gains[name], min(without.loss, total))
     fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
-    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * rest.sigma**2 * count)
+    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * lack.sigma**2 * count)
     close = tuple(
         n
         for n, r in without.rivals.items()
         if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
     )
-    features = claim_features(found.fit, found.accepted, name, rest, total)
+    features = claim_features(found.fit, found.accepted, name, lack, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
-    if _is_dominant(gain, rest, count) and all(r.loss > LEAST_LOST_TO_A_RIVAL * gain for r in without.rivals.values()):
+    if _is_dominant(gain, lack, count) and all(r.loss > LEAST_LOST_TO_A_RIVAL * gain for r in without.rivals.values()):
         sure = max(sure, DOMINANT_CONFIDENCE * trust)
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
@@ -276,14 +276,14 @@ def _audit_causes(
     return out
 
 
-def doubt(rest: Leftover, share: float) -> float:
+def confidence_factor(lack: LackOfFit, share: float) -> float:
     """Factor on every confidence where what is left is small, yet more than noise makes around the tones or in a state, and a
 
     larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
     """
     is_trace = (
-        max(rest.from_tones_sigma, rest.from_states_sigma, rest.from_alien_sigma) > 0.0
-        and rest.sigma <= MOSTLY_EXPLAINED_SIGMA
+        max(lack.from_tones_sigma, lack.from_states_sigma, lack.from_ruled_out_sigma) > 0.0
+        and lack.sigma <= MOSTLY_EXPLAINED_SIGMA
     )
     return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
 

@@ -20,7 +20,7 @@ from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.search.acceptance import is_plausible, loss_without
 from commissioner.diagnose.search.exchanges import read_late, with_closer_paths
 from commissioner.diagnose.search.screening import screen
-from commissioner.diagnose.verdict.lack_of_fit import Leftover
+from commissioner.diagnose.verdict.lack_of_fit import LackOfFit
 
 Array = NDArray[np.float64]
 TIE_CHI2 = 10.0
@@ -234,9 +234,9 @@ def _rms_of_course(found: Fit, name: str, setting: Setting) -> tuple[float, floa
     spread = weight @ covariance
     by_chance = 2.0 * float(np.sum(spread * spread.T))
     # the values carry their noise themselves
-    doubt = max(4.0 * float(values @ spread @ weight @ values) - by_chance, by_chance)
+    variance_of_power = max(4.0 * float(values @ spread @ weight @ values) - by_chance, by_chance)
     rms = float(np.sqrt(max(power, 0.0)))
-    return rms, float(np.sqrt(doubt) / (2.0 * max(rms, doubt**0.25)))
+    return rms, float(np.sqrt(variance_of_power) / (2.0 * max(rms, variance_of_power**0.25)))
 
 
 def confidence(features: Sequence[float], weights: Sequence[float]) -> float:
@@ -245,14 +245,14 @@ def confidence(features: Sequence[float], weights: Sequence[float]) -> float:
     return float(1.0 / (1.0 + np.exp(-np.clip(z, -30.0, 30.0))))
 
 
-def claim_features(found: Fit, accepted: Sequence[str], name: str, rest: Leftover, total_gain: float) -> list[float]:
+def claim_features(found: Fit, accepted: Sequence[str], name: str, lack: LackOfFit, total_gain: float) -> list[float]:
     """Log strength in sigma, log of what is left, log ratio of the two, log gain over the strongest other cause's,
     share of all gain. How near the best alternative comes was tried as well and told nothing more (such are ties)."""
     count = float(found.normal.count.sum())
     gain = max(loss_without(found, name), 1.0)
     others = max((loss_without(found, n) for n in accepted if n != name), default=0.0)
     strength = float(np.sqrt(gain / count))
-    left = max(rest.sigma, 0.03)
+    left = max(lack.sigma, 0.03)
     return [
         float(np.log10(strength)),
         float(np.log10(left)),

@@ -36,7 +36,7 @@ PART_OF_MATERIAL = 0.1
 
 
 @dataclass(frozen=True)
-class Leftover:
+class LackOfFit:
     """Structured error after the fit, in units of the noise rms; 0 where the noise explains everything."""
 
     sigma: float
@@ -46,17 +46,17 @@ class Leftover:
     from_states_sigma: float
     strongest_hz: float
     from_bursts_sigma: float = 0.0
-    from_alien_sigma: float = 0.0
+    from_ruled_out_sigma: float = 0.0
     """What a cause would take that was ruled out."""
 
-    def with_alien(self, sigma: float) -> Leftover:
+    def with_ruled_out(self, sigma: float) -> LackOfFit:
         """With what a cause that was ruled out would take, in units of the noise rms."""
-        return replace(self, from_alien_sigma=sigma, sigma=max(self.sigma, sigma))
+        return replace(self, from_ruled_out_sigma=sigma, sigma=max(self.sigma, sigma))
 
 
-def leftover(
+def lack_of_fit(
     model: Model, record: Record, layout: Layout, noise: Noise, numbers: int, tones_hz: Sequence[float] = ()
-) -> Leftover:
+) -> LackOfFit:
     """Five measures, the largest counts: total power above the noise (beyond three standard errors of the noise
 
     estimate), power in single frequencies that noise would not show once in a thousand recordings, power around
@@ -89,8 +89,8 @@ def leftover(
             if float(spectrum.max()) > strongest[0]:
                 strongest = (float(spectrum.max()), float(np.fft.rfftfreq(n, period)[1:][column]))
     excess = power / max(count - numbers, 1) - 1.0
-    doubt = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
-    by_power = float(np.sqrt(excess)) if excess > doubt else 0.0
+    uncertainty_here = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
+    by_power = float(np.sqrt(excess)) if excess > uncertainty_here else 0.0
     at_tones = 2.0 * sum(_excess(rows, noise.uncertainty) for rows in around)
     # the lines that coarse steps make are counted with the noise already
     by_lines, by_tones, by_states = (
@@ -99,7 +99,7 @@ def leftover(
     )
     by_bursts = bursts_sigma(residuals, record, noise, has_causes=any(t.effect for t in model.terms))
     largest = max(by_power, by_lines, by_tones, by_states, by_bursts)
-    return Leftover(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)
+    return LackOfFit(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)
 
 
 def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Array], noise: Noise) -> float:
@@ -179,6 +179,6 @@ def _excess(rows: Sequence[_Around], uncertainty: float) -> float:
     if not bins:
         return 0.0
     level = max(sum(r.beside_power for r in rows) / beside, 1.0) if beside else 1.0
-    doubt = uncertainty + (1.0 / np.sqrt(beside) if beside else 0.0)
-    limit = level * (float(gammainccinv(bins, ONCE_IN)) + 3.0 * doubt * bins)
+    uncertainty_here = uncertainty + (1.0 / np.sqrt(beside) if beside else 0.0)
+    limit = level * (float(gammainccinv(bins, ONCE_IN)) + 3.0 * uncertainty_here * bins)
     return power - level * bins if power > limit else 0.0

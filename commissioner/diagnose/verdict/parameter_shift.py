@@ -16,7 +16,7 @@ LEAST_SHARE, LEAST_SIGMAS = 0.01, 3.0
 
 
 @dataclass(frozen=True)
-class Moved:
+class ParameterShift:
     """One parameter fitted by four numbers alone, and with the accepted causes; `cause` had most of the move."""
 
     parameter: str
@@ -30,7 +30,7 @@ class Moved:
         return self.four_parameters / self.with_causes - 1.0
 
 
-def moved_parameters(nominal: Fit, extended: Fit, layout: Layout) -> tuple[Moved, ...]:
+def parameter_shifts(nominal: Fit, extended: Fit, layout: Layout) -> tuple[ParameterShift, ...]:
     """Parameters of slow currents that the accepted causes moved, largest first."""
     before = np.array(nominal.model.nominal)
     after, derivatives = extended.model.at_rest(layout)
@@ -43,7 +43,8 @@ def moved_parameters(nominal: Fit, extended: Fit, layout: Layout) -> tuple[Moved
     shifts = np.array([np.abs(relative @ _change_without(extended, name)) for name in causes])
     order = [k for k in np.argsort(-apart) if apart[k] > max(LEAST_SHARE, LEAST_SIGMAS * error[k])]
     return tuple(
-        Moved(PARAMETERS[k], float(before[k]), float(after[k]), causes[int(np.argmax(shifts[:, k]))]) for k in order
+        ParameterShift(PARAMETERS[k], float(before[k]), float(after[k]), causes[int(np.argmax(shifts[:, k]))])
+        for k in order
     )
 
 

@@ -72,4 +72,10 @@ def audit(recording: StandstillRecording) -> Audit:
     )
     beside = [r for s in excited if (r := besides_the_axis(s)) is not None]
     gaps = [s.lost_before for s in stretches if s.lost_before > 0]
-    return Audit(tuple(stretches), len(gaps), sum(gaps), seconds, (*remarks, *beside[:3]))
+    return Audit(
+        tuple(stretches),
+        len(gaps),
+        sum(gaps),
+        seconds,
+        (*(note.what for note in recording.notes), *remarks, *beside[:3]),
+    )

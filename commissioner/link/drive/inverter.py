@@ -12,11 +12,13 @@ from collections.abc import Callable, Mapping, Sequence
 from commissioner.errors import (
     CheckFailed,
     DriveFault,
+    ForeignMaster,
     ReplyMismatch,
     ReplyTimeout,
     RequestRefused,
     UsageError,
 )
+from commissioner.link.drive.claim import Claim
 from commissioner.link.drive.disarming import DISABLE_VOLTAGE, SHUTDOWN, de_energise
 from commissioner.link.drive.facts import Action, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
 from commissioner.link.drive.items import Items, number
@@ -64,6 +66,7 @@ class Inverter:
         self.profile = profile
         self.journal = journal
         self._items = Items(port, profile)
+        self.claim = Claim(self._items)
         self._sleep, self._clock = sleep, clock
         self._heartbeat = 0
         self._watchdog_ms = 0.0
@@ -77,8 +80,13 @@ class Inverter:
         return read_identity(self._items)
 
     def read_status(self) -> DriveStatus:
-        """The drive's state now. What the drive file does not describe is NaN, 0 or empty."""
-        return read_status(self._items)
+        """The drive's state now. What the drive file does not describe is NaN, 0 or empty.
+
+        ForeignMaster: the drive was set up by us and is not as we left it.
+        """
+        status = read_status(self._items)
+        self._items.watched.judge(status.settings_count, self._items.read)
+        return status
 
     def read_nameplate(self) -> dict[str, float]:
         """The nameplate the drive holds, by the contract's keys; what its file does not describe is left out."""
@@ -86,7 +94,11 @@ class Inverter:
 
     def snapshot(self) -> ParameterSnapshot:
         """The motor parameters in use and stored, with the identity of the drive that holds them."""
-        return self._write_back().snapshot()
+        found = self._write_back().snapshot()
+        stored = {f"stored_{name}": value for name, value in found.stored.items()}
+        staged = self._items.read([f"staged_{name}" for name in found.in_use])
+        self._items.watched.found({**found.in_use, **stored, **staged})
+        return found
 
     # --- set up -------------------------------------------------------------------------------------------------
     def set_watchdog(self, time_ms: float) -> None:
@@ -105,6 +117,7 @@ class Inverter:
             raise self._no_watchdog(refused.what, time_ms) from refused
         self._watchdog_ms = time_ms
         self._supervision |= values
+        self._items.watched.is_armed = True
 
     def set_limits(self, *, current_a: float, voltage_v: float, time_s: float) -> None:
         """Limits the drive enforces by itself: peak phase current (trips), axis voltage (clamps), energised time."""
@@ -163,6 +176,8 @@ class Inverter:
         """
         self.profile.require("excite")
         self._check_set_up()
+        self._keep_claim()
+        self.read_status()  # where somebody else changed a setting, that is the reason, not what it would lead to
         before = check_ready(self._items, self._supervision, self._watchdog_ms / 1000)
         self._prepare({"mode": SINGLE_AXIS_TEST}, "choose the single-axis test")
         stream = self._stream_format()
@@ -233,6 +248,7 @@ class Inverter:
         WriteBackFailed: says whether the snapshot was restored.
         """
         self.profile.require("write_back")
+        self._keep_claim()
         return self._write_back().write(values, snapshot, store=store)
 
     def write_circuit(
@@ -251,6 +267,19 @@ class Inverter:
         return WriteBack(self._items, self.journal, sleep=self._sleep, clock=self._clock)
 
     # --- steps --------------------------------------------------------------------------------------------------
+    def _keep_claim(self) -> None:
+        """ForeignMaster: the drive has become somebody else's."""
+        if self.claim.renew():
+            return
+        held = self.claim.holder()
+        raise ForeignMaster(
+            "another master took the drive: it no longer holds our claim",
+            step="keep the drive",
+            value="nobody's" if held is None else held.name or "a master without a name",
+            limit="our claim until the run has ended",
+            remedy="disconnect the other master, then start again",
+        )
+
     def _prepare(self, values: Mapping[str, Value], step: str) -> None:
         self.journal(Intent(Action.PREPARE, values))
         self._items.write_verified(values, step)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from commissioner.errors import DriveFault
+from commissioner.link.drive.foreign import Watched
 from commissioner.link.wire.port import Port, Words
 from commissioner.registers.codec import Value, decode_span, encode_item, encode_span
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
@@ -16,6 +17,7 @@ class Items:
     def __init__(self, port: Port, profile: DriveProfile) -> None:
         self.port = port
         self.profile = profile
+        self.watched = Watched(profile)
 
     def read(self, names: Iterable[str]) -> dict[str, Value]:
         """The named items' values; items the drive file does not describe are left out."""
@@ -32,13 +34,13 @@ class Items:
     def write(self, values: Mapping[str, Value]) -> None:
         """Write without looking: for commands, whose effect is seen in the status."""
         for span in self._spans(values):
-            self.port.write(span.address, encode_span(span, values))
+            self._write(span, values)
 
     def write_verified(self, values: Mapping[str, Value], step: str) -> None:
         """Write and read back. DriveFault: the drive acknowledged and holds something else."""
         spans = self._spans(values)
         for span in spans:
-            self.port.write(span.address, encode_span(span, values))
+            self._write(span, values)
         for span in spans:
             self._compare(span, self.port.read(span.address, span.count), values, step)
 
@@ -47,12 +49,21 @@ class Items:
         for span in self._spans(values):
             words = encode_span(span, values)
             seen = self.port.exchange(span.address, words, span.address, span.count)
+            self.watched.wrote(span, values)
             self._compare(span, seen, values, step)
 
     def same_words(self, name: str, first: Value, second: Value) -> bool:
         """True where both values are the same in the drive's own resolution."""
         item = self.profile.item(name)
         return encode_item(item, first) == encode_item(item, second)
+
+    def _write(self, span: Span, values: Mapping[str, Value]) -> None:
+        try:
+            self.port.write(span.address, encode_span(span, values))
+        except BaseException:  # it may have arrived all the same
+            self.watched.look_again()
+            raise
+        self.watched.wrote(span, values)
 
     def _spans(self, values: Mapping[str, Value]) -> tuple[Span, ...]:
         items = [self.profile.item(name) for name in values]

@@ -41,6 +41,7 @@ STATUS_ITEMS = (
     "overruns",
     "test_time_left_s",
     "present_bias_v",
+    "settings_count",
 )
 NAMEPLATE_ITEMS = (
     "rated_power_w",
@@ -96,6 +97,7 @@ def read_status(items: Items) -> DriveStatus:
         test_time_left_s=_real(seen, "test_time_left_s"),
         samples_produced=_whole(seen, "samples_produced"),
         overruns=_whole(seen, "overruns"),
+        settings_count=_whole(seen, "settings_count") if "settings_count" in seen else None,
     )
 
 

@@ -34,7 +34,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
 
     `lag_deg`: the order of the channels is known to be that of this lag of the currents.
     """
-    findings: list[Finding] = []
+    findings = [Finding(note.code, "note", note.what) for note in recording.notes]
     recording, exchanged = columns.sort_by_kind(recording, plate)
     recording, completed = columns.complete(recording)
     findings += [Finding(*entry) for entry in (*exchanged, *completed)]

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from commissioner.monitor.intake.channels import Entry
+from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
 
@@ -68,6 +69,11 @@ def _is_clear(size: Signal, voltages: tuple[int, ...]) -> bool:
     return bool(v and i and (min(v) > APART * max(i) or min(i) > APART * max(v)))
 
 
+def _is_computed(group: list[Signal], kind: str, line_to_line: bool) -> bool:
+    """Whether the third only repeats the other two; phase voltages of a balanced system do so by themselves."""
+    return (kind == "current" or line_to_line) and is_negative_sum(group[0], group[1], group[2])
+
+
 def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]]:
     """A recording of two currents, or of two line-to-line voltages, with the third as minus their sum; else as it is.
 
@@ -76,7 +82,19 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]
     entries: list[Entry] = []
     groups = [list(recording.currents_a), list(recording.voltages_v)]
     for group, kind in zip(groups, ("current", "voltage"), strict=True):
-        absent = [k for k, signal in enumerate(group) if not np.any(np.nan_to_num(signal))]
+        if is_computed := _is_computed(group, kind, recording.voltages_are_line_to_line):
+            group[2] = -(group[0] + group[1])
+            entries.append(
+                (
+                    f"computed_{kind}",
+                    "note",
+                    f"third {kind} computed from two: not used as a sensor",
+                    3,
+                    2,
+                    f"record all three {kind}s",
+                )
+            )
+        absent = [] if is_computed else [k for k, signal in enumerate(group) if not np.any(np.nan_to_num(signal))]
         if len(absent) != 1 or (kind == "voltage" and not recording.voltages_are_line_to_line):
             continue
         k = absent[0]

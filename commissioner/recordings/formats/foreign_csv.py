@@ -1,155 +1,152 @@
-"""Other people's CSV: any of comma, semicolon, tab, space; decimal commas; preface lines; a row of units."""
+"""Other people's CSV: any of comma, semicolon, tab, space; decimal commas; preface lines; a row of units; any encoding."""
 
 from __future__ import annotations
 
-import csv
-import gzip
 import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
-from commissioner.recordings.units import UNIT, scale_of, unit_in
-from commissioner.records import Signal
+from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to_numbers
+from commissioner.recordings.reading.encoding import decode
+from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
+from commissioner.recordings.reading.preface import Clock, clock_in, metadata_of, pairs
+from commissioner.records import ReadingNote, Signal
 
-MAX_PREFACE_LINES = 200
-HEAD_BYTES = 65536
+MOST_FOOTER_ROWS = 20
+SAMPLED_ROWS = 200
 
 
-def read_text(path: Path) -> str:
+@dataclass(frozen=True)
+class RawTable:
+    """A text's columns as numbers in the file's own units, by their place; `clock` is what its preface says of time."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: tuple[Signal, ...]
+    metadata: dict[str, str]
+    clock: Clock
+    notes: tuple[ReadingNote, ...]
+
+
+def read_text(path: Path) -> tuple[str, str]:
+    """(text, encoding) of a file within its limits; DataRefused where it cannot be unpacked."""
     try:
         data = bounded_text(path, MAX_FOREIGN_BYTES)
     except (OSError, EOFError, zlib.error) as error:
         raise _unreadable(path, str(error)) from error
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
-        try:
-            return data.decode(encoding)
-        except UnicodeDecodeError:
+    return decode(data)
+
+
+def parse_csv(text: str, encoding: str, source: str) -> RawTable:
+    """The columns of a text with what stands above them. DataRefused: no rows of numbers, or numbers that are ambiguous."""
+    layout = layout_of(text, source)
+    if layout.is_split:
+        raise DataRefused(
+            f"{source}: its rows hold twice as many cells as names: decimal commas between commas", step="read numbers",
+            value=f"{len(layout.names)} cells", limit="one cell for each name",
+            remedy="export again with decimal points, or with semicolons between the columns",
+        )  # fmt: skip
+    body = text[layout.start :]
+    marks = marks_of(_sample(body, layout), layout.separator, source)
+    columns, notes = _columns(body, layout, marks, source)
+    said = pairs(layout.preface)
+    if encoding not in ("UTF-8", "Latin-1", "Windows-1252"):
+        notes.append(ReadingNote("encoding", f"the text is in {encoding}"))
+    names, units, clock = _start_and_increment(layout, clock_in(said))
+    return RawTable(names, units, tuple(columns), dict(metadata_of(said)), clock, tuple(notes))
+
+
+def _sample(body: str, layout: Layout) -> list[str]:
+    rows = [split(line.text, layout.separator) for line in head_lines(body[: 1 << 17])[:SAMPLED_ROWS]]
+    return [cell for row in rows for cell in row[layout.skip :]]
+
+
+def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list[Signal], list[ReadingNote]]:
+    wrong_rows: list[tuple[int | None, int, str]] = []
+
+    def keep(row: pa_csv.InvalidRow) -> str:
+        wrong_rows.append((row.number, row.actual_columns, row.text or ""))
+        return "skip"
+
+    width = len(layout.names) + layout.skip
+    table = _parsed(_even(body, layout, width), layout, width, keep, source)
+    columns, rows = [], table.num_rows
+    bad = np.zeros(rows, dtype=np.int64)
+    for column in table.columns[layout.skip :]:
+        values, _ = to_numbers(column, marks)
+        columns.append(values)
+        bad += np.isfinite(values)
+    last = int(np.flatnonzero(bad)[-1]) + 1 if bad.any() else 0
+    notes = []
+    if wrong_rows:
+        _require_footer(wrong_rows, rows, source)
+        notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))
+    if rows - last > MOST_FOOTER_ROWS:
+        last = rows
+    return [c[:last] for c in columns], notes
+
+
+def _even(body: str, layout: Layout, width: int) -> str:
+    """Rows with as many cells as the widest: trailing separators come and go."""
+    if layout.separator == " ":
+        return "\n".join(" ".join(line.split()) for line in body.splitlines() if line.strip())
+    return body
+
+
+def _parsed(body: str, layout: Layout, width: int, keep: object, source: str) -> pa.Table:
+    names = [f"c{k}" for k in range(width)]
+    try:
+        return pa_csv.read_csv(
+            pa.BufferReader(body.encode("utf-8", errors="replace")),
+            read_options=pa_csv.ReadOptions(column_names=names, use_threads=False),
+            parse_options=pa_csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=keep),
+            convert_options=pa_csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string())),
+        )
+    except (pa.ArrowInvalid, pa.ArrowTypeError, OSError) as error:
+        raise DataRefused(
+            f"{source}: the rows are no table", step="read recording", value=str(error).splitlines()[0][:120],
+            limit=f"{width} cells in each row", remedy="export again, without footer lines",
+        ) from error  # fmt: skip
+
+
+def _require_footer(wrong: Sequence[tuple[int | None, int, str]], rows: int, source: str) -> None:
+    """Rows of another width may stand only behind the numbers: inside them they are lost samples or shifted cells."""
+    numbers = [n for n, _, text in wrong if n is not None]
+    holds_numbers = any(sum(map(is_number, text.replace(";", ",").split(","))) >= 2 for _, _, text in wrong)
+    if len(wrong) > MOST_FOOTER_ROWS or holds_numbers or (numbers and min(numbers) <= rows):
+        number, cells, _ = wrong[0]
+        raise DataRefused(
+            f"{source}: a row holds {cells} columns", step="read recording",
+            value=f"row {number}" if number is not None else cells, limit="as many as the first row of numbers",
+            remedy="export again, without footer lines",
+        )  # fmt: skip
+
+
+def _start_and_increment(layout: Layout, clock: Clock) -> tuple[tuple[str, ...], tuple[str, ...], Clock]:
+    """Rigol's and its kind: `Start` and `Increment` are columns by name, their values stand in the row of units."""
+    start, step = clock.start_s, clock.interval_s
+    names = list(layout.names)
+    for k, (name, unit) in enumerate(zip(layout.names, layout.units, strict=True)):
+        cell = name.lower().replace(" ", "")
+        value = unit if is_number(unit) else cell.partition("=")[2]
+        if not is_number(value):
             continue
-    raise _unreadable(path, "the text encoding is not known")
-
-
-def has_other_separators(path: Path) -> bool:
-    """Whether the names stand between semicolons or tabs, or in UTF-16. Of any other file False, whatever is wrong with it."""
-    opener = gzip.open if path.suffix == ".gz" else open
-    try:
-        with opener(path, "rb") as file:
-            head = file.read(HEAD_BYTES)
-    except (OSError, EOFError, zlib.error):
-        return False
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return True
-    if path.suffix == ".parquet" or b"\0" in head:
-        return False
-    names = next((line for line in head.splitlines() if line and not line.startswith(b"#")), b"")
-    return b";" in names or b"\t" in names
-
-
-def parse_csv(text: str, source: str) -> tuple[dict[str, Signal], dict[str, float | str]]:
-    """Columns by their header (with the unit row's scale applied) and `key: value` lines of the preface."""
-    lines = text.splitlines()
-    separator, first = _layout(lines, source)
-    comma = separator != "," and _has_decimal_commas(lines[first : first + 50])
-    header, units = _header(lines, first, separator)
-    values = _numbers(lines[first:], separator, comma, len(header), source)
-    scales = [scale_of(unit) for unit in units]
-    columns = {name: values[:, k] * scales[k] for k, name in enumerate(header) if name}
-    return columns, _preface(lines[:first])
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    """None where a cell is longer than any number or name."""
-    try:
-        return next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:
-        return []
-
-
-def _layout(lines: list[str], source: str) -> tuple[str, int]:
-    """The separator, and the first of at least three lines that hold the same number (2 or more) of numbers."""
-    for start in range(min(MAX_PREFACE_LINES, len(lines))):
-        for separator in (";", "\t", ",", " "):
-            counts = [_count_numbers(line, separator) for line in lines[start : start + 3]]
-            if len(counts) == 3 and min(counts) == max(counts) >= 2:
-                return separator, start
-    raise DataRefused(
-        f"{source}: no rows of numbers were found",
-        step="read recording",
-        value=lines[0][:60] if lines else "",
-        limit="two or more columns of numbers",
-        remedy="export time, three currents and three voltages as CSV",
-    )
-
-
-def _count_numbers(line: str, separator: str) -> int:
-    """Number of cells if every filled cell is a number, else 0."""
-    cells = [cell.strip() for cell in _cells(line, separator)]
-    filled = [cell for cell in cells if cell]
-    if not filled or not all(_is_number(cell, separator != ",") for cell in filled):
-        return 0
-    return len(cells) if separator != " " else len(filled)
-
-
-def _is_number(cell: str, commas: bool) -> bool:
-    try:
-        float(cell.replace(",", ".") if commas else cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _has_decimal_commas(lines: list[str]) -> bool:
-    return any("," in line for line in lines)
-
-
-def _header(lines: list[str], first: int, separator: str) -> tuple[list[str], list[str]]:
-    """Column names and their units: from the row above the numbers, and the one above it where that one holds units."""
-    width = len(_cells(lines[first], separator))
-    above = [_cells(line, separator) for line in lines[max(0, first - 2) : first]]
-    above = [[cell.strip().lstrip("#").strip() for cell in row] for row in above if len(row) == width]
-    if not above:
-        return [f"column_{k}" for k in range(width)], [""] * width
-    if len(above) == 2 and all(not cell or UNIT.match(cell) for cell in above[1]):
-        return above[0], above[1]
-    return above[-1], [unit_in(name) for name in above[-1]]
-
-
-def _numbers(lines: list[str], separator: str, comma: bool, width: int, source: str) -> Signal:
-    rows = []
-    for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        cells = line.replace(",", ".").split(separator) if comma else line.split(separator)
-        cells = [cell.strip() for cell in cells] if separator != " " else line.split()
-        if len(cells) < width:
-            raise DataRefused(
-                f"{source}: row {number} holds {len(cells)} columns",
-                step="read recording",
-                value=len(cells),
-                limit=width,
-                remedy="export again, without footer lines",
-            )
-        rows.append([float(cell) if _is_number(cell, False) else np.nan for cell in cells[:width]])
-    return np.array(rows, dtype=np.float64)
-
-
-def _preface(lines: list[str]) -> dict[str, float | str]:
-    metadata: dict[str, float | str] = {}
-    for line in lines:
-        key, mark, value = line.lstrip("#").partition(":")
-        if mark and value.strip() and len(key) < 60:
-            cleaned = value.strip().strip(";,\t")
-            metadata[key.strip()] = float(cleaned) if _is_number(cleaned, False) else cleaned
-    return metadata
+        if cell.partition("=")[0] in {"start", "t0"}:
+            start, names[k] = float(value), ""
+        elif cell.partition("=")[0] in {"increment", "tinc", "dt"}:
+            step, names[k] = float(value), ""
+    return tuple(names), layout.units, Clock(step, start, clock.said_by or ("Start and Increment" if step else ""))
 
 
 def _unreadable(path: Path, reason: str) -> DataRefused:
     return DataRefused(
-        f"{path}: the file cannot be read",
-        step="read recording",
-        value=reason,
-        limit="CSV, CSV.gz, Parquet, MATLAB v5",
+        f"{path}: the file cannot be read", step="read recording", value=reason, limit="CSV, CSV.gz, Parquet, MATLAB v5",
         remedy="export the recording again, as CSV or Parquet",
-    )
+    )  # fmt: skip

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
 
 import numpy as np
 
+from commissioner.diagnose.contract import UncertainName
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.verdict.collinearity import Alike, look_alikes
 from commissioner.diagnose.verdict.experiment import what_decides
@@ -17,7 +17,7 @@ SAME_FORM = 0.96
 """From this share on one cause makes the error of another, and only another test tells the two apart."""
 
 
-def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[dict[str, Any]]:
+def uncertain(seen: Diagnosis, withdrawn: Collection[str] = ()) -> list[UncertainName]:
     """`name`, `why` the name is uncertain, what `decides` it, and whether it `is_seen` (or could only hide); those that moved the fit first.
 
     `withdrawn`: accepted during the search and taken out again.

@@ -26,7 +26,7 @@ UNFINISHED, HIDDEN = "The time allowed was over", "Helps the fit, but"
 """How the remarks begin that are said in the headline, and in the block of uncertain names."""
 MOST_OF_LINK = 0.04
 """Share of the link voltage that a leg usually loses at most: 4 µs of dead time at 8 kHz and a volt or two of the switches."""
-LEGS_ALIKE = 0.25
+EQUAL_LEGS = 0.25
 """Of the mean of the three, by which a leg may differ before somebody should look at it."""
 GO_ON = "commissioner diagnose recording.csv --out diagnosis"
 
@@ -89,7 +89,7 @@ def _how_normal(cause: Cause, document: Document) -> str:
     if not plain_of(cause).is_normal:
         return ""
     if members(cause) & TOGETHER:
-        if (apart := _legs_apart(cause)) > LEGS_ALIKE:
+        if (apart := _legs_apart(cause)) > EQUAL_LEGS:
             return f" Its legs should lose alike; one is {percent(apart)} off their mean: check its gate driver and the compensation."
         link = document.get("dc_link_v")
         lost = cause["parameters"].get("voltage_v", {}).get("value")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from commissioner.monitor.chain import Observation
@@ -30,7 +30,7 @@ def page_of(
     indicators: Sequence[Indicator],
     verdict: Verdict | None,
     history: History | None,
-    document: dict[str, Any],
+    document: Mapping[str, Any],
     name: str,
 ) -> Page:
     """One self-contained page; all figures inline."""
@@ -124,7 +124,7 @@ def _shaft(seen: Observation) -> Section:
     )
 
 
-def _proof(seen: Observation, document: dict[str, Any]) -> Section:
+def _proof(seen: Observation, document: Mapping[str, Any]) -> Section:
     parts: list[Any] = [
         picture(
             figures.resimulation(seen),
@@ -198,7 +198,7 @@ def _trend(verdict: Verdict, history: History, seen: Observation, indicators: Se
     )
 
 
-def _motor(seen: Observation, document: dict[str, Any]) -> Section:
+def _motor(seen: Observation, document: Mapping[str, Any]) -> Section:
     parameters = document["parameters"]
     return Section(
         "The motor as it runs now",

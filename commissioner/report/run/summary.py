@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
 from commissioner.procedure.verdict import PARAMETERS
+from commissioner.report.run.contract import RunDocument, WrittenRow
 
 
-def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Mapping[str, str]) -> dict[str, Any]:
+def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Mapping[str, str]) -> RunDocument:
     """What `run --json` prints and `result.json` holds. `parameter_names`: the drive's name -> the contract's."""
     identification = findings.identification
     document: dict[str, Any] = {
@@ -38,7 +39,7 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "acted": findings.guard_acted,
         "limit_wb": findings.flux_limit_wb,
     }
-    return document
+    return cast("RunDocument", document)
 
 
 def finding_sentences(result: Mapping[str, Any]) -> list[str]:
@@ -88,7 +89,7 @@ def _before(findings: Findings, names: Mapping[str, str]) -> Mapping[str, float]
     return by_field
 
 
-def _written(findings: Findings, names: Mapping[str, str]) -> list[dict[str, Any]]:
+def _written(findings: Findings, names: Mapping[str, str]) -> list[WrittenRow]:
     return [
         {
             "name": row.name,

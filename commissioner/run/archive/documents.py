@@ -1,40 +1,13 @@
-"""The JSON of a run folder: records as plain types, documents read with care, and what is raised where they are not whole."""
+"""The JSON of a run folder: documents read with care, and what is raised where they are not whole."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
 import os
-from collections.abc import Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from commissioner.errors import CommissionerError, DataRefused
-
-
-def plain(value: Any) -> Any:
-    """A record as JSON types; arrays become lists, NaN and infinity become null."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if hasattr(value, "_asdict"):
-        return plain(value._asdict())
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if isinstance(value, str | int | bool | None) else str(value)
 
 
 def read_document(text: str) -> dict[str, Any]:

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from commissioner.run.archive.documents import open_no_link, plain, read_document
+from commissioner.encoding import plain
+from commissioner.run.archive.documents import open_no_link, read_document
 
 FIRST = 64 * "0"
 """What stands for the digest of the line before the first."""

@@ -6,12 +6,13 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from commissioner.encoding import plain
 from commissioner.procedure.findings import RunEnded
 from commissioner.report.page import with_notice
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import summarise
 from commissioner.run.archive.catalogue import RunSummary
-from commissioner.run.archive.folder import RunFolder, plain, read_journal
+from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.replay import learn_again
 
 

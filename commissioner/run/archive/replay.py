@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
@@ -21,7 +22,7 @@ from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, 
 from commissioner.report.run.summary import summarise
 from commissioner.run.acting import Announcer
 from commissioner.run.archive.blocks import BlockDamage, read_blocks
-from commissioner.run.archive.documents import damaged, plain, read_saved
+from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.journal import read_journal
 from commissioner.run.runner import JUDGED_REPLIES, kind_of
 from commissioner.safety import commands as ask

@@ -46,7 +46,8 @@ typedef struct {
     uint16_t fault, trip_cause;
     float trip_value, trip_limit;
     uint16_t session, last_control, heartbeat_echo;
-    uint32_t fed_at_ms;
+    uint32_t fed_at_ms, claimed_at_ms;
+    uint16_t settings_count;
     float trip_current_a, largest_current_a;
     cm_excitation excitation;
     cm_ring ring;
@@ -75,6 +76,10 @@ bool cm_next_voltage(cm_excitation *excitation, float *volts); /* false: the exc
 void cm_start_ring(cm_drive *drive);                       /* cm_ring.c */
 void cm_add_sample(cm_ring *ring, int16_t voltage, const int16_t currents[3], uint8_t flags);
 void cm_build_window(cm_drive *drive, uint16_t registers);
+bool cm_admits(const cm_drive *drive, uint32_t token);     /* cm_claim.c */
+void cm_renew_claim(cm_drive *drive);
+void cm_refresh_claim(cm_drive *drive);
+void cm_count_change(cm_drive *drive, uint16_t address, uint16_t count, const uint16_t *words);
 void cm_load_parameters(cm_drive *drive);                  /* cm_parameters.c */
 void cm_begin_commit(cm_drive *drive);
 void cm_begin_store(cm_drive *drive);

@@ -70,8 +70,10 @@ static uint16_t judge_staged(const cm_drive *drive)
 static void finish_commit(cm_drive *drive)
 {
     uint16_t result = drive->state == CM_ENABLED ? CM_NOT_STOPPED : judge_staged(drive);
-    if (result == CM_DONE)
+    if (result == CM_DONE) {
+        cm_count_change(drive, CM_IN_USE, 2 * CM_PARAMETERS, &drive->image[CM_STAGED]);
         memcpy(&drive->image[CM_IN_USE], &drive->image[CM_STAGED], 2 * CM_PARAMETERS * sizeof(uint16_t));
+    }
     drive->image[CM_COMMIT] = 0;
     drive->commit_result = result;
 }
@@ -86,8 +88,11 @@ static void finish_store(cm_drive *drive)
         next.store_count++;
         result = save(&next) ? CM_DONE : CM_STORE_FAILED;
     }
-    if (result == CM_DONE)
+    if (result == CM_DONE) {
+        if (memcmp(next.parameters, drive->memory.parameters, sizeof next.parameters) != 0)
+            drive->settings_count++;
         drive->memory = next;
+    }
     drive->image[CM_STORE] = 0;
     drive->store_result = result;
 }

@@ -48,6 +48,8 @@ static uint16_t examine(const cm_drive *drive, uint16_t address, uint16_t count,
     for (uint16_t k = 0; k < used; k = (uint16_t)(k + each))
         if (!is_allowed(item, &words[k]))
             return 0;
+    if (item->address == CM_OWNER_TOKEN && !cm_admits(drive, cm_get_u32(words)))
+        return 0; /* somebody else holds the drive */
     *answer = CM_OK;
     return used;
 }
@@ -57,6 +59,8 @@ static void act(cm_drive *drive, const cm_item *item)
     uint16_t word = drive->image[item->address];
     if (item->address == CM_HEARTBEAT)
         cm_feed(drive, word);
+    else if (item->address == CM_OWNER_TOKEN)
+        cm_renew_claim(drive);
     else if (item->address == CM_MODE && word != 1 && drive->state == CM_ENABLED)
         cm_leave(drive, CM_SWITCH_ON_DISABLED);
     else if (item->address == CM_COMMIT && word == CM_COMMIT_WORD)
@@ -80,6 +84,7 @@ cm_answer cm_write(cm_drive *drive, uint16_t address, uint16_t count, const uint
             return answer;
         k += used;
     }
+    cm_count_change(drive, address, count, words);
     memcpy(&drive->image[address], words, count * sizeof *words);
     for (int k = 0; k < cm_item_count; k++) {
         const cm_item *item = &cm_items[k];

@@ -56,6 +56,7 @@ void cm_feed(cm_drive *drive, uint16_t heartbeat)
         return;
     drive->heartbeat_echo = heartbeat;
     drive->fed_at_ms = cm_port_milliseconds();
+    cm_renew_claim(drive);
 }
 
 static bool is_too_hot(void)

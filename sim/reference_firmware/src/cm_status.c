@@ -87,6 +87,7 @@ void cm_refresh(cm_drive *drive)
     cm_put_f32(&image[CM_HEATSINK], cm_port_heatsink_degc());
     cm_put_f32(&image[CM_WINDING], cm_port_winding_degc());
     cm_put_f32(&image[CM_SHAFT_SPEED], cm_port_shaft_speed_rad_per_s());
+    cm_refresh_claim(drive);
     refresh_test(drive, image);
     refresh_parameters(drive, image);
     cm_port_unlock();

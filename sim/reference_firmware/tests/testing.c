@@ -3,7 +3,7 @@
 int checks_made, checks_failed;
 cm_drive drive;
 
-void test_map(void);
+void test_map(void), test_claim(void);
 void test_registers(void);
 void test_excitation(void);
 void test_ring(void);
@@ -117,6 +117,7 @@ int main(void)
 {
     test_map();
     test_registers();
+    test_claim();
     test_excitation();
     test_ring();
     test_states();

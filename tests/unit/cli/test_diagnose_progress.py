@@ -1,4 +1,4 @@
-"""The search's own lines become words; what was named and taken back is remembered."""
+"""The search's own lines become words."""
 
 from commissioner.cli.screens.diagnosis_progress import Progress
 
@@ -11,14 +11,3 @@ def test_the_searchs_arithmetic_becomes_words():
     assert told.translated("accepted dead_time: 1.145 times the noise") == "dead time helps"
     assert told.translated("  instead of iron_loss sensor_lag: gained 3 more") == ""
     assert told.translated("round 3: chi2 12.0") == ""
-
-
-def test_what_was_named_and_taken_back_is_remembered():
-    told = Progress(is_quiet=True)
-    for line in (
-        "accepted dead_time: 2 times the noise",
-        "accepted remanence: 1 times the noise",
-        "  dropped remanence",
-    ):
-        told(line)
-    assert told.withdrawn({"dead_time"}) == ["remanence"]

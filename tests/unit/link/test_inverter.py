@@ -6,6 +6,7 @@ import pytest
 from commissioner.errors import (
     CheckFailed,
     DriveFault,
+    ForeignMaster,
     IdentityMismatch,
     LinkUnreachable,
     ReplyMismatch,
@@ -213,8 +214,6 @@ def slow_link(drive):
     [
         (open_interlock, "interlock sto_released is open"),
         (present_fault, "the drive reports: earth fault"),
-        (lost_watchdog, "watchdog_ms has changed"),
-        (other_limit, "current_limit_a has changed"),
         (already_on, "energised already"),
         (slow_link, "outlast the watchdog"),
     ],
@@ -233,6 +232,24 @@ def test_a_drive_that_was_not_set_up_is_not_energised(bench):
     bench.inverter.set_watchdog(500)
     with pytest.raises(CheckFailed, match="not set up"):
         bench.inverter.enable()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "what"),
+    [(lost_watchdog, "watchdog_ms from 500 to 0"), (other_limit, "current_limit_a from 8 to 50")],
+)
+@pytest.mark.parametrize("counts", [True, False])
+def test_another_master_is_named_with_what_it_changed_before_anything_is_energised(bench, spoil, what, counts):
+    bench.set_up()
+    bench.inverter.read_status()
+    spoil(bench.drive)
+    if counts:
+        bench.drive.put("settings_count", bench.drive.get("settings_count") + 1)
+    else:
+        bench.inverter._items.watched.look_again()
+    with pytest.raises(ForeignMaster, match=f"another master wrote to the drive: it changed {what}"):
+        bench.inverter.enable()
+    assert bench.drive.written("control_word") == []
 
 
 def test_a_drive_that_does_not_follow_is_a_fault_within_the_deadline(bench):

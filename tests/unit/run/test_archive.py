@@ -6,10 +6,11 @@ import stat
 import numpy as np
 import pytest
 
+from commissioner.encoding import plain
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import summarise
-from commissioner.run.archive.folder import RunFolder, plain, read_blocks, read_journal, write_recording
+from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal, write_recording
 
 
 def _block(first: int, count: int = 29, *, lost: int = 0, with_w: bool = True) -> SampleBlock:

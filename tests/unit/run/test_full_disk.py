@@ -11,9 +11,11 @@ import pytest
 from commissioner.errors import WriteBackFailed
 from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.url import parse_url
 from commissioner.procedure.findings import RunEnded
 from commissioner.run import commission
 from commissioner.run.archive.folder import RunFolder
+from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety import commands as ask
@@ -110,7 +112,8 @@ def test_a_disk_that_fills_up_before_the_first_command_or_as_the_link_fails_ends
     drive = ScriptedDrive()
     if full_at == "job":
         monkeypatch.setattr(commission, "open_drive", lambda *_: nullcontext(drive))
-    ended = commission.carry_out(order, folder, None, lambda record: None, None, "job", OperatorStop())
+    with DriveLock.take(parse_url(order.url), order.profile, "run") as lock:
+        ended = commission.carry_out(order, folder, None, lambda record: None, None, "job", OperatorStop(), lock)
     assert ended.outcome == "faulted"
     assert not [name for name, _ in drive.log if name == "write"]
     if full_at == "job":

@@ -15,6 +15,8 @@ from commissioner.records import SampleBlock
 from commissioner.run import restore as restoring
 from commissioner.run.archive.catalogue import summarise
 from commissioner.run.archive.folder import RunFolder, read_blocks
+from commissioner.settings import load_motor
+from tests.support.chained import rechain
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")
@@ -35,7 +37,8 @@ class Bench:
         monkeypatch.setattr(restoring, "open_port", lambda *_, **__: self.drive)
         self.inverter = Inverter(self.drive, PROFILE, lambda i: self.folder.journal("about_to", i))
         self.snapshot = self.inverter.snapshot()
-        self.folder.save("request.json", {"url": "tcp://127.0.0.1:1", "profile": "simulated"})
+        plate = load_motor("motor_2kw2")
+        self.folder.save("request.json", {"url": "tcp://127.0.0.1:1", "profile": "simulated", "nameplate": plate})
         self.folder.save("snapshot.json", self.snapshot)
         self.folder.journal("reply", {"command": "TakeSnapshot", "reply": self.snapshot})
 
@@ -88,6 +91,43 @@ def test_a_changed_snapshot_is_refused_by_its_key(bench, change, names):
     assert bench.held() == held
 
 
+def forge(bench, name, value):
+    """Snapshot and journal agree on the value."""
+    bench.edit(lambda d: [d[which].update({name: value}) for which in ("in_use", "stored")])
+
+    def change(line):
+        if line["kind"] == "reply":
+            for which in ("in_use", "stored"):
+                line["record"]["reply"][which][name] = value
+        return line
+
+    return change
+
+
+@pytest.mark.parametrize(("name", "value"), [("stator_resistance", 42.0), ("magnetizing_inductance", 9.0)])
+def test_a_value_that_no_motor_of_the_plate_has_is_refused_whatever_the_chain_says(bench, name, value):
+    bench.write()
+    held = bench.held()
+    rechain(bench.folder.path / "journal.jsonl", forge(bench, name, value))
+    with pytest.raises(DataRefused, match=rf"snapshot\.json holds a {name} that no motor of this plate has") as caught:
+        bench.restore()
+    assert f"in_use.{name} = {value:g}" in caught.value.value and "..." in caught.value.limit
+    assert bench.held() == held
+
+
+def test_a_likely_value_put_into_snapshot_and_journal_is_refused_by_the_chain(bench):
+    bench.write()
+    held = bench.held()
+    change = forge(bench, "stator_resistance", 2.9)
+    path = bench.folder.path / "journal.jsonl"
+    lines = [change(json.loads(line)) for line in path.read_text().splitlines()]
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(DataRefused, match=r"journal\.jsonl is not as the run left it") as caught:
+        bench.restore()
+    assert "was changed" in caught.value.value
+    assert bench.held() == held
+
+
 def test_an_incomplete_snapshot_is_refused_also_where_the_journal_has_no_copy(bench):
     path = bench.folder.path / "journal.jsonl"
     path.write_text("")
@@ -121,11 +161,13 @@ def test_any_mixture_of_old_and_announced_values_is_taken_back(bench, new):
 def test_a_set_that_lay_staged_before_the_run_is_known_by_its_check_sum(bench):
     bench.write()
     path = bench.folder.path / "journal.jsonl"
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    for line in lines:
+
+    def only_the_check_sum(line):
         if line["kind"] == "about_to" and line["record"]["action"] == "stage":
             line["record"]["values"] = {"staged_crc": line["record"]["values"]["staged_crc"]}
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        return line
+
+    rechain(path, only_the_check_sum)
     bench.restore()
     assert bench.held() == bench.snapshot.in_use
 

@@ -1,4 +1,4 @@
-"""`commissioner restore` and `commissioner replay`: what an archived run is good for afterwards."""
+"""`commissioner restore`, `write` and `replay`: what an archived run is good for afterwards."""
 
 from __future__ import annotations
 
@@ -6,19 +6,9 @@ from pathlib import Path
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
-from commissioner.run.archive.catalogue import find_run
-from commissioner.run.archive.late_report import mark_restored
-from commissioner.run.archive.replay import replay
-from commissioner.run.archive.verify import refuse_damage, verify
-from commissioner.run.restore import restore
-from commissioner.run.write_accepted import (
-    Plan,
-    as_document,
-    check_token,
-    plan_restore,
-    plan_write_back,
-    write_accepted,
-)
+from commissioner.operations import archive, write
+from commissioner.run.archive.seal import read_key
+from commissioner.run.write_accepted import Plan, as_document
 
 
 def restore_run(
@@ -33,23 +23,16 @@ def restore_run(
     seal: Path | None = None,
 ) -> None:
     """Write the run's snapshot back, after asking. `plan`: only show what would change; `token`: only if that still holds."""
-    summary = find_run(runs, run)
-    if plan or token is not None:
-        shown = plan_restore(summary, drive)
-        if plan:
-            _show_plan(shown, as_json=as_json)
-            return
-        check_token(shown, token or "")
+    request = write.RunRequest(runs, run, drive)
+    if plan:
+        _show_plan(write.planned_restore(request), as_json=as_json)
+        return
     screen.require_yes(yes, as_json=as_json)
     if not yes:
-        screen.out.print(
-            f"The parameters that [bold]{summary.run}[/] found in {summary.drive} will be written into the drive and "
-            "stored. Make sure that it is the same drive."
-        )
+        _show_plan(write.planned_restore(request), as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
     with screen.busy("writing and reading back"):
-        done = restore(summary, drive)
-    mark_restored(summary)
+        done = write.restore(request, token, key=read_key(seal) if seal is not None else None)
     if as_json:
         screen.emit({"outcome": "restored", "reason": f"snapshot written, {screen.kept(done.is_stored)}"} | vars(done))
         return
@@ -69,8 +52,8 @@ def write_run(
     runs: Path, run: str, drive: str | None, *, yes: bool, as_json: bool, plan: bool = False, token: str | None = None
 ) -> None:
     """An accepted result into the drive, after the table was shown and agreed to."""
-    summary = find_run(runs, run)
-    shown = plan_write_back(summary, drive)
+    request = write.RunRequest(runs, run, drive)
+    shown = write.planned_write(request)
     if plan:
         _show_plan(shown, as_json=as_json)
         return
@@ -78,14 +61,15 @@ def write_run(
     if not yes:
         _show_plan(shown, as_json=False)
         screen.confirm("Write?", otherwise="nothing was written")
-    done = write_accepted(summary, drive, shown.token if token is None else token)
+    done = write.write_run(request, shown.token if token is None else token)
+    report = done.report
     if as_json:
-        reason = f"{len(done.written)} values written, {screen.kept(done.is_stored)}"
-        screen.emit({"outcome": "written", "reason": reason, "run": summary.run, "report": done})
+        reason = f"{len(report.written)} values written, {screen.kept(report.is_stored)}"
+        screen.emit({"outcome": "written", "reason": reason} | vars(done))
         return
-    screen.out.print(f"[green]{len(done.written)} parameters written, {screen.kept(done.is_stored)}[/]")
-    if done.wear_fraction is not None:
-        screen.out.print(screen.wear(done.store_count_after, done.wear_fraction))
+    screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
+    if report.wear_fraction is not None:
+        screen.out.print(screen.wear(report.store_count_after, report.wear_fraction))
 
 
 def _show_plan(plan: Plan, *, as_json: bool) -> None:
@@ -101,22 +85,16 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
 def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:
     """Decide the run again from its archive; exit 3 where the folder is not as the run left it, or a decision comes out
     otherwise."""
-    summary = find_run(runs, run)
-    folder = Path(summary.folder)
-    verified = verify(folder)
-    if not salvage:
-        refuse_damage(folder, verified, "replay")
     with screen.busy("deciding again"):
-        done = replay(folder, salvage=not verified.is_whole)
+        done, verified = archive.replay_run(runs, run, salvage=salvage)
     if as_json:
-        screen.emit({"run": summary.run, "decisions": done.decisions, "identical": done.is_identical,
-                     "difference": done.difference, "state": verified.state, "losses": verified.losses})  # fmt: skip
-        if not done.is_identical:
+        screen.emit(done)
+        if not done.identical:
             raise SystemExit(DataRefused.exit_code)
         return
     if done.difference is not None:
         raise DataRefused(
-            f"decision {done.difference.number} of {summary.run} comes out otherwise", step="replay",
+            f"decision {done.difference.number} of {done.run} comes out otherwise", step="replay",
             value=done.difference.replayed, limit=done.difference.archived,
             remedy="the run was made by another version of commissioner, or its folder was changed",
         )  # fmt: skip

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.errors import CommissionerError, DataRefused, UsageError
-from commissioner.run.archive.catalogue import find_folder, run_folders
+from commissioner.errors import DataRefused, UsageError
+from commissioner.operations import archive
 from commissioner.run.archive.seal import read_key
-from commissioner.run.archive.verify import DAMAGED, Loss, Verified, verify
+from commissioner.run.archive.verify import DAMAGED, Verified
 
 _COLOURS = {"intact": "green", "unverified": "yellow", "cut off": "yellow", DAMAGED: "red"}
 
@@ -21,8 +21,7 @@ def verify_runs(runs: Path, run: str | None, *, everything: bool, seal: Path | N
             remedy=f"leave out {run!r} or --all",
         )  # fmt: skip
     key = read_key(seal) if seal is not None else None
-    folders = run_folders(runs) if everything else [find_folder(runs, run or "last")]
-    found = [verify_folder(folder, key) for folder in folders]
+    found = archive.verify_runs(runs, None if everything else run or "last", key)
     damaged = sum(not one.is_whole for one in found)
     if as_json:
         documents = [vars(one) | {"is_whole": one.is_whole} for one in found]
@@ -34,17 +33,6 @@ def verify_runs(runs: Path, run: str | None, *, everything: bool, seal: Path | N
             screen.out.print(f"no runs in {screen.text(runs)}/")
     if damaged:
         raise SystemExit(DataRefused.exit_code)
-
-
-def verify_folder(folder: Path, key: bytes | None) -> Verified:
-    """As `verify`; a folder that cannot be read at all is damaged, too."""
-    try:
-        return verify(folder, key)
-    except (CommissionerError, OSError) as error:
-        what = error.what if isinstance(error, CommissionerError) else str(error)
-        return Verified(
-            folder.name, DAMAGED, (Loss(folder.name, None, what),), "nothing that can be read", 0, 0, 0, 0, "none"
-        )
 
 
 def _print(one: Verified) -> None:

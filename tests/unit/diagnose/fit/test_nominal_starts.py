@@ -8,7 +8,7 @@ import pytest
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.plant.model import NO_DICTIONARY, Model
 from commissioner.diagnose.plant.prediction import predict
-from commissioner.diagnose.search.nominal import bare_layout, impedance_starts, is_astray
+from commissioner.diagnose.search.nominal import bare_layout, impedance_starts, is_outside_the_box
 from tests.unit.diagnose.conftest import recording
 
 LARGE = (0.4, 0.3, 0.008, 0.2)
@@ -39,4 +39,4 @@ def test_box_holds_the_machine_under_noise(seed):
 )  # fmt: skip
 def test_four_numbers_that_no_motor_has_are_astray(four, expected):
     layout = replace(NO_DICTIONARY, nominal_box=((0.007, 2.8), (0.007, 2.4), (2e-4, 0.04), (3e-3, 10.0)))
-    assert is_astray(Model(four), layout) is expected
+    assert is_outside_the_box(Model(four), layout) is expected

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from commissioner.diagnose.catalogue import CATALOGUE
-from commissioner.diagnose.fit.normal_equations import Trial, whiten
+from commissioner.diagnose.fit.normal_equations import NormalEquations, whiten
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.plant.prediction import predict
 
@@ -16,7 +16,7 @@ WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given
 
 def of_dead_time(setting, nominal, block=1):
     terms = CATALOGUE["dead_time"].terms(setting)
-    return terms, Trial(nominal.with_terms(terms), setting.record, setting.layout, terms, WHITE).normal(block)
+    return terms, NormalEquations(nominal.with_terms(terms), setting.record, setting.layout, terms, WHITE).normal(block)
 
 
 @pytest.mark.parametrize("share_lost", [0.0, 0.01])
@@ -33,7 +33,7 @@ def test_they_are_the_products_of_what_is_whitened(setting, nominal, share_lost)
     record = replace(setting.record, segments=segments)
     terms = CATALOGUE["dead_time"].terms(setting)
     model, noise = nominal.with_terms(terms), replace(WHITE, sigma_a=np.array([0.01, 0.02, 0.03]))
-    normal = Trial(model, record, setting.layout, terms, noise).normal()
+    normal = NormalEquations(model, record, setting.layout, terms, noise).normal()
     for k, segment in enumerate(segments):
         seen = predict(model, record, k, setting.layout, terms)
         rows, left = (
@@ -57,9 +57,9 @@ def test_no_second_copy_of_the_sensitivities_is_held(setting, nominal):
     record = setting.record.subset((0,))
     terms = CATALOGUE["dead_time"].terms(setting)
     model = nominal.with_terms(terms)
-    Trial(model, record, setting.layout, terms, WHITE).normal()
+    NormalEquations(model, record, setting.layout, terms, WHITE).normal()
     tracemalloc.start()
-    Trial(model, record, setting.layout, terms, WHITE).normal()
+    NormalEquations(model, record, setting.layout, terms, WHITE).normal()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     numbers, signals = 4 + len(terms), 60

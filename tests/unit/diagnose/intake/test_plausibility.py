@@ -10,7 +10,7 @@ from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.noise import measure_noise
 from commissioner.diagnose.plant.prediction import predict
-from commissioner.diagnose.verdict.lack_of_fit import leftover
+from commissioner.diagnose.verdict.lack_of_fit import lack_of_fit
 from tests.unit.diagnose.conftest import NOMINAL, PERIOD_S, recording
 
 
@@ -116,7 +116,7 @@ def test_a_weak_structure_around_the_tones_is_seen_and_noise_is_not(plain, setti
     layout = setting.layout
     r_s, r_r, l_sigma, l_m = nominal.nominal
     wrong = replace(nominal, nominal=(1.0013 * r_s, r_r, l_sigma, l_m))
-    right, missed = (leftover(m, record, layout, noise, 4, audit.excited_hz) for m in (nominal, wrong))
+    right, missed = (lack_of_fit(m, record, layout, noise, 4, audit.excited_hz) for m in (nominal, wrong))
     assert right.sigma == right.from_tones_sigma == 0.0
     assert 0.02 < missed.from_tones_sigma < 0.3
 

@@ -11,7 +11,7 @@ from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.search.acceptance import guard
 from commissioner.diagnose.search.screening import joint_net, screen
-from commissioner.diagnose.search.stepwise import CRUMB, ENTIRELY, Alien, Steps
+from commissioner.diagnose.search.stepwise import ENTIRELY, LEAST_SHARE_OF_REST, RuledOut, Steps
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
@@ -73,20 +73,20 @@ def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
     assert left_out == pytest.approx([0.5 * x for x in whole], rel=1e-3)
 
 
-def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_a_crumb(late, setting, nominal):
+def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_not_named(late, setting, nominal):
     """A sag of a link that stands still takes ten times what any other does: it is real, and six weak causes are not its name."""
     steps = Steps(replace(setting, record=late), WHITE, ["sampling_delay", "iron_loss"], print, late, lambda: True)
     screening = promised(nominal, late, setting, steps.names)
     guards = dict.fromkeys(steps.names, 100.0)
-    assert steps._most_alien(screening, guards) == Alien()
-    steps.ruled_out["sampling_delay"] = 0.5
-    alien = steps.alien = steps._most_alien(screening, guards)
+    assert steps._most_ruled_out(screening, guards) == RuledOut()
+    steps.kept_of_ruled_out["sampling_delay"] = 0.5
+    ruled_out = steps.ruled_out = steps._most_ruled_out(screening, guards)
     assert (
-        alien.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
-        and alien.chi2 > steps.material_chi2
+        ruled_out.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
+        and ruled_out.chi2 > steps.material_chi2
     )
-    assert steps._crumb(0.0) == CRUMB * alien.chi2
-    assert steps._most_alien(screening, guards | {"sampling_delay": 2.0 * alien.chi2}) == Alien()
+    assert steps._least_chi2_of_rest(0.0) == LEAST_SHARE_OF_REST * ruled_out.chi2
+    assert steps._most_ruled_out(screening, guards | {"sampling_delay": 2.0 * ruled_out.chi2}) == RuledOut()
     small, large = 0.005 * steps.count, 0.05 * steps.count
-    steps.alien = Alien()
-    assert [steps._crumb(rest) for rest in (small, large)] == [0.0, CRUMB * large]
+    steps.ruled_out = RuledOut()
+    assert [steps._least_chi2_of_rest(rest) for rest in (small, large)] == [0.0, LEAST_SHARE_OF_REST * large]

@@ -11,7 +11,7 @@ from commissioner.diagnose.fit.normal_equations import Normal
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
-from commissioner.diagnose.search.refinement import placed, without_idle_numbers
+from commissioner.diagnose.search.refinement import leakage_side, without_idle_numbers
 from commissioner.diagnose.verdict.evidence import sizes_with_spread
 
 SIGMA_A = 0.01
@@ -32,13 +32,13 @@ def test_what_nothing_tells_is_left_out_of_the_covariance():
 def test_a_steady_creep_is_not_enlarged_by_the_noise_of_its_course(setting, nominal):
     """Speed as a free course over time: some of it is hardly seen, and squares of noise do not pass for speed."""
     terms = CATALOGUE["shaft_motion"].terms(setting)
-    hats = np.array([t.symbol.startswith("hat_") for t in terms])
+    splines = np.array([t.symbol.startswith("hat_") for t in terms])
     random = np.random.default_rng(5)
     root = random.normal(size=(len(terms) + 4, len(terms) + 4)) / np.sqrt(len(terms))
-    shown = np.r_[np.full(4, 1e3), np.where(hats, random.choice([1e-3, 8.0], len(terms)), 2.0)]
+    shown = np.r_[np.full(4, 1e3), np.where(splines, random.choice([1e-3, 8.0], len(terms)), 2.0)]
     information = shown[:, None] * (root @ root.T + np.eye(len(shown))) * shown
     speed, draws = 0.06, []
-    truth = np.r_[np.log(nominal.nominal), np.where(hats, speed, 0.0) / [t.step for t in terms]]
+    truth = np.r_[np.log(nominal.nominal), np.where(splines, speed, 0.0) / [t.step for t in terms]]
     spread = np.linalg.cholesky(np.linalg.inv(information))
     for _ in range(300):
         model = nominal.with_terms(terms).moved(truth + spread @ random.normal(size=truth.size))
@@ -81,7 +81,7 @@ def test_a_path_that_began_on_the_wrong_side_is_put_right(setting, looped):
     start = replace(truth, values=tuple(-0.5 if t.symbol == "split" else 0.02 for t in truth.terms))
     stuck = fit(start, record, setting.layout, WHITE, rounds=3)
     best = fit(truth, record, setting.layout, WHITE)
-    seen = placed(stuck, record, setting.layout, WHITE)
+    seen = leakage_side(stuck, record, setting.layout, WHITE)
     assert seen.chi2 <= stuck.chi2
     assert seen.chi2 - best.chi2 < 30.0
     assert seen.model.total(truth.terms[-1].kind) > 0.3

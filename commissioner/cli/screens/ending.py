@@ -1,0 +1,21 @@
+"""How a run ended, on the terminal or as the one JSON document, and the exit code of it."""
+
+from __future__ import annotations
+
+from commissioner.cli.screens import screen
+from commissioner.run.commission import Commissioned
+
+EXIT_CODES = {"commissioned": 0, "rejected": 3, "aborted": 4, "faulted": 5}
+
+
+def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
+    """The result, and the exit code of its outcome."""
+    if as_json:
+        screen.emit({**done.result, "folder": str(done.folder)})
+    else:
+        screen.result(done.result)
+        for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
+            if (done.folder / name).is_file():
+                screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
+    if code := EXIT_CODES[done.ended.outcome]:
+        raise SystemExit(code)

@@ -1,0 +1,47 @@
+"""An identification on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+ROWS = (
+    ("stator resistance R_s", "stator_resistance_ohm", "ohm", 1.0),
+    ("rotor resistance R_R", "rotor_resistance_ohm", "ohm", 1.0),
+    ("leakage inductance L_sigma", "leakage_inductance_h", "mH", 1e3),
+    ("magnetizing inductance L_M", "magnetizing_inductance_h", "mH", 1e3),
+    ("rotor time constant", "rotor_time_constant_s", "s", 1.0),
+)
+
+
+def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
+    """The result as a table for a technician, with what holds for which flux, and the remarks."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table(title="Identified from " + ", ".join(sources), title_justify="left")
+    for heading in ("per phase, star equivalent", "value", "std error", "unit"):
+        table.add_column(heading, justify="left" if heading in ("per phase, star equivalent", "unit") else "right")
+    for label, key, unit, factor in ROWS:
+        quantity = document["parameters"][key]
+        value, std = factor * quantity["value"], factor * quantity["std"]
+        table.add_row(label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", unit)
+    console.print(table)
+    flux = document["holds_for_stator_flux_wb"]
+    rated = document["rated_flux_wb"]["stator_peak"]
+    console.print(f"L_M holds for {flux:.3g} Wb peak stator flux ({flux / rated:.0%} of rated {rated:.3g} Wb).")
+    inverter = document["inverter"]
+    if inverter["identified"]:
+        console.print(
+            f"Inverter: each leg loses {inverter['leg_error_v']['value']:.2f} V (knee {inverter['knee_a']:.2g} A)."
+        )
+    white = [a["whiteness"]["is_white"] for a in document["axes"]]
+    console.print(
+        f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
+        f"{document['gaps']['lost_samples']} samples lost in {document['gaps']['count']} gaps."
+    )
+    for finding in document["findings"]:
+        console.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")
+    for remark in document["remarks"]:
+        console.print(f"- {remark}")

@@ -1,0 +1,110 @@
+"""A running motor on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.cli.screens.screen import err, out, quantity, table
+from commissioner.monitor.chain import Observation, Refused
+from commissioner.monitor.intake.findings import miswired
+from commissioner.monitor.trend.trend import Verdict
+
+
+def show_refused(seen: Refused) -> None:
+    """What the terminals show all the same."""
+    for finding in seen.findings:
+        if not finding.stops:
+            err.print(f"[dim]{finding.kind}[/] {finding.what}")
+    f = seen.audited.fundamental
+    if f is not None:
+        err.print(
+            f"[dim]what the terminals show all the same[/] {f.frequency_hz:.4g} Hz, {abs(f.voltage_v) / 2**0.5:.4g} V a phase "
+            f"({f.voltage_unbalance:.2%} negative sequence), {abs(f.current_a) / 2**0.5:.4g} A ({f.current_unbalance:.2%}), "
+            f"{f.power_w:.4g} W, {f.reactive_var:.4g} var"
+        )
+
+
+def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None) -> None:
+    """The human view: what turns how fast against what, how sure, and what was put right."""
+    wiring = miswired(seen.findings)
+    for finding in wiring:
+        out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
+    period = seen.period
+    rpm = 30 / 3.141592653589793
+    rows = [
+        ("mean speed", quantity(seen.mean_speed_rad_per_s * rpm, seen.mean_speed_std * rpm, "1/min")),
+        ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
+        (
+            "speed within the period",
+            f"± {0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * rpm:.3g} 1/min "
+            f"(std {document['waveforms']['speed_rms_std_rad_per_s'] * rpm:.2g})",
+        ),
+    ]
+    if period.load_torque_nm is not None:
+        rows.append(
+            (
+                "load torque",
+                f"{period.load_torque_nm.min():.3g} ... {period.load_torque_nm.max():.3g} N m "
+                f"(std {document['waveforms']['load_torque']['rms_std_nm']:.2g})",
+            )
+        )
+    else:
+        rows.append(("load torque", document["waveforms"]["load_torque"]))
+    if seen.inertia_kg_m2 is not None:
+        rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
+    rows.append(
+        ("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)")
+    )
+    out.print(table("", ("", ""), rows))
+    out.print(
+        table(
+            "Periods",
+            ("what", "Hz", "of the shaft", "speed ripple", "varies with"),
+            [
+                (
+                    p.name,
+                    quantity(p.frequency_hz, p.frequency_std_hz, ""),
+                    f"{p.ratio_to_shaft:.4f}",
+                    f"{p.speed_ripple_rad_per_s * rpm:.3g} 1/min rms",
+                    p.follows,
+                )
+                for p in seen.load_periods
+            ],
+            right=(1, 2, 3),
+        )
+    )
+    names = {
+        "stator_resistance_ohm": "R_s",
+        "rotor_resistance_ohm": "R_R",
+        "leakage_inductance_h": "L_sigma",
+        "magnetizing_inductance_h": "L_M",
+    }
+    out.print(
+        table(
+            f"Motor (inverse-Gamma; start: {seen.start.origin})",
+            ("", ""),
+            [
+                (
+                    short,
+                    quantity(
+                        document["parameters"][key]["value"] * scale, document["parameters"][key]["std"] * scale, unit
+                    ),
+                )
+                for (key, short), (scale, unit) in zip(
+                    names.items(), ((1, "ohm"), (1, "ohm"), (1e3, "mH"), (1e3, "mH")), strict=True
+                )
+            ],
+        )
+    )
+    out.print(document["cannot_be_fixed"]["sentence"])
+    for finding in seen.findings:
+        if (finding not in wiring and finding.kind == "corrected") or (
+            finding.kind == "note" and finding.code != "frequency_wander"
+        ):
+            out.print(f"[yellow]{finding.kind}[/] {finding.what}")
+    if verdict is not None:
+        colour = "red" if verdict.names else "green"
+        out.print(f"[{colour}]{verdict.state.value}[/]" + (": " + ", ".join(verdict.names) if verdict.names else ""))
+    for name, path in document.get("files", {}).items():
+        out.print(f"[dim]{name}[/] {path}")

@@ -1,0 +1,37 @@
+"""The one encoder: records as JSON types."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+HIDDEN = MappingProxyType({"is_hidden": True})
+"""Metadata of a field that is no part of the JSON."""
+
+
+def plain(value: Any) -> Any:
+    """A record as JSON types; arrays become lists, NaN and infinity become null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        shown = [f for f in dataclasses.fields(value) if not f.metadata.get("is_hidden")]
+        return {f.name: plain(getattr(value, f.name)) for f in shown}
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)

@@ -1,0 +1,119 @@
+"""The archive of runs: list, show, compare, report, export, verify, replay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.errors import CommissionerError, DataRefused
+from commissioner.procedure.assembly import assemble, columns
+from commissioner.recordings.table import check_ending, write_table
+from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.catalogue import RunSummary, find_folder, find_run, read_runs, run_folders
+from commissioner.run.archive.documents import damaged, read_saved
+from commissioner.run.archive.replay import Difference, replay
+from commissioner.run.archive.verify import DAMAGED, Loss, Verified, refuse_damage, verify
+
+
+@dataclass(frozen=True)
+class Reported:
+    """Where the page of a run is."""
+
+    run: str
+    report: str
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Where the samples of a run were written, how many, and what of them was lost before."""
+
+    run: str
+    recording: str
+    samples: int
+    losses: tuple[Loss, ...]
+
+
+@dataclass(frozen=True)
+class ReplayedRun:
+    """How many decisions were compared, and the first that differs."""
+
+    run: str
+    decisions: int
+    identical: bool
+    difference: Difference | None
+    state: str
+    losses: tuple[Loss, ...]
+
+
+def list_runs(runs: Path, *, with_results: bool = True) -> tuple[RunSummary, ...]:
+    """Newest first; a folder that cannot be read is a row that says so."""
+    return tuple(read_runs(runs, with_results=with_results))
+
+
+def show_run(runs: Path, run: str) -> RunSummary:
+    """The run of which the id starts so, or the newest for `last`. UsageError: none or several."""
+    return find_run(runs, run)
+
+
+def report_run(runs: Path, run: str) -> Reported:
+    """The path of the run's report, made from its archive where the run could not make it."""
+    from commissioner.run.archive.late_report import make_report
+
+    summary = find_run(runs, run)
+    report = Path(summary.folder) / "report.html"
+    if not report.is_file():
+        make_report(summary)
+    return Reported(summary.run, str(report))
+
+
+def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exported:
+    """The run's whole samples as a recording in the contract's format. DataRefused: it has none, or they are damaged."""
+    summary = find_run(runs, run)
+    check_ending(out)
+    source = Path(summary.folder)
+    verified = verify(source)
+    if not salvage:
+        refuse_damage(source, verified, "export", "blocks.bin", "request.json")
+    nameplate = read_saved(source, "request.json", "nameplate")["nameplate"]
+    if not isinstance(nameplate, dict):
+        raise damaged(source, "request.json", f"nameplate {nameplate!r}")
+    plate = {key: value for key, value in nameplate.items() if value is not None}
+    recording = assemble(read_blocks(source / "blocks.bin"), plate, summary.run)
+    if recording is None:
+        raise DataRefused(
+            f"{summary.run} holds no samples", step="export", value=0, limit="at least one block",
+            remedy="the motor was never energised in it",
+        )  # fmt: skip
+    write_table(out, columns(recording), plate | {"sample_period_s": recording.sample_period_s, "run": summary.run})
+    return Exported(summary.run, str(out), int(recording.time_s.size), tuple(verified.losses))
+
+
+def verify_runs(runs: Path, run: str | None, key: bytes | None = None) -> tuple[Verified, ...]:
+    """One run, or all of them where `run` is None."""
+    folders = run_folders(runs) if run is None else [find_folder(runs, run)]
+    return tuple(verify_folder(folder, key) for folder in folders)
+
+
+def verify_folder(folder: Path, key: bytes | None) -> Verified:
+    """As `verify`; a folder that cannot be read at all is damaged, too."""
+    try:
+        return verify(folder, key)
+    except (CommissionerError, OSError) as error:
+        what = error.what if isinstance(error, CommissionerError) else str(error)
+        return Verified(
+            folder.name, DAMAGED, (Loss(folder.name, None, what),), "nothing that can be read", 0, 0, 0, 0, "none"
+        )
+
+
+def replay_run(runs: Path, run: str, *, salvage: bool = False) -> tuple[ReplayedRun, Verified]:
+    """Decides the run again from its archive. DataRefused: the folder is not as the run left it, unless `salvage`."""
+    summary = find_run(runs, run)
+    folder = Path(summary.folder)
+    verified = verify(folder)
+    if not salvage:
+        refuse_damage(folder, verified, "replay")
+    done = replay(folder, salvage=not verified.is_whole)
+    replayed = ReplayedRun(
+        summary.run, done.decisions, done.is_identical, done.difference, verified.state, tuple(verified.losses)
+    )
+    return replayed, verified

@@ -1,0 +1,78 @@
+"""A motor commissioned through its drive: the whole job, from the first request to the closing diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.link.files.drive_file import load_profile
+from commissioner.operations.events import Observe, nobody
+from commissioner.run.archive.seal import read_key
+from commissioner.run.commission import Commissioned, require_capabilities
+from commissioner.run.commission import commission as carry_out_and_close
+from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.settings import load_motor, load_procedure
+
+DIAGNOSIS_S = 60.0
+"""Four tests with five causes in them take 40 s on two cores."""
+
+
+@dataclass(frozen=True)
+class CommissionRequest:
+    """`axes_deg`: None takes the procedure's own. `diagnosis_s` 0 leaves the closing diagnosis out. `seal`: a key file."""
+
+    drive: str
+    profile: str
+    motor: str
+    runs: Path
+    procedure: Path | None = None
+    axes_deg: tuple[float, ...] | None = None
+    write_back: bool = False
+    diagnosis_s: float = DIAGNOSIS_S
+    seal: Path | None = None
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Who asked for a run, and what is told the folder as soon as there is one."""
+
+    facts: Mapping[str, str] | None = None
+    begun: Callable[[Path], None] = lambda _folder: None
+
+
+def check_request(request: CommissionRequest) -> None:
+    """ConfigurationError or UsageError where the request cannot be carried out on any drive of its profile."""
+    load_motor(request.motor)
+    load_procedure(request.procedure, axes_deg=request.axes_deg)
+    require_capabilities(load_profile(request.profile), write_back=request.write_back)
+    if request.seal is not None:
+        read_key(request.seal)
+
+
+def commission(
+    request: CommissionRequest,
+    observe: Observe = nobody,
+    stop: OperatorStop | None = None,
+    origin: Origin | None = None,
+) -> Commissioned:
+    """Energises the motor. Configuration errors are raised; from the first request on, every end is a run with a folder.
+
+    `observe` gets the records of `procedure.findings`. `stop` ends the run from outside; None listens to the terminal.
+    """
+    origin = origin or Origin()
+    key = read_key(request.seal) if request.seal is not None else None
+    return carry_out_and_close(
+        request.drive,
+        request.profile,
+        load_motor(request.motor),
+        load_procedure(request.procedure, axes_deg=request.axes_deg),
+        write_back=request.write_back,
+        runs=request.runs,
+        present=observe,
+        diagnosis_s=request.diagnosis_s,
+        key=key,
+        stop=stop,
+        begun=origin.begun,
+        origin=origin.facts,
+    )

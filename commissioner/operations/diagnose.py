@@ -1,0 +1,173 @@
+"""What the simulation gets wrong about recordings of one motor at standstill, or about tables of test points, by name."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from commissioner.diagnose.contract import DiagnosisDocument
+from commissioner.diagnose.diagnosis import Diagnosis
+from commissioner.diagnose.diagnosis import diagnose as analyse
+from commissioner.diagnose.document import as_document, points_document, refused_document
+from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
+from commissioner.diagnose.points.table import Points, is_points_table, read_points
+from commissioner.encoding import plain
+from commissioner.errors import DataRefused
+from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
+from commissioner.operations.intake import require_one_motor, standstill, without_copies
+from commissioner.recordings.importers import contract_table
+from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.recordings.table import Table
+from commissioner.recordings.whole import folder_to_write, whole_file
+
+KEPT = re.compile(r"^accepted (\w+):")
+"""How the search says that it takes a cause in."""
+VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
+"""Of several tables the first of these that one has is the verdict of all."""
+
+
+@dataclass(frozen=True)
+class DiagnoseRequest:
+    """`motor` overrides the recordings' metadata. `out`: a folder for `report.html`, `model.json` and `diagnosis.json`.
+    `mapping`: what the files' channels are."""
+
+    files: tuple[Path, ...]
+    motor: str | None = None
+    out: Path | None = None
+    excluded: tuple[str, ...] = ()
+    mapping: Path | None = None
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """`document` is the contract's JSON; of several tables of points, each one's own lies under `tables`. `seen`: None of points."""
+
+    document: DiagnosisDocument
+    out: Path | None
+    seen: Diagnosis | None = None
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the data, or those of one table, could not carry an answer."""
+        tables = self.document.get("tables", {})
+        return "refused" in {self.document["verdict"], *(one["verdict"] for one in tables.values())}
+
+
+@dataclass
+class _Search:
+    """Hears the search: passes every line on, and remembers what was taken in."""
+
+    observe: Observe
+    kept: list[str] = field(default_factory=list)
+
+    def __call__(self, sentence: str) -> None:
+        if found := KEPT.match(sentence):
+            self.kept.append(found[1])
+        self.observe(SearchSaid(sentence))
+
+    def withdrawn(self, left: Collection[str]) -> list[str]:
+        """Named on the way and not among those that are `left`."""
+        return [name for name in dict.fromkeys(self.kept) if name not in left]
+
+
+def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = always) -> Diagnosed:
+    """Recordings together; where all files are tables of test points, each on its own.
+
+    Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor at standstill.
+    `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
+    """
+    said = read_mapping(request.mapping) if request.mapping else None
+    tables = [contract_table(Path(path), said) for path in request.files]
+    if request.out is not None:
+        folder_to_write(request.out)
+    if all(is_points_table(list(t.columns)) for t in tables):
+        return _points(tables, request.out)
+    return _recordings(tables, request, observe, go_on)
+
+
+def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Observe, go_on: GoOn) -> Diagnosed:
+    from commissioner.report.diagnosis.uncertain import uncertain
+
+    recordings, remarks = standstill(tables, request.motor)
+    require_one_motor(recordings)
+    recordings, copies = without_copies(recordings)
+    search = _Search(observe)
+    seen = analyse(recordings, excluded=request.excluded, report=search, go_on=go_on)
+    document = as_document(seen, None)
+    document["audit"] = [*remarks, *copies, *document["audit"]]
+    document["uncertain"] = uncertain(seen, search.withdrawn({c.name for c in (*seen.causes, *seen.unsure)}))
+    document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
+    if request.out is not None:
+        _write_recordings(request.out, seen, document, tables)
+    return Diagnosed(document, request.out, seen)
+
+
+def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, tables: Sequence[Table]) -> None:
+    from commissioner.report.diagnosis.page import page_of
+    from commissioner.report.page import render
+
+    document["model_file"] = str(out / "model.json") if seen.model else None
+    page = render(page_of(seen, document, ", ".join(Path(t.source).name for t in tables)))
+    _write(out, document, seen.model, page, "report.html")
+
+
+def _points(tables: Sequence[Table], out: Path | None) -> Diagnosed:
+    """The stator resistance of a locked-rotor table serves the others."""
+    read = [read_points(t.columns, Path(t.source).stem) for t in tables]
+    known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
+    resistance_ohm = float(known[0]) if known else None
+    documents = [
+        refused_document(points, "points")
+        if isinstance(points, DataRefused)
+        else points_document(analyse_points(points, resistance_ohm))
+        for points in read
+    ]
+    names = _names(tables)
+    document = documents[0] if len(documents) == 1 else _joined(documents, names)
+    if out is not None:
+        _write_points(out, document, documents, names)
+    return Diagnosed(document, out)
+
+
+def _write_points(
+    out: Path, document: DiagnosisDocument, documents: Sequence[DiagnosisDocument], names: Sequence[str]
+) -> None:
+    from commissioner.report.diagnosis.page import points_page
+    from commissioner.report.page import render
+
+    for one, file in zip(documents, names, strict=True):
+        name = str(Path(file).with_suffix(""))
+        _write(out, document, {}, render(points_page(one, name)), f"report_{name.replace('/', '_')}.html")
+
+
+def _joined(documents: Sequence[DiagnosisDocument], names: Sequence[str]) -> DiagnosisDocument:
+    """One document: all causes together, every table's own result under `tables`."""
+    verdicts = [d["verdict"] for d in documents]
+    joined = {
+        **documents[0],
+        "verdict": next((v for v in VERDICTS if v in verdicts), verdicts[0]),
+        "reason": " ".join(d["reason"] for d in documents),
+        "causes": [c for d in documents for c in d["causes"]],
+        "tables": dict(zip(names, documents, strict=True)),
+    }
+    return cast("DiagnosisDocument", joined)
+
+
+def _names(tables: Sequence[Table]) -> list[str]:
+    """The files' names, with their folder where two are called the same."""
+    paths = [Path(t.source) for t in tables]
+    names = [p.name for p in paths]
+    return [p.name if names.count(p.name) == 1 else f"{p.parent.name}/{p.name}" for p in paths]
+
+
+def _write(out: Path, document: Mapping[str, Any], model: Mapping[str, Any], page: str, page_name: str) -> None:
+    texts = {page_name: page, "diagnosis.json": json.dumps(plain(document), indent=2)}
+    if model:
+        texts["model.json"] = json.dumps(plain(model), indent=1)
+    for name, text in texts.items():
+        with whole_file(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,107 @@
+"""A motor identified from standstill recordings, with the estimators that a live run uses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.identify.analysis import Identification
+from commissioner.identify.analysis import identify as analyse
+from commissioner.identify.contract import FluxReached, IdentifiedDocument
+from commissioner.identify.estimate.axis import Estimator
+from commissioner.identify.intake.plate import nameplate_from
+from commissioner.motor.nameplate import Nameplate
+from commissioner.operations.events import Began, Observe, nobody
+from commissioner.recordings.importers import contract_table
+from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.recordings.table import to_standstill
+from commissioner.records import StandstillRecording
+from commissioner.settings import load_motor, load_procedure
+
+PAUSE_S = 10.0
+"""Between two recordings that are joined: longer than any motor remembers."""
+
+
+@dataclass(frozen=True)
+class IdentifyRequest:
+    """`motor` overrides the recordings' metadata; `estimator`: pao | lyapunov | nls; `mapping`: what their channels are."""
+
+    files: tuple[Path, ...]
+    motor: str | None = None
+    estimator: str = "pao"
+    mapping: Path | None = None
+
+
+@dataclass(frozen=True)
+class Identified:
+    """`document` is the contract's JSON; `found` the numbers behind it."""
+
+    document: IdentifiedDocument
+    found: Identification
+    nameplate: Nameplate
+    files: tuple[Path, ...]
+
+
+def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
+    """DataRefused where the recordings cannot carry an answer; UsageError for a file or an estimator that does not exist."""
+    said = read_mapping(request.mapping) if request.mapping else None
+    recording = joined([to_standstill(contract_table(path, said)) for path in request.files])
+    plate = None if request.motor is None else load_motor(request.motor)
+    observe(Began("identifying"))
+    found = analyse(recording, plate, cast("Estimator", request.estimator))
+    document: IdentifiedDocument = {**found.as_json(), "flux_guard": _flux_reached(found), "written": []}
+    return Identified(document, found, plate or nameplate_from(recording.metadata), request.files)
+
+
+def _flux_reached(found: Identification) -> FluxReached:
+    """As a run's: the largest flux of the recording, of the limit that the shipped procedure would have had."""
+    limit_wb = load_procedure().limits.flux_fraction * found.rated_flux.stator_peak_wb
+    peak_wb = max(axis.peak_stator_flux_wb for axis in found.axes)
+    return {"peak_fraction": peak_wb / limit_wb, "acted": False, "limit_wb": limit_wb}
+
+
+def joined(recordings: Sequence[StandstillRecording]) -> StandstillRecording:
+    """Several recordings of one motor as one, in the order given; their segments are renumbered and time runs on."""
+    first = recordings[0]
+    if len(recordings) == 1:
+        return first
+    for other in recordings[1:]:
+        _require_same_rate(first, other)
+    has_w = all(r.current_w_a is not None for r in recordings)
+    has_link = all(r.dc_link_v is not None for r in recordings)
+    time, segment, time_offset, segment_offset = [], [], 0.0, 0
+    for r in recordings:
+        time.append(r.time_s - r.time_s[0] + time_offset)
+        segment.append(r.segment - r.segment.min() + segment_offset)
+        time_offset = float(time[-1][-1]) + PAUSE_S
+        segment_offset = int(segment[-1].max()) + 1
+    return StandstillRecording(
+        time_s=np.concatenate(time),
+        segment=np.concatenate(segment),
+        axis_deg=np.concatenate([r.axis_deg for r in recordings]),
+        voltage_axis_v=np.concatenate([r.voltage_axis_v for r in recordings]),
+        current_u_a=np.concatenate([r.current_u_a for r in recordings]),
+        current_v_a=np.concatenate([r.current_v_a for r in recordings]),
+        current_w_a=np.concatenate([r.current_w_a for r in recordings if r.current_w_a is not None]) if has_w else None,
+        dc_link_v=np.concatenate([r.dc_link_v for r in recordings if r.dc_link_v is not None]) if has_link else None,
+        sample_period_s=first.sample_period_s,
+        metadata=first.metadata,
+        source=", ".join(r.source for r in recordings),
+        notes=tuple(dict.fromkeys(note for r in recordings for note in r.notes)),
+    )
+
+
+def _require_same_rate(first: StandstillRecording, other: StandstillRecording) -> None:
+    if abs(other.sample_period_s / first.sample_period_s - 1.0) > 1e-6:
+        raise DataRefused(
+            f"{other.source}: sampled at another rate than {first.source}",
+            step="join recordings",
+            value=other.sample_period_s,
+            limit=first.sample_period_s,
+            remedy="identify the files one by one",
+        )

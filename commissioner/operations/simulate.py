@@ -1,0 +1,167 @@
+"""A motor, plain or extended by a diagnosis, played into a recording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from math import pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from commissioner.diagnose.export import playback
+from commissioner.diagnose.export.model_file import model_from
+from commissioner.diagnose.export.model_file import plain as without_effects
+from commissioner.diagnose.intake.audit import prepare
+from commissioner.diagnose.intake.record import Facts
+from commissioner.diagnose.plant.model import Layout, Model
+from commissioner.errors import ConfigurationError, UsageError
+from commissioner.motor.nameplate import prior
+from commissioner.operations.events import Began, Observe, nobody
+from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
+from commissioner.settings import load_motor
+
+MAX_BYTES = 5_000_000
+SAMPLE_PERIOD_S = 2e-4
+Command = list[tuple[float, Any]]
+"""Axis in degrees and voltage along it, a segment each."""
+
+
+@dataclass(frozen=True)
+class SimulateRequest:
+    """`model`: a model.json of a diagnosis, or a motor's name or file. The command is that of the recording `like`, or six tones
+    at two levels on `axes_deg` for `seconds` each. `plain` leaves the named effects out."""
+
+    model: str
+    out: Path
+    like: Path | None = None
+    seconds: float = 6.0
+    axes_deg: tuple[float, ...] = (0.0, 60.0, 120.0)
+    noise_a: float = 0.0
+    seed: int = 1
+    plain: bool = False
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The recording that was written, and the effects in it."""
+
+    recording: str
+    samples: int
+    segments: int
+    effects: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Motor:
+    """A model, its dictionary, its line frequencies, its plate."""
+
+    model: Model
+    layout: Layout | None
+    lines_hz: Mapping[str, float]
+    plate: Mapping[str, Any]
+
+
+def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
+    """Writes the recording. ConfigurationError where the model cannot be played or runs away."""
+    check_ending(request.out)
+    _check_size(request.seconds, request.noise_a)
+    motor = _motor(request.model, request.plain)
+    facts = _facts(motor.plate)
+    if request.like is None:
+        plan = playback.default_plan(request.axes_deg)
+        segments = playback.command(motor.model, facts, plan, request.seconds, request.seed)
+    else:
+        segments, facts = _command_of(request.like, facts)
+    observe(Began("playing"))
+    columns = _played(
+        request.model,
+        lambda: playback.play(
+            motor.model, motor.layout, facts, segments, dict(motor.lines_hz), request.noise_a, request.seed
+        ),
+    )
+    keys = {k: v for k, v in motor.plate.items() if isinstance(v, int | float | str) and k not in ("name", "scenario")}
+    write_table(request.out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
+    effects = tuple(sorted({t.effect for t in motor.model.terms if t.effect}))
+    return Simulated(str(request.out), int(columns["time_s"].shape[0]), len(segments), effects)
+
+
+def _played(name: str, play: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The columns; ConfigurationError where the model cannot be played or runs away."""
+    try:
+        with np.errstate(all="ignore"):
+            columns = play()
+    except (IndexError, np.linalg.LinAlgError) as error:
+        raise ConfigurationError(
+            file=name,
+            key="terms",
+            value=str(error),
+            expected="numbers that its own dictionary has, as `commissioner diagnose` writes them",
+        ) from error
+    if not all(np.isfinite(values).all() for values in columns.values()):
+        raise ConfigurationError(
+            file=name, key="nominal and terms", value="currents that run away", expected="numbers of a motor"
+        )
+    return columns
+
+
+def _check_size(seconds: float, noise_a: float) -> None:
+    for name, value, low, high in (("--seconds", seconds, 0.1, 3600.0), ("--noise-a", noise_a, 0.0, 1e4)):
+        if not low <= value <= high:
+            raise UsageError(
+                f"{name} {value:g} is out of range",
+                step="command line",
+                value=value,
+                limit=f"{low:g} ... {high:g}",
+                remedy=f"give {name} a value in this range",
+            )
+
+
+def _motor(name: str, plain: bool) -> _Motor:
+    path = Path(name)
+    if path.suffix == ".json":
+        return _extended(path, plain)
+    plate = load_motor(name)
+    typical = prior(plate).typical.as_tuple()
+    return _Motor(Model(typical), None, {}, {k: v for k, v in asdict(plate).items() if v is not None})
+
+
+def _extended(path: Path, plain: bool) -> _Motor:
+    if not path.is_file():
+        raise UsageError(
+            f"there is no file {path}",
+            step="read model",
+            value=str(path),
+            limit="an existing file",
+            remedy="check the path",
+        )
+    if path.stat().st_size > MAX_BYTES:
+        raise ConfigurationError(
+            file=str(path), key="size", value=path.stat().st_size, expected=f"at most {MAX_BYTES} bytes"
+        )
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        document = without_effects(document) if plain else document
+        model, layout = model_from(document)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ConfigurationError(
+            file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
+        ) from error
+    return _Motor(model, layout, dict(document.get("lines_hz", {})), dict(document.get("nameplate", {})))
+
+
+def _facts(plate: Mapping[str, Any]) -> Facts:
+    current = sqrt(2.0) * float(plate.get("rated_current_a", 1.0))
+    voltage, frequency = float(plate.get("rated_voltage_v", 0.0)), float(plate.get("rated_frequency_hz", 0.0))
+    flux = sqrt(2.0 / 3.0) * voltage / (2.0 * pi * frequency) if frequency else 0.0
+    period = float(plate.get("sample_period_s", SAMPLE_PERIOD_S))
+    power = float(plate.get("rated_power_w", 1.0))
+    return Facts(period, current, power, flux, current, None, None, 3, dict(plate))
+
+
+def _command_of(path: Path, facts: Facts) -> tuple[Command, Facts]:
+    record, _ = prepare([to_standstill(read_table(path))])
+    segments: Command = [(s.axis_deg, s.voltage_axis_v) for s in record.segments]
+    return segments, replace(facts, sample_period_s=record.facts.sample_period_s)

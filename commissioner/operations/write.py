@@ -1,0 +1,93 @@
+"""Into a drive without energising it: what a run found there before, what it accepted, what recordings say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.link.drive.facts import WriteReport
+from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.identify import Identified
+from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.archive.late_report import mark_restored
+from commissioner.run.commission import Commissioned
+from commissioner.run.restore import Restored
+from commissioner.run.restore import restore as write_snapshot
+from commissioner.run.write_accepted import Plan, check_token, plan_restore, plan_write_back, write_accepted
+from commissioner.run.write_recorded import write_recorded as carry_out
+from commissioner.settings import load_procedure
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A run of the archive, and the drive to write to; `drive` None: the run's own."""
+
+    runs: Path
+    run: str
+    drive: str | None = None
+
+    def find(self) -> RunSummary:
+        """UsageError: none or several."""
+        return find_run(self.runs, self.run)
+
+
+@dataclass(frozen=True)
+class WriteRequest:
+    """The drive that the motor of recordings hangs on."""
+
+    drive: str
+    profile: str
+    runs: Path
+    procedure: Path | None = None
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was read back; `report` counts the writes of the drive's memory."""
+
+    run: str
+    report: WriteReport
+
+
+def planned_restore(request: RunRequest) -> Plan:
+    """What `restore` would change. Reads the drive, changes nothing."""
+    return plan_restore(request.find(), request.drive)
+
+
+def restore(
+    request: RunRequest, token: str | None = None, observe: Observe = nobody, key: bytes | None = None
+) -> Restored:
+    """The set that the run found, written back, verified and stored. Aborted where `token` is of another table.
+    `key`: of a sealed folder."""
+    summary = request.find()
+    if token is not None:
+        check_token(plan_restore(summary, request.drive), token)
+    observe(Began("writing and reading back"))
+    done = write_snapshot(summary, request.drive, key=key)
+    mark_restored(summary)
+    return done
+
+
+def planned_write(request: RunRequest) -> Plan:
+    """What `write_run` would change. Reads the drive, changes nothing."""
+    return plan_write_back(request.find(), request.drive)
+
+
+def write_run(request: RunRequest, token: str) -> Written:
+    """The accepted result of a run into its drive. Aborted where `token` is of another table."""
+    summary = request.find()
+    return Written(summary.run, write_accepted(summary, request.drive, token))
+
+
+def write_recorded(request: WriteRequest, identified: Identified, observe: Observe = nobody) -> Commissioned:
+    """The verdict on a motor identified from recordings; an accepted one is written, as a run that `restore` takes."""
+    return carry_out(
+        request.drive,
+        request.profile,
+        identified.nameplate,
+        load_procedure(request.procedure),
+        identified.found,
+        identified.files,
+        runs=request.runs,
+        present=observe,
+    )

@@ -1,0 +1,177 @@
+"""Where the numbers of a text begin, what separates them, and which rows above them are names and units."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from commissioner.errors import DataRefused
+from commissioner.recordings.bounds import MAX_COLUMNS
+from commissioner.recordings.reading.cells import is_number, is_numeric
+from commissioner.recordings.units import is_unit, read_unit, unit_in
+
+MAX_PREFACE_LINES = 400
+LONGEST_LINE = 1 << 16
+SEPARATORS = (";", "\t", ",", " ")
+HEAD_ROWS = 3
+"""Rows of numbers in a row, alike, that begin the data; fewer where the file ends."""
+
+Row = list[str]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """`start`: where in the text the first row of numbers begins. `skip`: cells of each row before the first column
+    (a preface that stands beside the numbers). `preface`: rows above the names, as cells."""
+
+    separator: str
+    start: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    preface: tuple[Row, ...]
+    skip: int = 0
+    is_split: bool = False
+    """Each number fills two cells: a decimal comma between commas."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    text: str
+    start: int
+
+
+def head_lines(text: str) -> list[_Line]:
+    """The first lines with where each begins; a longer line than any instrument writes ends them."""
+    lines: list[_Line] = []
+    at = 0
+    while at < len(text) and len(lines) < MAX_PREFACE_LINES + 60:
+        end = _line_end(text, at)
+        if end < 0:
+            break
+        lines.append(_Line(text[at:end], at))
+        at = end + (2 if text[end : end + 2] == "\r\n" else 1)
+    return lines
+
+
+def _line_end(text: str, at: int) -> int:
+    """Of the line at `at`; -1 where it is too long."""
+    limit = min(len(text), at + LONGEST_LINE)
+    ends = [e for e in (text.find("\n", at, limit), text.find("\r", at, limit)) if e >= 0]
+    return min(ends) if ends else (limit if limit == len(text) else -1)
+
+
+def split(line: str, separator: str) -> Row:
+    """The cells of a line; none where a cell is longer than any number or name."""
+    if separator == " ":
+        return line.split()
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    except csv.Error:
+        return []
+
+
+def layout_of(text: str, source: str) -> Layout:
+    """The layout; DataRefused where no rows of numbers are found."""
+    lines = head_lines(text)
+    for k, line in enumerate(lines[:MAX_PREFACE_LINES]):
+        if not line.text.strip() or line.text.lstrip().startswith("#"):
+            continue
+        for separator in SEPARATORS:
+            rows = _rows(lines[k:], separator)
+            skip = _beside(rows)
+            if _are_numbers([row[skip:] for row in rows]):
+                return _layout(lines, k, separator, skip, [row[skip:] for row in rows], source)
+    raise DataRefused(
+        f"{source}: no rows of numbers were found", step="read recording", value=lines[0].text[:60] if lines else "",
+        limit="two or more columns of numbers", remedy="export time, three currents and three voltages as CSV",
+    )  # fmt: skip
+
+
+def _rows(lines: Sequence[_Line], separator: str) -> list[Row]:
+    filled = [line.text for line in lines[: 3 * HEAD_ROWS] if line.text.strip()]
+    return [split(text, separator) for text in filled[:HEAD_ROWS]]
+
+
+def _beside(rows: Sequence[Row]) -> int:
+    """Cells that hold a preface beside the numbers (Tektronix TDS: key, value, empty; then time and volts)."""
+    is_so = (
+        len(rows) == HEAD_ROWS and all(len(r) >= 5 and not r[2] for r in rows) and rows[0][0].lower() == "record length"
+    )
+    return 3 if is_so else 0
+
+
+def _are_numbers(rows: Sequence[Row]) -> bool:
+    """Rows alike, of two numbers at least, in which every other cell is empty or stands for no number."""
+    if not rows or len({len(r) for r in rows}) != 1:
+        return False
+    return all(sum(map(is_number, r)) >= 2 and all(map(is_numeric, r)) for r in rows) or _with_text(rows)
+
+
+def _with_text(rows: Sequence[Row]) -> bool:
+    """Rows of numbers with a column of texts among them (a date, a state), the same in all."""
+    if len(rows) < HEAD_ROWS:
+        return False
+    kinds = [tuple(is_numeric(c) for c in r) for r in rows]
+    numbers = sum(kinds[0])
+    filled = sum(1 for c in rows[0] if is_number(c))
+    return len(set(kinds)) == 1 and filled >= 3 and len(rows[0]) - numbers <= max(2, len(rows[0]) // 4)
+
+
+def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows: Sequence[Row], source: str) -> Layout:
+    width = len(rows[0])
+    if width > MAX_COLUMNS:
+        raise DataRefused(
+            f"{source}: the file unpacks to too much", step="read recording", value=f"{width} columns", limit=MAX_COLUMNS,
+            remedy="export fewer columns",
+        )  # fmt: skip
+    above = [split(line.text.lstrip("\ufeff").lstrip("# "), separator) for line in lines[:first] if line.text.strip()]
+    if skip:
+        preface = [split(line.text, separator)[:2] for line in lines[first : first + 30]]
+        channel = next((row[1] for row in preface if len(row) > 1 and row[0].lower() == "source"), "CH1")
+        beside = {row[0].lower(): row[1] for row in preface if len(row) > 1}
+        named = ("Time", channel, *("",) * (width - 2))
+        return Layout(
+            separator, lines[first].start, named[:width],
+            (beside.get("horizontal units", "s"), beside.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
+        )  # fmt: skip
+    names, units, used, is_split = _names(above, width)
+    return Layout(
+        separator, lines[first].start, names, units, tuple(above[: len(above) - used]), 0, is_split and separator == ","
+    )
+
+
+def _names(above: Sequence[Row], width: int) -> tuple[tuple[str, ...], tuple[str, ...], int, bool]:
+    """(names, units, rows used, whether each number fills two cells)."""
+    rows = [_stripped(row, width) for row in above]
+    if not rows or not any(rows[-1]):
+        return tuple(f"column_{k}" for k in range(width)), ("",) * width, 0, False
+    last, before = rows[-1], rows[-2] if len(rows) > 1 else []
+    if _is_units(last) and before and len(before) >= 2 and not _is_units(before):
+        return _padded(before, width), _padded(last, width), 2, width >= 2 * len(before)
+    if before and _is_units(before) and len(before) >= 2 and not _is_units(last):
+        return _padded(last, width), _padded(before, width), 2, width >= 2 * len(last)
+    return _padded(last, width), tuple(unit_in(n) for n in _padded(last, width)), 1, width >= 2 * len(last) >= 4
+
+
+def _stripped(row: Row, width: int) -> Row:
+    """The row without empty cells at its end that go beyond the numbers."""
+    row = list(row)
+    while row and not row[-1] and len(row) > width:
+        row.pop()
+    return row if len(row) <= width + 8 else row[:width]
+
+
+def _is_units(row: Row) -> bool:
+    """A row of units: two or more cells that are one, and no cell that is something else but a number."""
+    said = [cell for cell in row if cell]
+    return (
+        len(said) >= 1
+        and all(is_unit(cell) or is_number(cell) for cell in said)
+        and sum(read_unit(cell) is not None or cell.strip("[]() ").lower() in {"%", "pu"} for cell in said) >= 1
+        and not all(len(cell) == 1 and cell.isupper() and cell in "UVW" for cell in said)
+    )
+
+
+def _padded(row: Row, width: int) -> tuple[str, ...]:
+    return tuple((row + [""] * width)[:width])

@@ -1,0 +1,94 @@
+"""Time stamps as files have them: rows written twice, stamps printed with too few digits, an index instead of a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.recordings.reading.preface import Clock
+from commissioner.records import ReadingNote, Signal
+
+LEAST_ROWS = 16
+MOST_REPEATED = 50
+"""Rows that may bear one printed stamp: beyond it nothing is left of the time."""
+
+
+def with_time(columns: dict[str, Signal], clock: Clock) -> list[ReadingNote]:
+    """Makes `time_s` of start and increment where there is none, or where it only counts the rows."""
+    if clock.interval_s is None:
+        return []
+    time = columns.get("time_s")
+    rows = max((v.size for v in columns.values()), default=0)
+    if time is None:
+        columns["time_s"] = (clock.start_s or 0.0) + clock.interval_s * np.arange(rows, dtype=np.float64)
+    elif time.size > 2 and np.all(np.diff(time) == 1.0) and abs(clock.interval_s - 1.0) > 1e-9:
+        columns["time_s"] = (clock.start_s or 0.0) + clock.interval_s * time
+    else:
+        return []
+    return [
+        ReadingNote("time_made", f"time from {clock.said_by or 'the sample interval'}: {clock.interval_s:.6g} s a row")
+    ]
+
+
+def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns without rows that repeat the one before them in every cell."""
+    time = columns.get("time_s")
+    rows = 0 if time is None else time.size
+    alike = [v for v in columns.values() if v.size == rows]
+    if rows < 2 or len(alike) < 3:
+        return dict(columns), []
+    same: NDArray[np.bool_] = np.all([np.diff(v) == 0.0 for v in alike], axis=0)
+    if not same.any():
+        return dict(columns), []
+    keep = np.concatenate([[True], ~same])
+    note = ReadingNote("doubled_rows", f"{int(same.sum())} rows repeat the one before them: each was taken once")
+    return {name: v[keep] if v.size == rows else v for name, v in columns.items()}, [note]
+
+
+def with_whole_time(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """Stamps that several rows share, where they leave a straight line by no more than their printing step, as that line;
+    each segment by itself, all at one period. Any other time stays as it is."""
+    time = columns.get("time_s")
+    if time is None or time.size < LEAST_ROWS or not np.isfinite(time).all():
+        return dict(columns), []
+    segment = columns.get("segment", np.zeros(time.size))
+    if segment.size != time.size or not np.any((np.diff(time) == 0.0) & (np.diff(segment) == 0.0)):
+        return dict(columns), []
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(segment) != 0.0) + 1, [time.size]])
+    parts = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+    period = _period([time[p] for p in parts])
+    if period is None:
+        return dict(columns), []
+    mended = np.empty_like(time)
+    for part in parts:
+        count = np.arange(part.stop - part.start, dtype=np.float64)
+        line = period * (count - count.mean()) + time[part].mean()
+        if np.max(np.abs(time[part] - line)) > _printing_step(time[part]) + 1e-12:
+            return dict(columns), []
+        mended[part] = line
+    note = ReadingNote(
+        "rounded_time",
+        f"time is printed in steps of {_printing_step(time):.6g} s, several rows share one: the period is the mean step, {period:.6g} s",
+    )
+    return {**columns, "time_s": mended}, [note]
+
+
+def _period(parts: list[Signal]) -> float | None:
+    """The mean step over all parts, s; None where stamps run backwards or too many rows share one."""
+    long = [p for p in parts if p.size >= LEAST_ROWS]
+    if not long or any(np.any(np.diff(p) < 0.0) for p in parts):
+        return None
+    weights = [float(p.size) for p in long]
+    slopes = [float(np.polyfit(np.arange(p.size), p - p[0], 1)[0]) for p in long]
+    period = float(np.average(slopes, weights=np.power(weights, 3)))
+    step = max(_printing_step(p) for p in parts)
+    return period if period > 0.0 and step < MOST_REPEATED * period else None
+
+
+def _printing_step(time: Signal) -> float:
+    """The least step between stamps that differ."""
+    steps = np.diff(time)
+    return float(np.min(steps[steps > 0.0], initial=np.inf)) if np.any(steps > 0.0) else 0.0

@@ -1,0 +1,106 @@
+"""What stands above the columns: keys with values, the sample interval or rate, start and increment."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from commissioner.recordings.reading.cells import NUMBER
+from commissioner.recordings.units import read_unit
+
+INTERVAL = frozenset(
+    {"sampleinterval", "samplinginterval", "samplingperiod", "sampleperiod", "sampleperiods", "dt", "deltat", "deltatime",
+     "tinc", "xincr", "xincrement", "increment", "hresolution", "resolution", "deltax", "tsample", "ts", "timestep",
+     "abtastintervall", "abtastzeit", "periodeechantillonnage", "采样周期", "采样间隔", "timeinterval", "hinterval", "interval"}
+)  # fmt: skip
+RATE = frozenset(
+    {"samplerate", "samplingrate", "samplingfrequency", "samplefrequency", "fs", "samplespersecond", "abtastrate",
+     "abtastfrequenz", "采样率", "采样频率", "frequenceechantillonnage", "samplerateinhz", "sampleratehz", "samplingratehz",
+     "fshz", "samplessec", "srate"}
+)  # fmt: skip
+START = frozenset({"start", "t0", "starttime", "xzero", "xorigin", "x0", "hoffset"})
+VALUE = re.compile(r"(?:[A-Za-z]+:)?\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s].*)?")
+SIGNS = re.compile(r"^([^:=]{1,60})[:=]\s*(.+)$")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When the samples were taken, by what stands beside them: interval and start in seconds, each None where unsaid."""
+
+    interval_s: float | None = None
+    start_s: float | None = None
+    said_by: str = ""
+
+
+def key(text: str) -> str:
+    """Letters (of any script) and digits, in lower case, without a unit in brackets."""
+    return re.sub(r"[\W_]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", text).lower())
+
+
+def pairs(rows: Iterable[Sequence[str]]) -> list[tuple[str, str, str]]:
+    """(key, value, unit) of rows `key,value[,unit]` and of cells `key: value` or `key = value`."""
+    found = []
+    for row in rows:
+        cells = [c.strip().strip('"') for c in row]
+        for cell in cells:
+            if said := SIGNS.match(cell):
+                found.append((said[1].strip().lstrip("# "), said[2].strip(), ""))
+        filled = [c for c in cells if c]
+        if len(filled) >= 2 and not SIGNS.match(filled[0]):
+            found.append((filled[0].rstrip(":= "), filled[1], filled[2] if len(filled) > 2 else ""))
+    return found
+
+
+def clock_in(said: Iterable[tuple[str, str, str]]) -> Clock:
+    """The first interval or rate that is said, with its unit (seconds and hertz where none stands)."""
+    interval, start, by = None, None, ""
+    for name, value, unit in said:
+        number = seconds(name, value, unit)
+        if number is None:
+            continue
+        if key(name) in START:
+            start = number if start is None else start
+        elif interval is None and key(name) in INTERVAL and number > 0:
+            interval, by = number, f"{name} {value} {unit}".strip()
+        elif interval is None and key(name) in RATE and number > 0:
+            interval, by = 1.0 / number, f"{name} {value} {unit}".strip()
+    return Clock(interval, start, by)
+
+
+def seconds(name: str, value: str, unit: str) -> float | None:
+    """The number in seconds (or hertz, of a rate); None where it is none, or its unit is not one of time or rate."""
+    text = value.replace(",", ".") if value.count(",") == 1 and "." not in value else value
+    found = VALUE.fullmatch(text.strip())
+    if not found or not math.isfinite(number := float(found[1])):
+        return None
+    said = (found[2] or "").strip() or _in_brackets(name) or unit
+    return number * _factor(said, key(name) in RATE) if said else number
+
+
+def _in_brackets(name: str) -> str:
+    found = re.search(r"[\[(]([^\])]+)[\])]\s*$", name)
+    return found[1] if found else ""
+
+
+def _factor(unit: str, is_rate: bool) -> float:
+    """To seconds, or to hertz; 1 where the text is no unit of it."""
+    bare = unit.strip("[]() ")
+    if is_rate:
+        found = re.fullmatch(r"([kMG]?)(?:S/s|Sa/s|SPS|Hz|S|samples/s)", bare)
+        return {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}[found[1]] if found else 1.0
+    known = read_unit(bare)
+    return known.scale if known and known.measures == "time" else 1.0
+
+
+def metadata_of(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
+    """Keys with their values, as texts; the first of two alike stands."""
+    out: dict[str, str] = {}
+    for name, value, _ in said:
+        out.setdefault(name.strip(), value)
+    return out
+
+
+def number_of(text: str) -> float | None:
+    return float(text) if NUMBER.fullmatch(text) and "," not in text and text.count(".") < 2 else None

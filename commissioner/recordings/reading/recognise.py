@@ -1,0 +1,108 @@
+"""Columns of a file as the contract's: by the user's mapping, by their names, in SI by their units. Nothing is guessed
+that would change a value by a factor: a unit that does not fit or may be two things is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.recordings.names import is_per_minute, meaning_of, reversed_pair, uses_rst
+from commissioner.recordings.reading.mapping import Target
+from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
+from commissioner.recordings.units import FOREIGN, read_unit, unit_in
+from commissioner.records import ReadingNote, Signal
+
+MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
+            "_deg": "angle", "_nm": "torque"}  # fmt: skip
+CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
+"""What an instrument calls a channel that nobody has named."""
+
+
+@dataclass(frozen=True)
+class Recognised:
+    columns: dict[str, Signal]
+    readings: tuple[ColumnReading, ...]
+    notes: tuple[ReadingNote, ...]
+    unnamed: tuple[str, ...]
+    """Channels whose names say nothing."""
+
+
+def recognise(
+    names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str
+) -> Recognised:
+    """The columns by the contract's names where they mean one, else by their own; see the module."""
+    with_s = uses_rst([n for n in names if n])
+    columns: dict[str, Signal] = {}
+    readings, notes, unnamed = [], [], []
+    order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
+    for k in order:
+        name, unit = names[k], units[k] or unit_in(names[k])
+        if not name:
+            continue
+        meaning, factor = _meaning(name, unit, targets.get(name), with_s, source)
+        if meaning in columns:
+            notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
+            meaning = None
+        if meaning is None:
+            unnamed += [name] if CHANNEL.fullmatch(_bare(name)) else []
+            columns.setdefault(name, values[k])
+        else:
+            with np.errstate(invalid="ignore", over="ignore"):
+                columns[meaning] = factor * values[k] if factor != 1.0 else values[k]
+        readings.append(ColumnReading(name, meaning, unit, factor))
+    return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[\[(][^\])]*[\])]\s*$", "", name).strip()
+
+
+def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: str) -> tuple[str | None, float]:
+    if target is not None:
+        if target.column == "ignore":
+            return None, 1.0
+        sign = -1.0 if target.is_turned else 1.0
+        return target.column, sign * (
+            target.factor if target.factor is not None else _factor(name, unit, target.column, source)
+        )
+    bare = _bare(name)
+    if bare in CONTRACT_COLUMNS:
+        return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
+    meaning, sign = meaning_of(name, with_s), 1.0
+    if meaning is None and (turned := reversed_pair(name)):
+        meaning, sign = turned, -1.0
+    if meaning is None:
+        return None, 1.0
+    if meaning == "speed_rad_per_s" and is_per_minute(name) and read_unit(unit) is None:
+        return meaning, np.pi / 30
+    return meaning, sign * _factor(name, unit, meaning, source)
+
+
+def _factor(name: str, unit: str, meaning: str, source: str) -> float:
+    """To SI. DataRefused: mega or milli, a unit of something else, or one that needs a factor which is not given."""
+    known = read_unit(unit)
+    if known is None:
+        if unit.strip().strip("[]()").lower() in FOREIGN:
+            raise _refused(name, unit, meaning, source, "a unit that needs a factor")
+        return 1.0
+    expected = next((m for ending, m in MEASURES.items() if meaning.endswith(ending)), None)
+    if meaning == "speed_rad_per_s":
+        expected = "speed"
+    if expected is None or (known.measures != expected and name.endswith(f"_{unit}") and known.scale == 1.0):
+        return 1.0
+    if known.measures != expected:
+        raise _refused(name, unit, meaning, source, f"a {known.measures}, not a {expected}")
+    if known.is_ambiguous:
+        raise _refused(name, unit, meaning, source, "milli or mega")
+    return known.scale
+
+
+def _refused(name: str, unit: str, meaning: str, source: str, why: str) -> DataRefused:
+    return DataRefused(
+        f"{source}: the unit {unit} of {name} is {why}", step="recognise columns", value=f"{name} [{unit}]",
+        limit=f"{meaning} in a unit with a known factor", remedy=HOW_TO_MAP,
+    )  # fmt: skip

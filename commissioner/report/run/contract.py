@@ -1,0 +1,83 @@
+"""The JSON of a run, as promised: what `run --json` prints and `result.json` holds."""
+
+from __future__ import annotations
+
+from typing import Any, NotRequired
+
+from typing_extensions import TypedDict
+
+from commissioner.identify.contract import (
+    AxesFinding,
+    Axis,
+    CurvePoint,
+    Gaps,
+    Inverter,
+    Measured,
+    Parameters,
+    RatedFlux,
+    TModel,
+)
+
+
+class GuardDocument(TypedDict):
+    """The highest flux of the run, of its limit, and whether the guard acted."""
+
+    peak_fraction: float | None
+    acted: bool
+    limit_wb: float | None
+
+
+class WrittenRow(TypedDict):
+    """One parameter of the drive: before, as written, as read back; `field`: the contract's name."""
+
+    name: str
+    field: str | None
+    register: int
+    before: float
+    after: float
+    read_back: float
+
+
+class CheckRow(TypedDict):
+    """A check before the motor is energised."""
+
+    name: str
+    has_passed: bool
+    value: Any
+    limit: Any
+    remedy: str
+
+
+class RunDocument(TypedDict):
+    """`parameters` is empty, and what comes of an identification missing, where a run did not get so far."""
+
+    run: str
+    outcome: str
+    reason: str
+    error: dict[str, Any] | None
+    energised_s: float
+    duration_s: float
+    drive: dict[str, Any] | None
+    checks: list[CheckRow]
+    before: dict[str, float | None] | None
+    written: list[WrittenRow]
+    objections: list[Any]
+    parameters: Parameters | dict[str, Measured]
+    remarks: list[str]
+    diagnosis: dict[str, Any] | None
+    flux_guard: GuardDocument
+    convention: NotRequired[str]
+    estimator: NotRequired[str]
+    holds_for_stator_flux_wb: NotRequired[float]
+    t_model: NotRequired[TModel]
+    axes: NotRequired[list[Axis]]
+    dispersion: NotRequired[dict[str, float | None]]
+    findings: NotRequired[list[AxesFinding]]
+    rated_flux_wb: NotRequired[RatedFlux]
+    inverter: NotRequired[Inverter]
+    delay_s: NotRequired[Measured]
+    magnetizing_curve: NotRequired[list[CurvePoint]]
+    stator_resistance_20degc_ohm: NotRequired[Measured | None]
+    gaps: NotRequired[Gaps]
+    winding_temperature_degc: NotRequired[float | None]
+    longer_test: NotRequired[dict[str, Any]]

@@ -1,0 +1,244 @@
+"""One recording under the headers that instruments' manuals show comes as the same numbers, or with a question."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commissioner.errors import ConfigurationError, DataRefused, UsageError
+from commissioner.motor.computed import is_negative_sum
+from commissioner.recordings.imported import store, understand
+from commissioner.recordings.importers import contract_table, read_running
+from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.recordings.table import to_standstill
+
+RATE_HZ = 2000.0
+TIME = np.arange(600) / RATE_HZ
+RNG = np.random.default_rng(7)
+CURRENTS = [
+    4.2 * np.cos(2 * np.pi * 50 * TIME - 0.6 - k * 2 * np.pi / 3) + 0.02 * RNG.standard_normal(TIME.size)
+    for k in range(3)
+]
+V = [325 * np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) + 0.5 * RNG.standard_normal(TIME.size) for k in range(3)]
+
+
+def rows(time, signals, decimals=4, separator=",", comma=False, quoted=False, end=""):
+    """The body as an instrument prints it."""
+    out = []
+    for values in zip(time, *signals, strict=True):
+        cells = [f"{x:.{decimals}f}" for x in values]
+        cells = [c.replace(".", ",") for c in cells] if comma else cells
+        out.append(separator.join(f'"{c}"' if quoted else c for c in cells) + end)
+    return "\n".join(out) + "\n"
+
+
+def lines(*head):
+    return "\n".join(head) + "\n"
+
+
+UV, VW, WU = V[0] - V[1], V[1] - V[2], V[2] - V[0]
+NAMED = [*CURRENTS, *V]
+ABC = "Ia,Ib,Ic,Va,Vb,Vc"
+FILES = {
+    "picoscope": lines("Time,Ia,Ib,Ic,Va,Vb,Vc", "(ms),(mA),(mA),(mA),(V),(V),(V)", "")
+    + rows(1e3 * TIME, [*(1e3 * x for x in CURRENTS), *V]),
+    "picoscope microseconds": lines("Time,Ia,Ib,Ic,Va,Vb,Vc", "(µs),(A),(A),(A),(kV),(kV),(kV)", "")
+    + rows(1e6 * TIME, [*CURRENTS, *(1e-3 * x for x in V)], 6),
+    "rigol": lines(f"X,{ABC},Start,Increment,", "Sequence,A,A,A,V,V,V,-1.0e-01,5.000000e-04,")
+    + rows(np.arange(600), NAMED, 5, end=",,"),
+    "siglent": lines(
+        "Record Length,Analog:600", "Sample Interval,Analog:0.0005", "Horizontal Units,s", "Model Number,SDS1104X-E",
+        "Source," + ABC, "Second,A,A,A,Volt,Volt,Volt",
+    )
+    + rows(TIME, NAMED),
+    "tektronix": lines(
+        "Model,MSO46", "Waveform Type,ANALOG", "Horizontal Units,s", "Sample Interval,5e-04", "Record Length,600",
+        "Probe Attenuation,1,1,1,1,1,1", "Vertical Units,A,A,A,V,V,V", ",,,,,,", "TIME," + ABC,
+    )
+    + rows(TIME, NAMED),
+    "keysight": lines("x-axis," + ABC, "second,Ampere,Ampere,Ampere,Volt,Volt,Volt") + rows(TIME, NAMED),
+    "rohde": lines("in s,Ia in A,Ib in A,Ic in A,Va in V,Vb in V,Vc in V") .replace("in s,", "Time in s,") + rows(TIME, NAMED),
+    "german": lines("Zeit in ms;" + ";".join(f"Strom L{k} in A" for k in (1, 2, 3)) + ";"
+                    + ";".join(f"Spannung L{k} in V" for k in (1, 2, 3)))
+    + rows(1e3 * TIME, NAMED, separator=";", comma=True),
+    "french": lines("Temps (s);Courant L1 (A);Courant L2 (A);Courant L3 (A);Tension L1 (V);Tension L2 (V);Tension L3 (V)")
+    + rows(TIME, NAMED, separator=";", comma=True),
+    "quoted": lines('"time_s","current_u_a","current_v_a","current_w_a","voltage_u_v","voltage_v_v","voltage_w_v"')
+    + rows(TIME, NAMED, comma=True, quoted=True),
+    "stator names": lines("t\tias\tibs\tics\tvas\tvbs\tvcs") + rows(TIME, NAMED, separator="\t"),
+    "stator letters": lines("t,isa,isb,isc,usa,usb,usc") + rows(TIME, NAMED),
+    "chinese": lines("时间(s),A相电流(A),B相电流(A),C相电流(A),A相电压(V),B相电压(V),C相电压(V)") + rows(TIME, NAMED),
+    "rate in the preface": lines("Sampling rate: 2 kS/s", "", "I_U [A];I_V [A];I_W [A];U_L1 [V];U_L2 [V];U_L3 [V]")
+    + "\n".join(";".join(f"{x:.4f}" for x in r) for r in zip(*NAMED, strict=True)) + "\n",
+    "clock times": lines("Time," + ABC)
+    + "".join(f"10:00:00.{round(t * 1e4):04d}," + ",".join(f"{x[k]:.4f}" for x in NAMED) + "\n" for k, t in enumerate(TIME)),
+}  # fmt: skip
+ENCODINGS = {
+    "chinese": "gbk",
+    "stator names": "utf-16",
+    "german": "cp1252",
+    "french": "latin-1",
+    "picoscope microseconds": "cp1252",
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_same_recording_comes_from_every_header(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "file.csv"
+    path.write_bytes(FILES[name].encode(ENCODINGS.get(name, "utf-8")))
+    recording = read_running(path)
+    assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-6)
+    for k in range(3):
+        np.testing.assert_allclose(recording.currents_a[k], CURRENTS[k], atol=1e-4)
+        np.testing.assert_allclose(recording.voltages_v[k], V[k], atol=1e-3)
+
+
+def test_two_wattmeters_give_the_third_voltage_with_its_sign(tmp_path: Path) -> None:
+    path = tmp_path / "analyser.csv"
+    path.write_text(lines("Time (s),Ia (A),Ib (A),Uac (V),Ubc (V)") + rows(TIME, [CURRENTS[0], CURRENTS[1], -WU, VW]))
+    recording = read_running(path)
+    np.testing.assert_allclose(recording.voltages_v[2], WU, atol=1e-3)
+    np.testing.assert_allclose(recording.voltages_v[1], VW, atol=1e-3)
+
+
+@pytest.mark.parametrize("unit", ["MA", "V", "%", "counts"])
+def test_a_unit_that_may_change_the_current_by_a_factor_is_refused(tmp_path: Path, unit: str) -> None:
+    path = tmp_path / "file.csv"
+    path.write_text(lines(f"Time (s),Ia ({unit}),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)") + rows(TIME, NAMED))
+    with pytest.raises(DataRefused, match="unit"):
+        read_running(path)
+
+
+def test_numbers_that_may_be_thousands_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    signals = [np.round(3 + x, 3) + 0.0 for x in (0.1 * CURRENTS[0], 0.1 * CURRENTS[1], 0.1 * CURRENTS[2])]
+    path.write_text(lines("Zeit\tIa\tIb\tIc") + rows(1 + TIME, signals, 3, "\t", comma=True))
+    with pytest.raises(DataRefused, match="thousands"):
+        contract_table(path)
+
+
+def test_decimal_commas_between_commas_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    path.write_text(lines("Time," + ABC) + rows(TIME, NAMED, comma=True))
+    with pytest.raises(DataRefused, match="decimal commas between commas"):
+        read_running(path)
+
+
+CHANNELS = lines("Time,CH1,CH2,CH3,CH4,CH5,CH6", "(s),(V),(V),(V),(V),(V),(V)") + rows(
+    TIME, [*(0.1 * x for x in CURRENTS), *V], 6
+)
+MEANS = ("current_u_a * 10", "current_v_a * 10", "current_w_a * 10", "voltage_u_v", "voltage_v_v", "voltage_w_v")
+
+
+def test_channels_without_names_are_asked_for_and_a_mapping_answers(tmp_path: Path) -> None:
+    path, mapping = tmp_path / "scope.csv", tmp_path / "map.toml"
+    path.write_text(CHANNELS)
+    with pytest.raises(DataRefused) as refusal:
+        read_running(path)
+    assert "--map" in refusal.value.remedy
+    mapping.write_text("[columns]\n" + "".join(f'CH{k} = "{m}"\n' for k, m in enumerate(MEANS, 1)))
+    mapped = read_running(path, read_mapping(mapping))
+    said = tmp_path / "said.csv"
+    said.write_text("".join(f"# CH{k}: {m}\n" for k, m in enumerate(MEANS, 1)) + CHANNELS)
+    for recording in (mapped, read_running(said)):
+        np.testing.assert_allclose(recording.currents_a[1], CURRENTS[1], atol=1e-4)
+        np.testing.assert_allclose(recording.voltages_v[2], V[2], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "text", ["[columns]\nCH1 = 'torque'\n", "[rows]\n", "no toml", "[columns]\nCH1 = 'current_u_a * -0'\n"]
+)
+def test_a_mapping_that_cannot_be_used_is_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigurationError):
+        read_mapping(path)
+    with pytest.raises(UsageError):
+        read_mapping(tmp_path / "none.toml")
+
+
+def test_stamps_printed_short_become_the_mean_step_and_it_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    body = rows(TIME, NAMED)
+    short = "".join(
+        f"{np.floor(1e3 * t) / 1e3:.3f},{line.split(',', 1)[1]}\n"
+        for t, line in zip(TIME, body.splitlines(), strict=True)
+    )
+    path.write_text(lines("Time," + ABC) + short)
+    recording = read_running(path)
+    assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-4)
+    assert [note.code for note in recording.notes] == ["rounded_time"]
+
+
+def test_rows_written_twice_are_taken_once_and_it_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    body = rows(TIME, NAMED).splitlines(keepends=True)
+    path.write_text(lines("Time," + ABC) + "".join(body[:100] + body[99:300] + body[299:]))
+    recording = read_running(path)
+    assert recording.time_s.size == TIME.size
+    assert recording.notes[0].code == "doubled_rows" and recording.notes[0].what.startswith("2 rows")
+
+
+HEADS = {
+    "contract": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a", 1.0),
+    "names": ("Time (ms),segment,axis_deg,voltage_axis_v,Ia (mA),Ib (mA)", 1e3),
+    "units": ("time_s [ms],segment,axis_deg,voltage_axis_v,current_u_a [mA],current_v_a [mA]", 1e3),
+    "unit row": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a\nms,,,V,mA,mA", 1e3),
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_standstill_recordings_come_from_the_same_headers(tmp_path: Path, name: str) -> None:
+    head, scale = HEADS[name]
+    path = tmp_path / "file.csv"
+    zeros = np.zeros(TIME.size)
+    path.write_text(
+        lines(head) + rows(scale * TIME, [zeros, zeros + 60, V[0], scale * CURRENTS[0], scale * CURRENTS[1]])
+    )
+    recording = to_standstill(contract_table(path))
+    assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-6)
+    np.testing.assert_allclose(recording.current_v_a, CURRENTS[1], atol=1e-4)
+
+
+def test_a_running_recording_given_as_standstill_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    path.write_text(FILES["picoscope"])
+    with pytest.raises(DataRefused, match="running motor"):
+        to_standstill(contract_table(path))
+
+
+@pytest.mark.parametrize("form", [".4f", ".7g", ".9g"])
+@pytest.mark.parametrize("gain", [1.0, 0.98])
+def test_a_third_current_that_is_the_others_sum_is_no_sensor(form: str, gain: float) -> None:
+    def printed(x):
+        return np.array([float(format(v, form)) for v in x])
+
+    u, v = gain * CURRENTS[0], CURRENTS[1]
+    assert is_negative_sum(printed(u), printed(v), printed(-(u + v)))
+    assert not is_negative_sum(printed(u), printed(v), printed(CURRENTS[2]))
+
+
+def test_the_computed_third_is_left_out_of_a_standstill_recording_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    zeros = np.zeros(TIME.size)
+    path.write_text(
+        lines(HEADS["contract"][0] + ",current_w_a")
+        + rows(TIME, [zeros, zeros, V[0], CURRENTS[0], CURRENTS[1], -(CURRENTS[0] + CURRENTS[1])])
+    )
+    recording = to_standstill(contract_table(path))
+    assert recording.current_w_a is None
+    assert recording.notes[-1].what.startswith("third current computed from two")
+
+
+def test_what_was_imported_reads_the_same_and_keeps_what_was_changed(tmp_path: Path) -> None:
+    path, out = tmp_path / "scope.csv", tmp_path / "out.csv"
+    path.write_text(FILES["rigol"])
+    table, document = understand(path)
+    assert document["kind"] == "running" and document["phase_order"] == {"current": "u-v-w", "voltage": "u-v-w"}
+    files = store(table, document, out)
+    again = read_running(out)
+    np.testing.assert_allclose(again.currents_a[0], CURRENTS[0], atol=1e-4)
+    assert "Start and Increment" in again.metadata["import_changes"]
+    assert "<img" in Path(files["picture"]).read_text("utf-8")
