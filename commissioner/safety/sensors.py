@@ -70,7 +70,9 @@ class SensorWatch:
         shown = float(np.max(np.abs(_three(phases)[:, place])))
         if abs(shown - claimed) <= SCALE * max(shown, claimed) + SCALE_FLOOR * self.current_limit_a:
             return None
-        return _distrusted("the current samples and the drive's own current magnitude differ", shown, f"{claimed:.4g} A")
+        return _distrusted(
+            "the current samples and the drive's own current magnitude differ", shown, f"{claimed:.4g} A"
+        )
 
     def _against_the_axis(self, block: SampleBlock, phases: Signal) -> StopReason | None:
         if self._zero is None:

@@ -37,7 +37,13 @@ class DirectCurrent:
     while no machine is known whose flux follows from the current exactly."""
 
     def __init__(
-        self, job: Job, findings: Findings, step: str, axis_deg: float, inductance_h: float, machine: InverseGamma | None
+        self,
+        job: Job,
+        findings: Findings,
+        step: str,
+        axis_deg: float,
+        inductance_h: float,
+        machine: InverseGamma | None,
     ) -> None:
         self.job, self.findings, self.axis_deg = job, findings, axis_deg
         self.seconds = self.offset_a = self.peak_fraction = 0.0

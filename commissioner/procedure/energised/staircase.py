@@ -142,7 +142,9 @@ class _Stair(DirectCurrent):
     def ceilings(self) -> SetDriveLimits:
         """What the drive may let pass: the top current and a little, and of a known motor the top level's voltage."""
         if self._is_first:
-            return ceilings.for_current(self.job, self.findings, ceilings.FIRST_OVER * self._top_a, self.job.test_voltage_v)
+            return ceilings.for_current(
+                self.job, self.findings, ceilings.FIRST_OVER * self._top_a, self.job.test_voltage_v
+            )
         volts = TOP_ROOM * max(self.known_voltages(), default=self.job.test_voltage_v)
         return ceilings.for_current(self.job, self.findings, TOP_ROOM * self._top_a, volts)
 
