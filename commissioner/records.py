@@ -26,7 +26,8 @@ class SampleBlock:
 
     `lost_before` counts the samples missing between the previous block and this one; they are never filled.
     `current_*_a[k]` is sampled at `(first_index + k) * sample_period_s`; `voltage_axis_v[k]` is the mean voltage
-    commanded along the axis over the period that starts there.
+    commanded along the axis over the period that starts there. `age_s`: how old the last sample can have been, at
+    most, when it arrived (`safety.freshness`).
     """
 
     session: int
@@ -40,6 +41,7 @@ class SampleBlock:
     dc_link_v: float
     lost_before: int = 0
     clipped: bool = False
+    age_s: float = 0.0
 
     @property
     def count(self) -> int:

@@ -39,6 +39,20 @@ class ChecksJudged:
 
 
 @dataclass(frozen=True)
+class FirstCurrentSeen:
+    """The static stator inductance at a tenth of the staircase's current, over the plate's typical one; the two levels."""
+
+    axis_deg: float
+    stator_inductance_h: float
+    of_typical: float
+    slope_ohm: float
+    voltage_v: tuple[float, float]
+    current_a: tuple[float, float]
+    peak_flux_fraction: float
+    energised_s: float
+
+
+@dataclass(frozen=True)
 class StaircaseFitted:
     """Start values for the fit of all samples together: what the levels alone say, the inverter's knee taken by form."""
 

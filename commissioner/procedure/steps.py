@@ -13,6 +13,7 @@ from typing import Any
 from commissioner.identify.analysis import Identification, identify
 from commissioner.identify.excite.duration import LongerTest, longer_test
 from commissioner.identify.excite.tones import DesignedExcitation
+from commissioner.identify.inverter.first_current import FirstCurrent
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
@@ -21,7 +22,7 @@ from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed
 from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
-from commissioner.procedure.verdict import Decision, Verdict, decide, evidence_of
+from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
     ArmWatchdog,
@@ -29,7 +30,6 @@ from commissioner.safety.commands import (
     Identify,
     ReadNameplate,
     ReadStatus,
-    SetDriveLimits,
     TakeSnapshot,
     Tell,
     Wait,
@@ -105,6 +105,7 @@ class Findings:
     winding_degc: float | None = None
     """Before the first volt; None where the drive has no sensor."""
     tests_done: int = 0
+    first_current: FirstCurrent | None = None
     knee: tuple[DcLevel, ...] = ()
     staircases: list[Staircase] = field(default_factory=list)
     look: Identification | None = None
@@ -188,8 +189,19 @@ def check(job: Job, findings: Findings) -> Step:
         raise failure
     findings.snapshot = yield TakeSnapshot()
     yield ArmWatchdog(job.plan.supervision.watchdog_s)
-    yield SetDriveLimits(findings.trip_current_a(job), job.test_voltage_v, job.axis_time_s)
     return Event.CHECKS_PASSED
+
+
+def reject(findings: Findings, objections: tuple[Objection, ...]) -> Generator[Command, Any, Event]:
+    """End here, for these reasons; nothing more is energised or written."""
+    findings.verdict = Verdict(Decision.REJECT, objections)
+    yield Tell(_told(findings.verdict))
+    return Event.REJECT
+
+
+def _told(verdict: Verdict) -> VerdictReached:
+    value, limit, remedy = next(((o.value, o.limit, o.remedy) for o in verdict.objections), (None, None, ""))
+    return VerdictReached(verdict.decision.value, verdict.reason, value, limit, remedy)
 
 
 def judge(job: Job, findings: Findings) -> Step:
@@ -200,16 +212,7 @@ def judge(job: Job, findings: Findings) -> Step:
     findings.identification = identification
     verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict
-    first = verdict.objections[0] if verdict.objections else None
-    yield Tell(
-        VerdictReached(
-            verdict.decision.value,
-            verdict.reason,
-            first.value if first else None,
-            first.limit if first else None,
-            first.remedy if first else "",
-        )
-    )
+    yield Tell(_told(verdict))
     return {Decision.WRITE_BACK: Event.WRITE_BACK, Decision.KEEP: Event.KEEP, Decision.REJECT: Event.REJECT}[
         verdict.decision
     ]

@@ -93,6 +93,7 @@ def watch_limits(job: Job) -> WatchLimits:
         flux_fraction=FLUX_FRACTION,
         axis_time_s=job.axis_time_s,
         lost_samples_s=LOST_SAMPLES_S,
+        age_s=job.plan.supervision.watchdog_s,
         dc_link_v=(limits.dc_link_min_v, limits.dc_link_max_v),
         heatsink_degc=limits.heatsink_max_degc,
         winding_degc=limits.winding_max_degc,

@@ -6,6 +6,7 @@ journals, on the disk, what energises or writes before it goes out.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
@@ -15,19 +16,18 @@ from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBac
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
-from commissioner.registers.window import StreamCursor
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
 from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
+from commissioner.run.stream import Stream, stop_if
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
-from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
+from commissioner.safety.sensors import SensorWatch
+from commissioner.safety.watch import WatchLimits, judge_block, judge_status
 
 STATUS_EVERY_S = 0.25
 """Motor time between two readings of the drive's status while energised."""
-EMPTY_FETCH_PAUSE_S = 0.002
-"""Wait after a window without new samples: a drive in real time needs a moment."""
 TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
 """Before the first of these the drive is somebody else's: it is only looked at, and not switched off either."""
 
@@ -72,7 +72,7 @@ class Runner:
         self._present = present
         self._progress = _Progress()
         self._stop = stop or OperatorStop()
-        self._cursor: StreamCursor | None = None
+        self._stream: Stream | None = None
         self._snapshot: ParameterSnapshot | None = None
 
     @property
@@ -173,7 +173,7 @@ class Runner:
                 live = self._disarm(reason)
                 if live is not None:
                     raise live
-                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+                stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
                 set_up(self._inverter, command)
 
@@ -202,11 +202,17 @@ class Runner:
         progress = self._progress
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
-        self._cursor = self._inverter.enable()
+        limits = progress.facts.drive_limits
+        began_s = time.monotonic()
+        cursor = self._inverter.enable()
+        sensors = SensorWatch(limits.current_a if limits else math.inf)
+        self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""
-        block = self._next_block()
+        longest_s = self._progress.facts.watchdog_s
+        assert self._stream is not None and longest_s is not None
+        block = self._stream.next_block(longest_s)
         if block is None:
             return None
         progress = self._progress
@@ -214,34 +220,12 @@ class Runner:
         seconds = (block.count + block.lost_before) * block.sample_period_s
         progress.session_s += seconds
         progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
-        self._stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
+        stop_if(judge_block(block, progress.session_s, progress.flux_fraction, self._watch))
+        stop_if(self._stream.sensors.judge(block))
         if progress.session_s >= progress.next_status_s:
             progress.next_status_s = progress.session_s + STATUS_EVERY_S
-            self._stop_if(judge_status(self._inverter.read_status(), self._watch))
+            self._stream.ask_status()
         return block
-
-    def _next_block(self) -> SampleBlock | None:
-        longest_s = self._progress.facts.watchdog_s
-        assert self._cursor is not None and longest_s is not None
-        asked = time.monotonic()
-        deadline = asked + longest_s
-        while asked <= deadline:
-            asked = time.monotonic()
-            window = self._inverter.fetch(self._cursor)
-            self._cursor = window.cursor
-            if window.block is not None:
-                return window.block
-            if window.has_ended:
-                self._stop_if(judge_status(self._inverter.read_status(), self._watch))
-                return None
-            time.sleep(EMPTY_FETCH_PAUSE_S)
-        raise DriveFault(
-            "the drive sends no samples",
-            step="stream",
-            value=f"nothing for {longest_s:g} s",
-            limit="new samples within the watchdog's time",
-            remedy="check the drive's status; the output has been switched off",
-        )
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):
@@ -261,12 +245,6 @@ class Runner:
         except (Exception, SystemExit) as gone:
             self._present = lambda _record: None
             note(self._folder, "presenter_lost", {"kind": type(gone).__name__, "what": str(gone)})
-
-    def _stop_if(self, reason: StopReason | None) -> None:
-        if reason is None:
-            return
-        kind = DriveFault if reason.is_fault else Aborted
-        raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
     def _disarm(self, reason: str) -> DriveFault | None:
         """The one place that de-energises. It tries every path and says what it verified.

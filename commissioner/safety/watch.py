@@ -23,12 +23,14 @@ class StopReason:
 
 @dataclass(frozen=True)
 class WatchLimits:
-    """Peak values; `flux_fraction` is of the rated stator flux and lies above the procedure's guard."""
+    """Peak values; `flux_fraction` is of the rated stator flux and lies above the procedure's guard. `age_s`: a motor whose
+    newest sample is older runs unsupervised for as long as the drive's own watchdog would allow."""
 
     current_a: float
     flux_fraction: float
     axis_time_s: float
     lost_samples_s: float
+    age_s: float
     dc_link_v: tuple[float, float]
     heatsink_degc: float
     winding_degc: float
@@ -65,6 +67,14 @@ def judge_block(block: SampleBlock, energised_s: float, flux_fraction: float, li
             energised_s,
             limits.axis_time_s,
             "raise limits.axis_time_s",
+        )
+    if not block.age_s <= limits.age_s:
+        return StopReason(
+            "the samples came too late",
+            block.age_s,
+            limits.age_s,
+            "use a faster link or a host that is less busy",
+            is_fault=True,
         )
     lost_s = block.lost_before * block.sample_period_s
     if lost_s > limits.lost_samples_s:

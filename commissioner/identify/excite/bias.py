@@ -4,8 +4,7 @@ A direct current above the tones' peak keeps the sign of every leg's current, so
 stays constant and the tones see the linear machine (`standstill_identification` 3.4); building it up and holding it tells
 the magnetizing inductance where slow tones drown in the inverter's loss. Its price is flux: L I, whatever the frequency.
 
-A voltage integral cannot watch a constant flux. The current can: psi_R' = R_R i - alpha psi_R needs no voltage, so neither
-resistance nor inverter, forgets its start within a rotor time constant, and reads too high where iron saturates.
+A voltage integral cannot watch a constant flux. The current can: `current_flux`.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
+from commissioner.identify.excite.current_flux import CurrentFlux
 from commissioner.identify.excite.forecast import Forecast
 from commissioner.identify.excite.tones import Excitation, ExcitationLimits, predicted_peaks
 from commissioner.identify.inverter.staircase import DcLevel, InverterError
@@ -95,28 +94,23 @@ class BiasGuard:
     rotor_flux_wb: float
     reaction_s: float = 0.02
     _forecast: Forecast = field(init=False)
+    _flux: CurrentFlux = field(init=False)
 
     def __post_init__(self) -> None:
         worst_h = (1.0 + DOUBT) * self.machine.magnetizing_inductance_h
         self.machine = replace(self.machine, magnetizing_inductance_h=worst_h)
         whole = replace(self.excitation, dc_bias_v=self.bias_v)
         self._forecast = Forecast.behind(self.inverter, whole, self.axis_deg)
+        self._flux = CurrentFlux(self.machine, self.sample_period_s, self.rotor_flux_wb)
 
     def advance(self, current_a: Signal, ends_s: float, lost_before: int = 0) -> tuple[float, float]:
         """(largest |stator flux| of the block, the same over latency and reaction as well), in Wb; `ends_s` is the end of
         the block from the excitation's start."""
-        machine = self.machine
-        keeps = math.exp(-self.sample_period_s * machine.rotor_resistance_ohm / machine.magnetizing_inductance_h)
-        driven = (
-            (1.0 - keeps) * machine.magnetizing_inductance_h * np.append(np.full(lost_before, current_a[0]), current_a)
-        )
-        rotor = lfilter([1.0], [1.0, -keeps], driven, zi=[keeps * self.rotor_flux_wb])[0]
-        self.rotor_flux_wb = float(rotor[-1])
-        seen = rotor[lost_before:] + machine.leakage_inductance_h * current_a
+        seen = self._flux.advance(current_a, lost_before)
         peak_wb = float(np.max(np.abs(seen)))
         steps = max(2, math.ceil((self.latency_s + self.reaction_s) / self.sample_period_s))
         stride = max(1, steps // AHEAD_POINTS)
         ahead = ends_s + (np.arange(steps // stride + 1, dtype=np.float64) + 0.5) * self.sample_period_s * stride
-        start = (float(current_a[-1]), self.rotor_flux_wb, float(seen[-1]))
-        predicted_wb, _ = self._forecast.peaks(machine, ahead, self.scale, start)
+        start = (float(current_a[-1]), self._flux.rotor_flux_wb, float(seen[-1]))
+        predicted_wb, _ = self._forecast.peaks(self.machine, ahead, self.scale, start)
         return peak_wb, max(peak_wb, predicted_wb)

@@ -118,9 +118,16 @@ class FluxGuard:
         return self._granted
 
     def advance(
-        self, voltage_v: Signal, current_a: Signal, estimate: BlockEstimate, present_scale: float, lost_before: int = 0
+        self,
+        voltage_v: Signal,
+        current_a: Signal,
+        estimate: BlockEstimate,
+        present_scale: float,
+        lost_before: int = 0,
+        age_s: float = 0.0,
     ) -> FluxReading:
-        """Take in the block the observer has just taken in; `current_a` is along the axis, `(n,)`."""
+        """Take in the block the observer has just taken in; `current_a` is along the axis, `(n,)`. Samples older than the
+        latency say nothing of the amplitude last asked for: they permit no raise, nor do the first that follow them."""
         self._samples += lost_before + voltage_v.shape[0]
         time_s = self._samples * self.sample_period_s
         model_free = self._integrate(voltage_v, current_a)
@@ -133,7 +140,7 @@ class FluxGuard:
         difference = float(np.max(np.abs(estimate.stator_flux_wb - model_free)))
         self._recent = [r for r in self._recent if time_s - r.time_s < self._window_s]
         self._recent.append(_Seen(time_s, difference, max(observer_wb, model_free_wb), largest_a))
-        if abs(present_scale - self._last_scale) > 1e-4:
+        if abs(present_scale - self._last_scale) > 1e-4 or age_s > self.latency_s:
             self._scale_since_s = time_s
         self._last_scale = present_scale
         permitted = self._permit(estimate, present_scale, time_s, current_a)

@@ -117,16 +117,21 @@ class StaircasePlan:
 
 CLIMB_S = 0.5
 """The climb drives the top current through the typical resistance in this time, whatever dead time takes before it."""
+MOST_INDUCTIVE, SEEN_DOUBT = 1.35, 1.3
+"""Of the plate's typical motor: the most inductive of 35 published ones. Of an inductance seen at a small current: the most
+that it may be more at a larger one, where iron's permeability first rises, and for what that measurement is off."""
 
 
-def staircase(nameplate: Nameplate, limits: StaircaseLimits) -> StaircasePlan:
-    """The plan for a motor of which only the plate is known.
+def staircase(nameplate: Nameplate, limits: StaircaseLimits, seen_inductance_h: float | None = None) -> StaircasePlan:
+    """The plan for a motor of which the plate and, if so, the inductance at a small current is known.
 
-    Its top current keeps the stator flux L_s i of the most inductive of 35 published machines (1.35 times the typical
-    member of the prior) under the limit, iron unsaturated.
+    Its top current keeps the stator flux L_s i of the most inductive motor that this can be under the limit, iron
+    unsaturated. A small current can show too little inductance, behind an inverter that loses much: it raises the top never.
     """
     box = prior(nameplate)
-    inductance_h = 1.35 * (box.typical.leakage_inductance_h + box.typical.magnetizing_inductance_h)
+    inductance_h = MOST_INDUCTIVE * (box.typical.leakage_inductance_h + box.typical.magnetizing_inductance_h)
+    if seen_inductance_h is not None:
+        inductance_h = max(inductance_h, SEEN_DOUBT * seen_inductance_h)
     top_a = 0.9 * min(limits.current_a, limits.flux_wb / inductance_h)
     slow = -poles_per_s(box.typical)[0]
     return StaircasePlan(

@@ -9,7 +9,7 @@ from commissioner.identify.excite.bias import CUT_ABOVE, BiasGuard, plan_bias
 from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import Excitation, ExcitationLimits
 from commissioner.procedure.energised.multitone import UnderTest
-from commissioner.procedure.energised.session import along_axis, duration_s, next_block, period_s
+from commissioner.procedure.energised.session import SinceCommand, along_axis, next_block, period_s
 from commissioner.procedure.findings import BiasChosen, GuardActed
 from commissioner.procedure.steps import Findings, Job
 from commissioner.safety.commands import Command, SetBias, SetScale, Tell
@@ -42,13 +42,14 @@ def under_bias(
         findings.inverter, axis_deg, test.rotor_flux_wb,
     )  # fmt: skip
     yield SetScale(plan.scale)
-    passed_s, has_bias = -1.0 / job.scale_ramp_per_s, False
-    while passed_s < seconds:
-        if passed_s >= 0.0 and not has_bias:  # the tones have come down: both together would pass the current limit
-            has_bias = True
+    since, has_bias = SinceCommand(), False
+    while since.seconds < seconds or not has_bias:
+        if since.seconds >= 1.0 / job.scale_ramp_per_s and not has_bias:
+            # the tones have come down: both together would pass the current limit
+            since, has_bias = SinceCommand(), True
             yield SetBias(plan.voltage_v)
         block = yield from next_block(findings, step, axis_deg)
-        passed_s += duration_s(block)
+        since.take(block)
         ends_s = (block.first_index + block.count) * block.sample_period_s
         reached_wb, predicted_wb = guard.advance(along_axis(block) - test.offset_a, ends_s, block.lost_before)
         reading = test.take_biased(block, reached_wb, predicted_wb)

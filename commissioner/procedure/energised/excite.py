@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from commissioner.errors import DataRefused
@@ -13,7 +13,9 @@ from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import DesignedExcitation, ExcitationLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
+from commissioner.motor.plate_match import PlateMismatch, mismatch, plate_match
 from commissioner.procedure.assembly import assemble
+from commissioner.procedure.energised.ceilings import aimed_current_a, for_tones
 from commissioner.procedure.energised.closing_bias import SECONDS as BIAS_SECONDS
 from commissioner.procedure.energised.closing_bias import under_bias
 from commissioner.procedure.energised.multitone import UnderTest, plate_machine, warm_up
@@ -27,7 +29,8 @@ from commissioner.procedure.energised.session import (
 )
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
 from commissioner.procedure.states import Event
-from commissioner.procedure.steps import Findings, Job, Step
+from commissioner.procedure.steps import Findings, Job, Step, reject
+from commissioner.procedure.verdict import Objection
 from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetScale, Tell
 
 __all__ = ["excite", "warm_up"]
@@ -54,6 +57,9 @@ def excite(job: Job, findings: Findings) -> Step:
         look_s = FIRST_LOOK * seconds
         yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
         yield from _look(job, findings)
+        mismatch = _mismatch(job, findings)
+        if mismatch is not None:
+            return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
     ramp_s = 1.0 / job.scale_ramp_per_s
     left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - ramp_s
     bias_s = BIAS_SECONDS * job.stretch
@@ -79,7 +85,7 @@ def _design(job: Job, findings: Findings, seconds: float) -> DesignedExcitation:
     machine = findings.estimate or plate_machine(job, findings)
     limits = ExcitationLimits(
         flux_wb=job.flux_limit_wb(findings.resistance_ohm(job)),
-        current_a=findings.test_current_a(job),
+        current_a=aimed_current_a(job, findings),
         voltage_v=job.test_voltage_v,
     )
     return excitation.design(machine, limits, period_s(findings), findings.inverter, seconds)
@@ -102,6 +108,14 @@ def _look(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     findings.is_measured = findings.estimate == look.parameters
     error = look.inverter.plateau_v if look.inverter else 0.0
     yield Tell(FirstLook(look.parameters.as_tuple(), look.std, error, look.delay_s[0]))
+
+
+def _mismatch(job: Job, findings: Findings) -> PlateMismatch | None:
+    """Whether the motor that was measured is the plate's, as soon as all four of its values are."""
+    look = findings.look
+    if look is None or any(s > LOOK_STD * v for v, s in zip(look.parameters.as_tuple(), look.std, strict=True)):
+        return None
+    return mismatch(plate_match(look.parameters, job.nameplate), job.nameplate)
 
 
 def _believable(look: Identification, otherwise: InverseGamma, box: ParameterBox) -> InverseGamma:
@@ -140,6 +154,7 @@ def _test(
         )
     )  # fmt: skip
     under_test = UnderTest(job, findings, axis_deg, chosen, seconds)
+    yield for_tones(job, findings)
     yield LoadExcitation(axis_deg, tones, BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
     yield Enable(STEP)
     findings.segment += 1

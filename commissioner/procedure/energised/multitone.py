@@ -16,6 +16,7 @@ from commissioner.identify.observer.coordinates import PRIOR_LOG_STD
 from commissioner.identify.observer.observer import BlockEstimate, ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.procedure.energised.ceilings import aimed_current_a, tripping_current_a
 from commissioner.procedure.energised.session import along_axis, duration_s, period_s
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.steps import Findings, Job
@@ -49,7 +50,7 @@ class UnderTest:
         )  # fmt: skip
         self._guard = FluxGuard(
             job.flux_limit_wb(resistance_ohm), job.link_latency_s, chosen.excitation, sample_s, resistance_ohm,
-            inverter, axis_deg, current_a=findings.test_current_a(job), trip_a=findings.trip_current_a(job),
+            inverter, axis_deg, current_a=aimed_current_a(job, findings), trip_a=tripping_current_a(job, findings),
         )  # fmt: skip
         first = min(job.plan.excitation.first_scale, self._guard.safe_scale)
         if findings.is_measured:
@@ -83,7 +84,7 @@ class UnderTest:
         step = self._job.scale_ramp_per_s * taken_s
         self._present_scale += float(np.clip(self.scale - self._present_scale, -step, step))
         reading = self._guard.advance(
-            block.voltage_axis_v, current, self._estimate, self._present_scale, block.lost_before
+            block.voltage_axis_v, current, self._estimate, self._present_scale, block.lost_before, block.age_s
         )
         self._lost += block.lost_before
         self.peak_fraction = max(self.peak_fraction, self._measured_fraction(reading))
@@ -166,8 +167,14 @@ class UnderTest:
 
 
 def plate_machine(job: Job, findings: Findings) -> InverseGamma:
-    """The plate's typical machine with the resistance that was measured."""
-    return replace(prior(job.nameplate).typical, stator_resistance_ohm=findings.resistance_ohm(job))
+    """The plate's typical machine with the resistance and the static inductance that were measured."""
+    box = prior(job.nameplate)
+    machine = replace(box.typical, stator_resistance_ohm=findings.resistance_ohm(job))
+    if findings.first_current is None:
+        return machine
+    rest_h = findings.first_current.stator_inductance_h - machine.leakage_inductance_h
+    within_h = min(max(rest_h, box.lower.magnetizing_inductance_h), box.upper.magnetizing_inductance_h)
+    return replace(machine, magnetizing_inductance_h=within_h)
 
 
 def warm_up(nameplate: Nameplate) -> None:

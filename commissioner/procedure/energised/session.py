@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,10 +44,27 @@ def measure_offset(findings: Findings, step: str, axis_deg: float) -> Generator[
 
 def ramp_down(findings: Findings, step: str, axis_deg: float, seconds: float) -> Generator[Command, Any, None]:
     """Fetch until the drive's ramp has reached zero, so that the motor is left without a jerk."""
-    passed = 0.0
-    while passed < seconds:
-        block = yield from next_block(findings, step, axis_deg)
-        passed += duration_s(block)
+    since = SinceCommand()
+    while since.seconds < seconds:
+        since.take((yield from next_block(findings, step, axis_deg)))
+
+
+@dataclass
+class SinceCommand:
+    """The motor time that has surely passed, at the end of the newest block, since the last command took effect.
+
+    A command has taken effect when its answer is here, and so before the next block is; that block's last sample may be
+    older than the command, by its age at the most. Late samples so let no command overtake what it was based on.
+    """
+
+    seconds: float = 0.0
+    _has_begun: bool = False
+
+    def take(self, block: SampleBlock) -> None:
+        if self._has_begun:
+            self.seconds += duration_s(block)
+        else:
+            self._has_begun, self.seconds = True, -block.age_s
 
 
 def duration_s(block: SampleBlock) -> float:

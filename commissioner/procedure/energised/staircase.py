@@ -1,55 +1,60 @@
-"""The DC staircase: levels of both signs, enough to tell the stator's resistance from what the inverter loses."""
+"""The DC staircase: levels of both signs, enough to tell the stator's resistance from what the inverter loses.
+
+On an unknown motor it is preceded by a first current, a tenth of what the plate's motor could take: what that tells of the
+inductance says how much the motor that is really there may be given.
+"""
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Generator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from commissioner.errors import Aborted
 from commissioner.identify.inverter import staircase as resistance
+from commissioner.identify.inverter.first_current import FirstCurrent, HeldLevel, first_current, stepped_inductance_h
 from commissioner.identify.inverter.settling import Approach, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
+from commissioner.motor.plate_match import inductance_mismatch
 from commissioner.motor.standstill import poles_per_s
-from commissioner.procedure.energised.session import (
-    BIAS_RAMP_PER_S,
-    OFFSET_S,
-    along_axis,
-    duration_s,
-    measure_offset,
-    next_block,
-    period_s,
-    ramp_down,
-)
-from commissioner.procedure.findings import StaircaseFitted, StepProgress
+from commissioner.procedure.energised import ceilings
+from commissioner.procedure.energised.direct_current import STEER_S, DirectCurrent
+from commissioner.procedure.energised.session import BIAS_RAMP_PER_S, period_s
+from commissioner.procedure.findings import FirstCurrentSeen, StaircaseFitted, StepProgress
 from commissioner.procedure.states import Event
-from commissioner.procedure.steps import Findings, Job, Step
-from commissioner.records import SampleBlock, Signal
-from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetBias, Tell
+from commissioner.procedure.steps import Findings, Job, Step, reject
+from commissioner.procedure.verdict import Objection
+from commissioner.records import Signal
+from commissioner.safety.commands import Command, SetBias, SetDriveLimits, Tell
 
-STEP = "DC staircase"
-RUNGS = (1.0, 0.6, 0.3)
-"""DC levels of one sign, of the top current."""
-KNOWN_TOP = 0.95
-"""Flux of the top DC level, of the limit, once the inductance is known."""
+STEP, FIRST_STEP = "DC staircase", "first current"
+RUNGS, UNKNOWN_RUNGS, FIRST_LOWER = (1.0, 0.6, 0.3), (0.6, 0.3), 0.55
+"""DC levels of one sign, of the top current; on an unknown motor those before the top; the lower of the first current."""
+FIRST_SHARE = 0.2
+"""The first current, of the top that the plate's most inductive motor could take."""
+TOP, KNOWN_TOP = 0.9, 0.95
+"""Flux of the top DC level, of the limit, and once all of the machine is known."""
+TOP_ROOM = 1.15
+"""Current that the drive ends a staircase at, of its top."""
 SECONDS = 5.0
-"""A staircase's energised time; levels that have not settled by then are extrapolated."""
-STEER_S = 0.02
-"""Time between two voltages of the climb or of a push."""
+"""A staircase's energised time, a first current's included; levels that have not settled by then are extrapolated."""
+FIRST_SECONDS, FIRST_END_S = 2.2, 0.05
+FIRST_KEEPS = 0.6
+"""Of the climb's voltage: what the first current is held at, at the least; a slow motor's climb is nearly all induction."""
 IDLE_S = 4.0
 """The climb would pass the whole test voltage in this time as long as no current flows."""
-CARRIES = 0.02
+CARRIES, FIRST_CARRIES = 0.02, 0.15
 """Of the top current: from here on the climb is slow."""
 RISE_STEPS = 10
 KNEE_STEP, KNEE_TOP, KNEE_LAG = 0.02, 0.3, 0.1
 """Points kept from the climb: their distance and how far up, of the top current, and the largest share of flux lag."""
 SETTLED = 0.006
+FIRST_SETTLED = 0.012
 FAST_TIMES = 4.0
 PUSH, ARRIVAL = 4.0, 0.85
 """First surplus of a push towards the next level, in resistive steps; it falls to nothing while the flux gets that far."""
@@ -58,22 +63,27 @@ PUSH_ABOVE_S = 0.15
 
 
 def measure_resistance(job: Job, findings: Findings) -> Step:
-    """DC levels of both signs; on the first axis a slow climb finds how much voltage they need."""
+    """DC levels of both signs; on the first axis a first current and a slow climb find how much voltage they need."""
     axis_deg = job.plan.tests_deg[findings.tests_done]
     findings.axis_s = 0.0
+    if findings.first_current is None:
+        seen = yield from _first_current(job, findings, axis_deg)
+        mismatch = inductance_mismatch(seen.stator_inductance_h, job.nameplate)
+        if mismatch is not None:
+            return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
     stair = _Stair(job, findings, axis_deg)
-    yield LoadExcitation(axis_deg, (), BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
-    yield Enable(STEP)
-    findings.segment += 1
-    yield from stair.zero()
-    voltages = stair.known_voltages() or (yield from stair.climb())
-    both = (*voltages, *(-v for v in reversed(voltages)))
-    for number, (before_v, voltage_v) in enumerate(itertools.pairwise((0.0, *both))):
-        yield from stair.hold(before_v, voltage_v, len(both) - number)
-        yield Tell(stair.progress(len(both)))
-    yield SetBias(0.0)
-    yield from ramp_down(findings, STEP, axis_deg, 1.0 / BIAS_RAMP_PER_S)
-    yield Disarm("staircase measured")
+    yield from stair.begin(stair.ceilings())
+    known = stair.known_voltages()
+    if known:
+        yield from stair.walk((*known, *(-v for v in reversed(known))))
+    else:
+        yield from stair.climb(UNKNOWN_RUNGS[0])
+        yield from stair.walk([stair.voltage_at(rung) for rung in UNKNOWN_RUNGS])
+        stair.tighten()
+        yield from stair.climb(1.0)
+        top = stair.voltage_at(1.0)
+        yield from stair.walk((top, *(-stair.voltage_at(rung) for rung in reversed(UNKNOWN_RUNGS)), -top))
+    yield from stair.end("staircase measured", 1.0 / BIAS_RAMP_PER_S)
     findings.knee = findings.knee or tuple(stair.knee)
     fitted = resistance.fit_staircase((*stair.levels(), *findings.knee), axis_deg)
     findings.staircases.append(fitted)
@@ -82,40 +92,61 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     return Event.RESISTANCE_KNOWN
 
 
-@dataclass
-class _Stair:
-    """One DC staircase under way."""
+def _first_current(job: Job, findings: Findings, axis_deg: float) -> Generator[Command, Any, FirstCurrent]:
+    """A tenth of the current, then half of that: the static inductance of the motor that is really there."""
+    stair = _Stair(job, findings, axis_deg, is_first=True)
+    yield from stair.begin(stair.ceilings())
+    yield from stair.climb(1.0)
+    upper_v, lower_v = stair.voltage_at(1.0), stair.voltage_at(FIRST_LOWER)
+    yield from stair.walk((upper_v, lower_v, upper_v))
+    seen = stair.first_current()
+    yield from stair.end("first current seen", FIRST_END_S)
+    findings.first_current = seen
+    typical = prior(job.nameplate).typical
+    of_typical = seen.stator_inductance_h / (typical.leakage_inductance_h + typical.magnetizing_inductance_h)
+    yield Tell(
+        FirstCurrentSeen(axis_deg, of_typical=of_typical, peak_flux_fraction=stair.peak_fraction, energised_s=stair.seconds, **asdict(seen))
+    )  # fmt: skip
+    return seen
 
-    job: Job
-    findings: Findings
-    axis_deg: float
-    knee: list[DcLevel] = field(default_factory=list)
-    seconds: float = 0.0
-    offset_a: float = 0.0
-    _held: list[tuple[float, Approach]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        job = self.job
-        flux_wb = job.flux_limit_wb(self.findings.resistance_ohm(job))
-        self._most_a = self.findings.test_current_a(job)
+class _Stair(DirectCurrent):
+    """One DC staircase under way; `is_first`: the small one that looks at an unknown motor."""
+
+    def __init__(self, job: Job, findings: Findings, axis_deg: float, *, is_first: bool = False) -> None:
+        self._known: InverseGamma | None = findings.look.parameters if findings.look else None
+        self._is_first = is_first
+        self._most_a = findings.test_current_a(job)
+        self.knee: list[DcLevel] = []
+        self._reached, self._steady, self._before_v = [0.0], [0.0], 0.0
+        self._levels = 3 if is_first else 2 * len(RUNGS)
+        self._held: list[tuple[float, Approach]] = []
+        self._whole: list[HeldLevel] = []
+        flux_wb = job.flux_limit_wb(findings.resistance_ohm(job))
+        seen_h = findings.first_current.stator_inductance_h if findings.first_current else None
         limits = StaircaseLimits(self._most_a, flux_wb, job.test_voltage_v)
-        self._plan = resistance.staircase(job.nameplate, limits)
-        look = self.findings.look
-        self._known: InverseGamma | None = look.parameters if look else None
+        self._plan = resistance.staircase(job.nameplate, limits, seen_h)
         machine = self._known or prior(job.nameplate).typical
         slow, fast = poles_per_s(machine)
         self._slow_s, self._fast_s = -1.0 / slow, -1.0 / fast
-        self._top_a = self._plan.top_current_a
+        self._top_a = (FIRST_SHARE if is_first else 1.0) * self._plan.top_current_a
         if self._known is not None:
             inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
             self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
+        step = FIRST_STEP if is_first else STEP
+        super().__init__(job, findings, step, axis_deg, self._plan.largest_inductance_h, self._known)
+        self._already_s = 0.0 if is_first or self._known else findings.axis_s
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
-    def zero(self) -> Generator[Command, Any, None]:
-        """Before any voltage: what the sensors show is offset."""
-        self.offset_a = yield from measure_offset(self.findings, STEP, self.axis_deg)
-        self.seconds += OFFSET_S
+    def ceilings(self) -> SetDriveLimits:
+        """What the drive may let pass: the top current and a little, and of a known motor the top level's voltage."""
+        if self._is_first:
+            return ceilings.for_current(
+                self.job, self.findings, ceilings.FIRST_OVER * self._top_a, self.job.test_voltage_v
+            )
+        volts = TOP_ROOM * max(self.known_voltages(), default=self.job.test_voltage_v)
+        return ceilings.for_current(self.job, self.findings, TOP_ROOM * self._top_a, volts)
 
     def known_voltages(self) -> tuple[float, ...]:
         """The rungs' voltages once a look has told resistance, inductance and inverter; empty before."""
@@ -126,30 +157,53 @@ class _Stair:
         volts = self._known.stator_resistance_ohm * currents + lost
         return tuple(float(min(v, self.job.test_voltage_v)) for v in volts)
 
-    def climb(self) -> Generator[Command, Any, tuple[float, ...]]:
-        """Raise the bias until the top current flows, slowly once any flows; the rungs' voltages, largest first.
+    def climb(self, share: float) -> Generator[Command, Any, None]:
+        """Raise the bias until this share of the top current flows, slowly once any flows, from where current was seen to
+        flow before.
 
         What the climb needs to build up flux would drive too much current once held: it is taken off, for the most
-        inductive motor the plate allows.
+        inductive motor that this can be.
         """
-        job, voltage_v, steady, reached = self.job, 0.0, [0.0], [0.0]
-        while reached[-1] < self._top_a and voltage_v < job.test_voltage_v:
-            slow = self._plan.climb_v_per_s
-            rate = slow if reached[-1] > CARRIES * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
+        job, slow, reached, steady = self.job, self._plan.climb_v_per_s, self._reached, self._steady
+        carries = FIRST_CARRIES if self._is_first else CARRIES
+        seen = self.findings.first_current
+        voltage_v, wanted_a = max(steady[-1], seen.voltage_v[1] if seen else 0.0), share * self._top_a
+        while reached[-1] < wanted_a and voltage_v < job.test_voltage_v:
+            rate = slow if seen or reached[-1] > carries * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
             voltage_v = min(voltage_v + rate * STEER_S, job.test_voltage_v)
-            step_s, seen_a = yield from self._steer(voltage_v)
+            step_s, seen_a = yield from self.steer(voltage_v, self._top_a)
             self._note_climb(voltage_v, seen_a, (seen_a - reached[-1]) / step_s)
             reached.append(max(reached[-1], seen_a))
             back = min(len(reached) - 1, RISE_STEPS)
             rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
-            steady.append(max(steady[-1], voltage_v - self._plan.largest_inductance_h * rise))
-        if reached[-1] < 0.3 * self._top_a:
+            held_v = voltage_v - self._plan.largest_inductance_h * rise
+            steady.append(max(steady[-1], held_v, FIRST_KEEPS * voltage_v if self._is_first else 0.0))
+        if reached[-1] < 0.3 * wanted_a:
             raise Aborted(
-                "no current flows", step=f"{STEP}, axis {self.axis_deg:g} deg", value=f"{reached[-1]:.3g} A",
-                limit=f"{self._top_a:.3g} A within {job.test_voltage_v:.3g} V",
+                "no current flows", step=self._where, value=f"{reached[-1]:.3g} A",
+                limit=f"{wanted_a:.3g} A within {job.test_voltage_v:.3g} V",
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip
-        return tuple(float(np.interp(rung * reached[-1], reached, steady)) for rung in RUNGS)
+        self._top_a = min(self._top_a, reached[-1] / share)
+
+    def voltage_at(self, rung: float) -> float:
+        """What the climb has shown to hold this share of the top current."""
+        return float(np.interp(rung * self._top_a, self._reached, self._steady))
+
+    def tighten(self) -> None:
+        """The inductance between the two levels held last says how high the top may be."""
+        period = period_s(self.findings)
+        larger, smaller = self._whole[-2:]
+        inductance_h = stepped_inductance_h(larger, smaller, period, self._tail)
+        self._top_a = min(self._top_a, TOP * self._limit_wb / max(resistance.SEEN_DOUBT * inductance_h, 1e-9))
+
+    def walk(self, voltages_v: Sequence[float]) -> Generator[Command, Any, None]:
+        """Hold these levels, one after the other."""
+        for voltage_v in voltages_v:
+            yield from self.hold(self._before_v, voltage_v, self._levels - len(self._held))
+            self._before_v = voltage_v
+            if not self._is_first:
+                yield Tell(self.progress(self._levels))
 
     def _note_climb(self, voltage_v: float, current_a: float, rise_a_per_s: float) -> None:
         """Points on the knee of the inverter's error, which no settled level shows; the iron's small lag taken off."""
@@ -162,19 +216,26 @@ class _Stair:
 
     def hold(self, before_v: float, voltage_v: float, levels_left: int) -> Generator[Command, Any, None]:
         """Hold a level until its current has settled or its share of the time is up; keep how it got there."""
-        share_s = (SECONDS * self.job.stretch - self.seconds) / levels_left
+        budget_s = FIRST_SECONDS if self._is_first else SECONDS
+        share_s = (budget_s * self.job.stretch - self._already_s - self.seconds) / levels_left
         until_s = self.seconds + max(share_s, 0.2 * self._slow_s, 0.05)
         yield from self._push(before_v, voltage_v)
         yield SetBias(voltage_v)
         began_s, ramp_s = self.seconds, abs(voltage_v - before_v) / (BIAS_RAMP_PER_S * self.job.test_voltage_v)
-        skipped = round((FAST_TIMES * self._fast_s + ramp_s) / period_s(self.findings))
-        current = np.zeros(0)
-        while (self.seconds < until_s or current.size < 2 * skipped) and not self._has_settled(current):
-            current = np.append(current, self._current((yield from self._fetch())))
-            if self.seconds - began_s > self._plan.longest_dwell_s:
+        late_s, current, volts = 0.0, np.zeros(0), np.zeros(0)
+        while True:
+            block = yield from self.fetch()
+            late_s = late_s if current.size else block.age_s
+            current, volts = np.append(current, self.current(block)), np.append(volts, block.voltage_axis_v)
+            skipped = round((FAST_TIMES * self._fast_s + ramp_s + late_s) / period_s(self.findings))
+            is_over = self.seconds >= until_s and current.size >= 2 * skipped
+            if is_over or self._has_settled(current[skipped:]):
+                break
+            if self.seconds - began_s > self._plan.longest_dwell_s + late_s:
                 break
         time_s = np.arange(current.size, dtype=np.float64) * period_s(self.findings)
         skipped = min(skipped, current.size // 2)
+        self._whole.append(HeldLevel(voltage_v, volts, current))
         self._held.append((voltage_v, Approach(time_s[skipped:], current[skipped:])))
 
     def _push(self, before_v: float, voltage_v: float) -> Generator[Command, Any, None]:
@@ -184,14 +245,17 @@ class _Stair:
         machine, job = self._known, self.job
         step_v = machine.stator_resistance_ohm * abs(self._current_at(voltage_v) - self._current_at(before_v))
         room_v = (self._most_a - self._top_a) * (machine.stator_resistance_ohm + machine.rotor_resistance_ohm)
-        surplus_v = max(0.0, min(PUSH * step_v, room_v, job.test_voltage_v - abs(voltage_v)))
+        sign = math.copysign(1.0, voltage_v - before_v)
+        # held for ever, it would make no more flux than the top level: the push must not rely on being ended in time
+        most_v = min(max(self.known_voltages()), job.test_voltage_v)
+        surplus_v = max(0.0, min(PUSH * step_v, room_v, most_v - sign * voltage_v))
         length_s = self._slow_s * _push_length(surplus_v / step_v) if surplus_v > step_v else 0.0
         if length_s < PUSH_ABOVE_S:
             return
-        began_s, sign = self.seconds, math.copysign(1.0, voltage_v - before_v)
+        began_s = self.seconds
         while self.seconds - began_s < length_s:
             left = 1.0 - (self.seconds - began_s + 0.5 * STEER_S) / length_s
-            yield from self._steer(voltage_v + sign * surplus_v * max(left, 0.0))
+            yield from self.steer(voltage_v + sign * surplus_v * max(left, 0.0), math.inf)
 
     def _current_at(self, voltage_v: float) -> float:
         """What a voltage drives through the known machine behind the known inverter in the end."""
@@ -208,6 +272,14 @@ class _Stair:
         rows = zip(self._held, settled.current_a, settled.std_a, strict=True)
         return tuple(DcLevel(voltage_v, float(a), float(s)) for (voltage_v, _), a, s in rows)
 
+    def first_current(self) -> FirstCurrent:
+        """From the levels that were held: the larger, the smaller, the larger again."""
+        return first_current(self._whole, period_s(self.findings), self._tail)
+
+    @property
+    def _tail(self) -> int:
+        return max(8, round(self._plan.window_s / period_s(self.findings)))
+
     def progress(self, planned: int) -> StepProgress:
         voltage_v, approach = self._held[-1]
         return StepProgress(
@@ -217,31 +289,11 @@ class _Stair:
 
     def _has_settled(self, current: Signal) -> bool:
         """The means of the last three windows differ by less than `SETTLED` of the top current."""
-        n = max(8, round(self._plan.window_s / period_s(self.findings)))
+        n = self._tail
         if current.size < 3 * n:
             return False
         means = [float(np.mean(current[current.size - k * n : current.size - (k - 1) * n])) for k in (1, 2, 3)]
-        return max(means) - min(means) < SETTLED * self._top_a
-
-    # -- samples --------------------------------------------------------------------------------------------------
-
-    def _steer(self, voltage_v: float) -> Generator[Command, Any, tuple[float, float]]:
-        """Ask for a voltage and wait `STEER_S`: (time passed, mean current of the last block)."""
-        yield SetBias(voltage_v)
-        passed_s, current = 0.0, np.zeros(1)
-        while passed_s < STEER_S:
-            block = yield from self._fetch()
-            current = self._current(block)
-            passed_s += duration_s(block)
-        return passed_s, float(np.mean(current))
-
-    def _current(self, block: SampleBlock) -> Signal:
-        return along_axis(block) - self.offset_a
-
-    def _fetch(self) -> Generator[Command, Any, SampleBlock]:
-        block = yield from next_block(self.findings, STEP, self.axis_deg)
-        self.seconds += duration_s(block)
-        return block
+        return max(means) - min(means) < (FIRST_SETTLED if self._is_first else SETTLED) * self._top_a
 
 
 def _push_length(push: float) -> float:

@@ -22,7 +22,8 @@ from commissioner.records import SampleBlock
 MARK = b"BLK1"
 _FRAME = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
 _HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
-_CLIPPED, _HAS_W = 1, 2
+_AGE = struct.Struct("<d")  # behind the signals, where the flags say so
+_CLIPPED, _HAS_W, _HAS_AGE = 1, 2, 4
 LARGEST_BLOCK = 1 << 20
 """Payload bytes; the largest window of a drive makes 4 kB."""
 
@@ -140,7 +141,7 @@ def _payload(data: bytes, at: int) -> bytes | None:
 
 
 def _encode(block: SampleBlock, segment: int) -> bytes:
-    flags = (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
+    flags = _HAS_AGE | (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
     header = _HEADER.pack(
         segment, block.session, block.first_index, block.count, block.lost_before, block.sample_period_s,
         block.axis_deg, block.dc_link_v, flags,
@@ -148,7 +149,7 @@ def _encode(block: SampleBlock, segment: int) -> bytes:
     signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
     if block.current_w_a is not None:
         signals.append(block.current_w_a)
-    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals)
+    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals) + _AGE.pack(block.age_s)
 
 
 def _decode(payload: bytes) -> Placed:
@@ -156,13 +157,17 @@ def _decode(payload: bytes) -> Placed:
         raise _no_block(len(payload), f"at least {_HEADER.size} bytes")
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
     channels = 4 if flags & _HAS_W else 3
-    if len(payload) != _HEADER.size + 8 * channels * count:
+    signals_end = _HEADER.size + 8 * channels * count
+    has_age = bool(flags & _HAS_AGE)
+    if len(payload) != signals_end + _AGE.size * has_age:
         raise _no_block(len(payload), f"{channels} signals of {count} samples")
-    signals = np.frombuffer(payload, "<f8", offset=_HEADER.size).reshape(channels, count).astype(np.float64)
+    numbers = np.frombuffer(payload, "<f8", channels * count, _HEADER.size)
+    signals = numbers.reshape(channels, count).astype(np.float64)
     return segment, SampleBlock(
         session=session, first_index=first, sample_period_s=period, axis_deg=axis, voltage_axis_v=signals[0],
         current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
         dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
+        age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
     )  # fmt: skip
 
 

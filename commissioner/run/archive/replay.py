@@ -152,7 +152,8 @@ def read_job(folder: Path, journal: list[dict[str, Any]]) -> Job:
 
 _DECISIONS = frozenset(
     {
-        "state_entered", "drive_identified", "checks_judged", "staircase_fitted", "first_look", "excitation_chosen",
+        "state_entered", "drive_identified", "checks_judged", "first_current_seen", "staircase_fitted", "first_look",
+        "excitation_chosen",
         "bias_chosen", "estimate_updated", "guard_acted", "axis_finished", "verdict_reached", "step_progress",
     }
 )  # fmt: skip

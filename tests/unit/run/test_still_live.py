@@ -12,6 +12,7 @@ from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stream import Stream
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import SafetyFacts
 from commissioner.settings import load_motor
@@ -155,10 +156,8 @@ def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
         def fetch(self, cursor):
             return SimpleNamespace(cursor=cursor, block=None, has_ended=False)
 
-    runner = Runner(Silent(live_from=9), folder, bounds=None, watch=None, present=lambda record: None)
-    runner._progress.facts = SafetyFacts(watchdog_s=0.05)
-    runner._cursor = object()
+    stream = Stream(Silent(live_from=9), object(), time.monotonic(), sensors=None, watch=None)
     began = time.monotonic()
     with pytest.raises(DriveFault, match="no samples"):
-        runner._next_block()
+        stream.next_block(0.05)
     assert time.monotonic() - began < 1.0

@@ -14,6 +14,7 @@ LIMITS = WatchLimits(
     flux_fraction=1.0,
     axis_time_s=20.0,
     lost_samples_s=0.01,
+    age_s=0.5,
     dc_link_v=(480.0, 640.0),
     heatsink_degc=85.0,
     winding_degc=120.0,

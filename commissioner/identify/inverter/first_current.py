@@ -1,0 +1,70 @@
+"""What a first small direct current tells of whatever is connected: its stator inductance, before anything large flows.
+
+Between two settled levels the stator flux moves by L_s times the step of the current, and by the integral of what of the
+voltage the static curve does not take: L_s (i_2 - i_1) = integral(u - u_static(i)) dt. The static curve, resistance and
+inverter together, is taken as the straight line between the two levels. It bends upwards of that, behind dead time by much;
+on the way down that makes L_s too small and on the way up too large by the same, so that the mean of both stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.records import Signal
+
+
+@dataclass(frozen=True)
+class FirstCurrent:
+    """`slope_ohm`: of the static curve, resistance and the inverter's knee together. Levels of the larger, then the smaller."""
+
+    stator_inductance_h: float
+    slope_ohm: float
+    voltage_v: tuple[float, float]
+    current_a: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class HeldLevel:
+    """A DC level from the moment it was asked for: its voltage; voltage and current at the samples, `(n,)` each."""
+
+    voltage_v: float
+    samples_v: Signal
+    samples_a: Signal
+
+
+def first_current(levels: Sequence[HeldLevel], sample_period_s: float, tail: int) -> FirstCurrent:
+    """From the same larger, smaller and larger level; the last `tail` samples of each are taken as settled.
+
+    DataRefused where the current did not follow the voltage.
+    """
+    settled_a = [float(np.mean(level.samples_a[-tail:])) for level in levels]
+    larger, smaller, _ = levels
+    larger_a, smaller_a = 0.5 * (settled_a[0] + settled_a[2]), settled_a[1]
+    change_a, change_v = larger_a - smaller_a, larger.voltage_v - smaller.voltage_v
+    if not (change_v > 0.0 and change_a > 0.0 and smaller_a > 0.0):
+        raise DataRefused(
+            "the current does not follow the voltage", step="first current", value=f"{change_a:.3g} A for {change_v:.3g} V",
+            limit="a current that falls with the voltage",
+            remedy="check the current sensors' sign and order, the motor cable and the contactor",
+        )  # fmt: skip
+    slope_ohm = change_v / change_a
+    down, up = (_moved_wb(level, smaller.voltage_v, smaller_a, slope_ohm, sample_period_s) for level in levels[1:])
+    inductance_h = 0.5 * (up - down) / change_a
+    return FirstCurrent(inductance_h, slope_ohm, (larger.voltage_v, smaller.voltage_v), (larger_a, smaller_a))
+
+
+def stepped_inductance_h(larger: HeldLevel, smaller: HeldLevel, sample_period_s: float, tail: int) -> float:
+    """The static inductance between two levels above the inverter's knee, the second held after the first."""
+    larger_a, smaller_a = (float(np.mean(level.samples_a[-tail:])) for level in (larger, smaller))
+    change_a = max(larger_a - smaller_a, 1e-9)
+    slope_ohm = (larger.voltage_v - smaller.voltage_v) / change_a
+    return -_moved_wb(smaller, smaller.voltage_v, smaller_a, slope_ohm, sample_period_s) / change_a
+
+
+def _moved_wb(level: HeldLevel, voltage_v: float, current_a: float, slope_ohm: float, period_s: float) -> float:
+    """Stator flux gained from the level's first sample on: what of the voltage the static line does not take."""
+    return float(np.sum(level.samples_v - voltage_v - slope_ohm * (level.samples_a - current_a))) * period_s

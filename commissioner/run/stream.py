@@ -1,0 +1,130 @@
+"""The samples of one energised session as they come: each block with its age, and read in one go where the host is behind."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from commissioner.errors import Aborted, DriveFault
+from commissioner.link.drive.inverter import Inverter
+from commissioner.records import SampleBlock
+from commissioner.registers.window import StreamCursor
+from commissioner.safety.freshness import DriveClock
+from commissioner.safety.sensors import SensorWatch
+from commissioner.safety.watch import StopReason, WatchLimits, judge_status
+
+EMPTY_FETCH_PAUSE_S = 0.002
+"""Wait after a window without new samples: a drive in real time needs a moment."""
+LATE_S = 0.05
+"""A sample that may be older than this: the drive is asked how many it has made, as often as this at the most."""
+CATCH_UP_S, CATCH_UP_WINDOWS = 0.02, 8
+"""Behind by this much: so many windows are read before anything is computed from them."""
+
+
+class Stream:
+    """Owned by the runner, one per session; `enable` was asked for at `began_s` on the monotonic clock."""
+
+    def __init__(
+        self, inverter: Inverter, cursor: StreamCursor, began_s: float, sensors: SensorWatch, watch: WatchLimits
+    ) -> None:
+        self.sensors = sensors
+        self._inverter, self._cursor, self._watch = inverter, cursor, watch
+        self._began_s, self._asked_s = began_s, -math.inf
+        self._clock: DriveClock | None = None
+        self._waiting: SampleBlock | None = None
+
+    def next_block(self, longest_s: float) -> SampleBlock | None:
+        """The next block with the largest age its last sample can have; None once the drive has ended the session.
+
+        DriveFault: no sample for `longest_s`.
+        """
+        block, self._waiting = self._waiting or self._await_block(longest_s), None
+        if block is None:
+            return None
+        for _ in range(CATCH_UP_WINDOWS - 1):
+            if self._age_s(block) < CATCH_UP_S:
+                break
+            more = self._fetch()
+            if more is None:
+                break
+            if more.lost_before:  # a hole has its place between two blocks
+                self._waiting = more
+                break
+            block = _joined(block, more)
+        age_s = self._age_s(block)
+        if age_s > LATE_S and time.monotonic() - self._asked_s > LATE_S:
+            self.ask_status()
+            age_s = self._age_s(block)
+        return replace(block, age_s=age_s)
+
+    def ask_status(self) -> None:
+        """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
+        self._asked_s = time.monotonic()
+        status = self._inverter.read_status()
+        stop_if(judge_status(status, self._watch))
+        if self._clock is not None and status.samples_produced > 0:
+            self._clock = self._clock.at_most(status.samples_produced, self._asked_s)
+        self.sensors.claim(status)
+
+    def _await_block(self, longest_s: float) -> SampleBlock | None:
+        deadline = time.monotonic() + longest_s
+        while True:
+            asked_s = time.monotonic()
+            if asked_s > deadline:
+                raise DriveFault(
+                    "the drive sends no samples", step="stream", value=f"nothing for {longest_s:g} s",
+                    limit="new samples within the watchdog's time",
+                    remedy="check the drive's status; the output has been switched off",
+                )  # fmt: skip
+            block = self._fetch()
+            if block is not None:
+                return block
+            if self._has_ended:
+                stop_if(judge_status(self._inverter.read_status(), self._watch))
+                return None
+            time.sleep(EMPTY_FETCH_PAUSE_S)
+
+    def _fetch(self) -> SampleBlock | None:
+        """One window. A window that is not full ends with the newest sample, which pins the drive's clock."""
+        asked_s = time.monotonic()
+        window = self._inverter.fetch(self._cursor)
+        self._cursor, self._has_ended = window.cursor, window.has_ended
+        block = window.block
+        if block is None:
+            return None
+        if self._clock is None:
+            self._clock = DriveClock(self._began_s, block.sample_period_s)
+        if block.count < self._cursor.stream.samples_per_window:
+            self._clock = self._clock.at_most(self._cursor.next_index, asked_s)
+        return block
+
+    def _age_s(self, block: SampleBlock) -> float:
+        assert self._clock is not None
+        return self._clock.age_s(block.first_index + block.count, time.monotonic())
+
+
+def stop_if(reason: StopReason | None) -> None:
+    """Raise what the reason amounts to; nothing where there is none."""
+    if reason is None:
+        return
+    kind = DriveFault if reason.is_fault else Aborted
+    raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
+
+
+def _joined(first: SampleBlock, second: SampleBlock) -> SampleBlock:
+    """Two blocks without a hole between them as one."""
+    third = None
+    if first.current_w_a is not None and second.current_w_a is not None:
+        third = np.concatenate([first.current_w_a, second.current_w_a])
+    return replace(
+        first,
+        voltage_axis_v=np.concatenate([first.voltage_axis_v, second.voltage_axis_v]),
+        current_u_a=np.concatenate([first.current_u_a, second.current_u_a]),
+        current_v_a=np.concatenate([first.current_v_a, second.current_v_a]),
+        current_w_a=third,
+        dc_link_v=second.dc_link_v,
+        clipped=first.clipped or second.clipped,
+    )

@@ -1,0 +1,151 @@
+"""Do the current sensors tell the truth? Judged on every block of a session, and against what the drive itself says.
+
+Along one axis all three phase currents are one current times a known cosine. What the phases show beyond that is no
+current of the test: a sensor that is silent, frozen, reversed, exchanged or of foreign scale leaves a misfit in that
+pattern as large as the current itself. A scale common to all sensors leaves none: it shows only against the drive's own
+current magnitude, sample for sample, where the drive offers one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from commissioner.motor.space_vector import phase_cosines
+from commissioner.records import DriveStatus, SampleBlock, Signal
+from commissioner.safety.watch import StopReason
+
+ZERO_S, WINDOW_S = 0.05, 0.04
+"""Time at zero voltage from which the offsets are taken; time over which the pattern is judged."""
+MISFIT = 0.2
+"""Largest misfit of a phase, of the axis current: gains that differ by a tenth and legs by another stay below."""
+SIGMAS = 6.0
+SCALE, SCALE_FLOOR = 0.1, 0.004
+"""How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""
+MOVES, LEAST_SHARE = 0.1, 0.1
+"""A phase stands still that shows one and the same number while the voltage moves by this share of itself; a phase whose
+share of the axis current is smaller than the second is not asked."""
+NAMES = ("u", "v", "w")
+
+
+@dataclass(frozen=True)
+class _Zero:
+    """What the sensors show while nothing is driven: mean and standard deviation, `(phases,)`."""
+
+    offset_a: Signal
+    noise_a: Signal
+
+
+@dataclass
+class SensorWatch:
+    """One per energised session. `current_limit_a`: what the drive trips at, the scale of what matters."""
+
+    current_limit_a: float
+    _at_rest: list[Signal] = field(default_factory=list)
+    _window: list[tuple[Signal, Signal]] = field(default_factory=list)
+    _zero: _Zero | None = None
+    _claimed: tuple[int, float] | None = None
+
+    def claim(self, status: DriveStatus) -> None:
+        """The drive says how large its newest sample's largest phase current is."""
+        if status.is_energised and status.samples_produced > 0 and math.isfinite(status.current_magnitude_a):
+            self._claimed = (status.samples_produced - 1, status.current_magnitude_a)
+
+    def judge(self, block: SampleBlock) -> StopReason | None:
+        """The first reason to distrust a sensor that this block and those before it give."""
+        phases = _phases(block)
+        return self._against_the_drive(block, phases) or self._against_the_axis(block, phases)
+
+    def _against_the_drive(self, block: SampleBlock, phases: Signal) -> StopReason | None:
+        if self._claimed is None:
+            return None
+        place = self._claimed[0] - block.first_index
+        if place >= block.count:
+            return None
+        claimed, self._claimed = self._claimed[1], None
+        if place < 0:
+            return None
+        shown = float(np.max(np.abs(_three(phases)[:, place])))
+        if abs(shown - claimed) <= SCALE * max(shown, claimed) + SCALE_FLOOR * self.current_limit_a:
+            return None
+        return _distrusted(
+            "the current samples and the drive's own current magnitude differ", shown, f"{claimed:.4g} A"
+        )
+
+    def _against_the_axis(self, block: SampleBlock, phases: Signal) -> StopReason | None:
+        if self._zero is None:
+            self._learn(block, phases)
+            return None
+        self._window.append((phases, block.voltage_axis_v))
+        if sum(volts.size for _, volts in self._window) * block.sample_period_s < WINDOW_S:
+            return None
+        seen = np.concatenate([part for part, _ in self._window], axis=1)
+        volts = np.concatenate([part for _, part in self._window])
+        self._window.clear()
+        return _misfit(seen, volts, self._zero, block.axis_deg)
+
+    def _learn(self, block: SampleBlock, phases: Signal) -> None:
+        """Offsets and noise, from the time before the first volt."""
+        at_rest = phases[:, np.cumsum(np.abs(block.voltage_axis_v)) == 0.0]
+        self._at_rest.append(at_rest)
+        seen = np.concatenate(self._at_rest, axis=1)
+        is_over = at_rest.shape[1] < phases.shape[1]
+        if seen.shape[1] > 1 and (is_over or seen.shape[1] * block.sample_period_s >= ZERO_S):
+            self._zero = _Zero(seen.mean(axis=1), seen.std(axis=1))
+
+
+def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float) -> StopReason | None:
+    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still, or the worst one's rms distance from the
+    axis' pattern."""
+    cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
+    current = seen - zero.offset_a[:, None]
+    along = cosines @ current / float(cosines @ cosines)
+    size_a, noise_a = math.sqrt(float(np.mean(np.square(along)))), SIGMAS * float(np.max(zero.noise_a))
+    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE)
+    if still.any() and size_a > noise_a and np.ptp(voltage_v) > MOVES * np.max(np.abs(voltage_v)):
+        names = " and ".join(name for name, is_still in zip(NAMES, still, strict=False) if is_still)
+        return _distrusted(
+            f"the current sensor of phase {names} stands still", 0.0, "a current that moves with the voltage"
+        )
+    rest = np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
+    allowed = MISFIT * size_a + noise_a
+    if float(np.max(rest)) <= allowed:
+        return None
+    return _distrusted(
+        f"the current sensor of phase {_culprit(current, cosines)} does not follow the test axis",
+        float(np.max(rest)), f"at most {allowed:.3g} A beside the axis",
+    )  # fmt: skip
+
+
+def _culprit(current: Signal, cosines: Signal) -> str:
+    """The phase without which the others agree best; two sensors alone cannot accuse each other."""
+    if len(cosines) < 3:
+        return "u or v"
+    left = []
+    for phase in range(3):
+        others = [k for k in range(3) if k != phase]
+        c, i = cosines[others], current[others]
+        along = c @ i / max(float(c @ c), 1e-12)
+        left.append(float(np.mean(np.square(i - np.outer(c, along)))))
+    best = int(np.argmin(left))
+    tied = [NAMES[k] for k in range(3) if left[k] <= 1.5 * left[best]]
+    return " or ".join(tied)
+
+
+def _distrusted(what: str, value: float, limit: str) -> StopReason:
+    return StopReason(
+        what, value, limit,
+        "check the current sensors, their plugs, order, sign and scale in the drive, and the motor cable", is_fault=True,
+    )  # fmt: skip
+
+
+def _phases(block: SampleBlock) -> Signal:
+    """`(2 or 3, n)`: the sensors there are."""
+    seen = [block.current_u_a, block.current_v_a]
+    return np.stack(seen if block.current_w_a is None else [*seen, block.current_w_a])
+
+
+def _three(phases: Signal) -> Signal:
+    return phases if phases.shape[0] == 3 else np.vstack([phases, -phases.sum(axis=0)])
