@@ -59,6 +59,23 @@ Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` fo
 RUNS = Path("runs")
 
 
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"commissioner {version('commissioner')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_verb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Which version this is.")
+    ] = False,
+) -> None:
+    """Commission an induction motor at standstill: identify it through its drive, judge the result, write it back."""
+
+
 @app.command()
 def demo(
     json: Json = False,
