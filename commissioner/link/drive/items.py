@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from commissioner.errors import DriveFault
 from commissioner.link.drive.foreign import Watched
 from commissioner.link.wire.port import Port, Words
-from commissioner.registers.codec import Value, decode_span, encode_item, encode_span
+from commissioner.registers.codec import Value, decode_item, decode_span, encode_item, encode_span
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
 
 
@@ -56,6 +56,11 @@ class Items:
         """True where both values are the same in the drive's own resolution."""
         item = self.profile.item(name)
         return encode_item(item, first) == encode_item(item, second)
+
+    def as_held(self, name: str, value: Value) -> Value:
+        """The value as the drive's own words hold it."""
+        item = self.profile.item(name)
+        return decode_item(item, encode_item(item, value))
 
     def _write(self, span: Span, values: Mapping[str, Value]) -> None:
         try:
