@@ -59,23 +59,24 @@ def plain_simulation(subject: Subject) -> Markup:
 _FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
 
 
+_FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
+_REST = (
+    "The result on page 1 does not rest on this: the run measured the inverter’s loss, the delay and the iron itself."
+)
+
+
 def _lead(diagnosis: Record) -> Text:
+    if not diagnosis.get("is_complete", True):
+        return marks.coded(f"Not told: the search was stopped before every cause was tried. {_FINISH} {_REST}")
     gain = diagnosis.get("gain") or {}
     before, after, noise = (gain.get(key) for key in ("rmse_before_a", "rmse_after_a", "noise_floor_a"))
+    if not (before and after):
+        return f"{diagnosis['reason'][:1].upper()}{diagnosis['reason'][1:]}. {_REST}"
     number = len(diagnosis["causes"])
-    rest = "The result on page 1 does not rest on this: the run measured the inverter’s loss, the delay and the iron itself."
-    stopped = (
-        ""
-        if diagnosis.get("is_complete", True)
-        else (
-            " The search was stopped before every cause was tried; `commissioner diagnose` on recording.parquet finishes it."
-        )
-    )
-    if before and after:
-        added = f"with {number} cause{'s' if number != 1 else ''} added, by {digits(1e3 * after, 3)} mA"
-        of_noise = f", and the sensors’ noise is {digits(1e3 * noise, 3)} mA" if noise else ""
-        return f"A simulation with the four parameters alone misses the current by {digits(1e3 * before, 3)} mA rms; {added}{of_noise}. {rest}{stopped}"
-    return f"{diagnosis['reason'][:1].upper()}{diagnosis['reason'][1:]}. {rest}{stopped}"
+    added = f"with {number} cause{'s' if number != 1 else ''} added, by {digits(1e3 * after, 3)} mA"
+    of_noise = f", and the sensors’ noise is {digits(1e3 * noise, 3)} mA" if noise else ""
+    alone = f"A simulation with the four parameters alone misses the current by {digits(1e3 * before, 3)} mA rms"
+    return f"{alone}; {added}{of_noise}. {_REST}"
 
 
 def _cause(cause: Record) -> tuple[Text, ...]:
