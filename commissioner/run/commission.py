@@ -27,6 +27,7 @@ from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
 from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
+from commissioner.run.archive.summary import read_file
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
@@ -212,4 +213,5 @@ def _with_diagnosis(
 def _report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
     """`result.json`, and the page that names its digest."""
     digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
-    folder.save_text("report.html", run_page(result, read_journal(folder.path / "journal.jsonl"), findings, digest))
+    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
+    folder.save_text("report.html", run_page(result, journal, findings, request, digest))

@@ -177,10 +177,10 @@ def _apart(subject: Subject) -> tuple[Text, str, str]:
 
 
 def _motor(subject: Subject) -> Markup:
-    plate, subject_of = subject.plate, subject.job.get("subject") or {}
+    plate = subject.plate
     rows: list[tuple[Text, Text]] = [
-        ("Tag", subject_of.get("tag") or marks.BLANK),
-        ("Serial no.", subject_of.get("serial_number") or marks.BLANK),
+        ("Tag", subject.told("motor_tag") or marks.BLANK),
+        ("Serial no.", subject.told("motor_serial") or marks.BLANK),
     ]
     if plate:
         rows.append(
@@ -195,7 +195,7 @@ def _motor(subject: Subject) -> Markup:
     rows.append(
         ("Winding", f"{digits(winding, 2)} °C, read by the drive" if winding is not None else "temperature not known")
     )
-    rows.append(("Cable, load", subject_of.get("cable") or marks.BLANK))
+    rows.append(("Cable, load", subject.told("cable") or marks.BLANK))
     return marks.section("Motor", marks.facts(rows))
 
 
@@ -224,7 +224,7 @@ def _measurement(subject: Subject) -> Markup:
         rows.append(("Begun, UTC", begun.strftime("%Y-%m-%d %H:%M:%S")))
         if offset := origin.get("local_time"):
             rows.append(("Local", str(offset)))
-    place = (subject.job.get("subject") or {}).get("place")
+    place = subject.told("place")
     rows.append(
         (
             "By",

@@ -16,10 +16,14 @@ from commissioner.report.sheet.document import Margins, Page, document
 
 
 def run_page(
-    result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], findings: Findings, digest: str | None = None
+    result: Mapping[str, Any],
+    journal: Sequence[Mapping[str, Any]],
+    findings: Findings,
+    request: Mapping[str, Any] | None = None,
+    digest: str | None = None,
 ) -> str:
     """The whole report as one self-contained HTML text, for every way a run can end. `digest`: SHA-256 of result.json."""
-    subject = Subject(result, journal, findings)
+    subject = Subject(result, journal, findings, request or {})
     pages = [
         Page("result", "Result", certificate(subject)),
         Page("evidence", "Evidence", evidence(subject)),
@@ -32,7 +36,7 @@ def run_page(
 
 
 def _margins(subject: Subject, digest: str | None) -> Margins:
-    tag = (subject.job.get("subject") or {}).get("tag")
+    tag = subject.told("motor_tag")
     drive = subject.result.get("drive") or {}
     return Margins(
         subject=f"Commissioning report, {f'motor {tag}' if tag else 'induction motor at standstill'}",

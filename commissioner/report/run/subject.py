@@ -58,11 +58,12 @@ class Test:
 
 @dataclass(frozen=True)
 class Subject:
-    """A run: its result document, its journal's lines and what it learnt."""
+    """A run: its result document, its journal's lines, what it learnt and what it was asked to do."""
 
     result: Record
     journal: Sequence[Record]
     findings: Findings
+    request: Record
 
     @property
     def run(self) -> str:
@@ -117,6 +118,14 @@ class Subject:
     def origin(self) -> Record:
         """Who made the run, where, by which version."""
         return self.first("run_started")
+
+    def told(self, what: str) -> str:
+        """What a person said about the motor and its place: with the order, or since; empty where nobody did."""
+        said = [line["record"] for line in self.journal if line["kind"] == "motor_named"]
+        for record in (*reversed(said), self.request.get("origin") or {}):
+            if record.get(what):
+                return str(record[what])
+        return ""
 
     @property
     def begun(self) -> dt.datetime | None:
