@@ -221,7 +221,7 @@ def _measurement(subject: Subject) -> Markup:
     begun, origin, result = subject.begun, subject.origin, subject.result
     rows: list[tuple[Text, Text]] = []
     if begun:
-        rows.append(("Begun, UTC", begun.strftime("%Y-%m-%d %H:%M:%S")))
+        rows.append(("Begun, UTC", begun))
         if offset := origin.get("local_time"):
             rows.append(("Local", str(offset)))
     place = subject.told("place")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +15,7 @@ from commissioner.records import Signal
 from commissioner.report.run.standing import standing
 
 Record = Mapping[str, Any]
+DAY_S = 86400.0
 _ALLOWED = {
     "stator_resistance_ohm": "resistance_std_percent",
     "rotor_resistance_ohm": "rotor_resistance_std_percent",
@@ -128,15 +128,15 @@ class Subject:
         return ""
 
     @property
-    def begun(self) -> dt.datetime | None:
-        return _time(self.journal[0]["utc"]) if self.journal else None
+    def begun(self) -> str:
+        """UTC to the second; empty where the run left no record."""
+        return str(self.journal[0]["utc"])[:19].replace("T", " ") if self.journal else ""
 
     @property
     def seconds(self) -> float | None:
         """By the clock, from the first to the last record that the run itself wrote."""
-        ended = next((line["utc"] for line in self.journal if line["kind"] == "run_ended"), None)
-        begun, end = self.begun, _time(ended) if ended else None
-        return (end - begun).total_seconds() if begun and end else None
+        ended = next((str(line["utc"]) for line in self.journal if line["kind"] == "run_ended"), None)
+        return (_of_day(ended) - _of_day(str(self.journal[0]["utc"]))) % DAY_S if ended else None
 
     @property
     def is_simulated(self) -> bool:
@@ -218,5 +218,7 @@ class Subject:
         return [np.concatenate(parts) for parts in sessions.values()]
 
 
-def _time(text: str) -> dt.datetime:
-    return dt.datetime.fromisoformat(text)
+def _of_day(utc: str) -> float:
+    """Seconds since midnight of an ISO time stamp."""
+    hours, minutes, seconds = utc[11:].removesuffix("+00:00").split(":")
+    return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
