@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 
 from markupsafe import Markup
 
@@ -15,8 +15,12 @@ from commissioner.report.sheet.marks import Column, Text
 from commissioner.report.sheet.numbers import digits, half_width, signed, with_interval
 
 _MOST_LIMITS = 30
-_FACTORS = {"s": (1e6, "µs"), "h": (1e3, "mH"), "wb": (1e3, "mWb"), "f": (1e9, "nF")}
-"""Units of sizes that are small in SI."""
+_SHOWN: Mapping[str, tuple[tuple[float, str], ...]] = {
+    "1": ((100.0, "%"),), "1/min": ((100.0, "%/min"),), "us": ((1.0, "µs"),),
+    "A": ((1.0, "A"), (1e3, "mA")), "A/min": ((1.0, "A/min"), (1e3, "mA/min")), "V": ((1.0, "V"), (1e3, "mV")),
+    "Wb": ((1.0, "Wb"), (1e3, "mWb")), "H": ((1.0, "H"), (1e3, "mH")), "s": ((1.0, "s"), (1e6, "µs")),
+}  # fmt: skip
+"""Factor and unit that a size is shown in: the first that makes it no less than a tenth."""
 
 
 def plain_simulation(subject: Subject) -> Markup:
@@ -83,7 +87,7 @@ def _cause(cause: Record) -> tuple[Text, ...]:
     names = [cause.get("title") or _words(cause["name"]), *(_words(other) for other in cause["equivalent"])]
     strength = cause.get("strength_over_noise")
     return (
-        ", or ".join(names), Markup(",<br>").join(_sizes(cause["parameters"])), _bar(strength),
+        ", or ".join(names), Markup(", ").join(_sizes(cause["parameters"])), _bar(strength),
         digits(strength, 2) if strength else "–", f"{math.floor(1e3 * cause['confidence']) / 10:g} %",
     )  # fmt: skip
 
@@ -91,11 +95,16 @@ def _cause(cause: Record) -> tuple[Text, ...]:
 def _sizes(parameters: Record) -> Iterator[Text]:
     many = len(parameters) > 1
     for name, size in parameters.items():
-        factor, unit = _FACTORS.get(str(size["unit"]).lower(), (1.0, str(size["unit"])))
-        if abs(factor * size["value"]) >= 1e4 or unit == size["unit"]:
-            factor, unit = 1.0, str(size["unit"])
+        factor, unit = _scale(size["value"], str(size["unit"]))
         shown = with_interval(factor * size["value"], half_width(size["std"], factor))
-        yield f"{_words(name) + ' ' if many else ''}{shown} {unit}".rstrip()
+        stem = name.rpartition("_")
+        words = _words(stem[0] if stem[2] == str(size["unit"]).lower() else name)
+        yield Markup('<span class="n">{}</span>').format(f"{words + ' ' if many else ''}{shown} {unit}")
+
+
+def _scale(value: float, unit: str) -> tuple[float, str]:
+    choices = _SHOWN.get(unit, ((1.0, unit),))
+    return next((choice for choice in choices if abs(choice[0] * value) >= 0.1), choices[-1])
 
 
 def _bar(strength: float | None) -> Text:
@@ -150,7 +159,9 @@ def _cannot_tell(diagnosis: Record) -> Markup:
     lines = [str(line) for line in diagnosis.get("cannot_tell") or ()]
     if not lines:
         return Markup("")
-    items = Markup("").join(Markup("<li>{}</li>").format(f"{line[:1].upper()}{line[1:]}") for line in lines)
+    items = Markup("").join(
+        Markup("<li>{}</li>").format(f"{line[:1].upper()}{line[1:]}".replace(" | ", ", ")) for line in lines
+    )
     return marks.section("What these data cannot tell", Markup('<ul class="lines">{}</ul>').format(items), level=3)
 
 
@@ -186,17 +197,11 @@ def _experiment(diagnosis: Record) -> Markup | None:
     experiment = diagnosis.get("next_experiment")
     if not experiment:
         return None
-    steps: Sequence[Text] = [
-        marks.coded(str(step))
-        for step in experiment.get("steps") or [experiment[key] for key in ("what", "change") if key in experiment]
-    ]
-    why = experiment.get("why") or experiment.get("separates") or experiment.get("reason")
-    lead = marks.paragraph(str(why)) if isinstance(why, str) else Markup("")
-    if not steps:
-        return None
-    return marks.section(
-        "The next experiment, if one is wanted", lead, marks.actions(steps), kind="first slim", level=3
-    )
+    *steps, last = (str(step) for step in experiment["steps"])
+    steps.append(f"{last} `{experiment['command']}`" if last.endswith(":") else last)
+    effect = marks.paragraph(f"Does it change the values of page 1? {experiment['changes_values']}", kind="small")
+    doing = marks.actions(marks.coded(step) for step in steps)
+    return marks.section("The next experiment, if one is wanted", doing, effect, kind="first slim", level=3)
 
 
 def _limits(diagnosis: Record) -> Markup | None:
@@ -210,11 +215,10 @@ def _limits(diagnosis: Record) -> Markup | None:
             continue
         size = next(iter(limit.values())) if limit and isinstance(next(iter(limit.values())), dict) else limit
         if {"value", "unit"} <= set(size):
-            rows.append(
-                Markup("<div><dt>{}</dt><dd>{} {}</dd></div>").format(
-                    _words(name), digits(size["value"], 2), size["unit"]
-                )
-            )
+            factor, unit = _scale(size["value"], str(size["unit"]))
+            words = _words(name)
+            shown = (f"{words[:1].upper()}{words[1:]}", digits(factor * size["value"], 2), unit)
+            rows.append(Markup("<div><dt>{}</dt><dd>{} {}</dd></div>").format(*shown))
     if not rows:
         return None
     return Markup("<section><h3>Looked for and not found; this much would have been seen</h3>") + Markup(
