@@ -349,15 +349,16 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 @runs_app.command("export")
 def runs_export(
     run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
+    form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
     salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
-    """The samples of a run as one recording; works for runs that were cut off, too."""
+    """The samples of a run as one recording, or its parameters in the form of another program (--form)."""
     from commissioner.cli.verbs.archived.runs import export_run
 
-    export_run(runs, run, out, as_json=json, salvage=salvage)
+    export_run(runs, run, out, form, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
