@@ -11,7 +11,7 @@ import numpy as np
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.procedure.steps import Findings
 from commissioner.procedure.verdict import evidence_of
-from commissioner.records import Signal
+from commissioner.records import Signal, drive_words
 from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
 from commissioner.report.run import figures
 from commissioner.report.run.standing import ACCEPTED, standing
@@ -64,7 +64,7 @@ def _facts(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]]) -> I
         )
     drive = result.get("drive") or {}
     if drive:
-        yield "Drive", f"{drive['drive_type']} #{drive['serial_number']}"
+        yield "Drive", drive_words(drive["drive_type"], drive["serial_number"])
     yield "Energised in all", f"{result['energised_s']:.1f} s"
     peak = (result.get("flux_guard") or {}).get("peak_fraction")
     if peak:
@@ -92,6 +92,7 @@ def _sections(result: Mapping[str, Any], journal: Sequence[Mapping[str, Any]], f
                 *_flux_parts(tests, limit),
             ],
         )
+    yield Section("The drive's own tuning", list(_tuning_parts(result)))
     yield Section("Magnetizing curve", list(_curve_parts(result)))
     yield Section("Currents and residual", list(_current_parts(findings)))
     yield Section("Checks before energising", list(_check_parts(result)))
@@ -175,8 +176,33 @@ def _conditions(result: Mapping[str, Any]) -> Iterator[str | Table]:
     yield Table([n[0] for n in names], [row], caption=f"T circuit, under the assumption: {circuit['assumption']}.")
 
 
+def _tuning_parts(result: Mapping[str, Any]) -> Iterator[str | Table]:
+    """Each result over the repeats, and in our own terms where the drive file says how."""
+    tune = result.get("tune")
+    if not tune or not tune.get("rows"):
+        return
+    rows = [
+        (
+            row["name"],
+            f"{row['before']:.6g}",
+            ", ".join(f"{value:.6g}" for value in row["values"]),
+            f"{row['median']:.6g} {row['unit']}",
+            f"{row['spread_percent']:.2g} %",
+            f"{row['trend_percent']:+.2g} %",
+            "—" if row["ours"] is None else f"{row['ours']:.5g} ({row['conversion']})",
+            "—" if row["plate_low"] is None else f"{row['plate_low']:.3g} ... {row['plate_high']:.3g}",
+        )
+        for row in tune["rows"]
+    ]
+    header = ("Result", "Before", "Repeats", "Median", "Spread", "Trend", "Per phase, SI", "The plate allows")
+    yield Table(header, rows)
+    yield f"In the drive: {tune['in_the_drive']}."
+
+
 def _written_cell(row: Mapping[str, Any] | None, factor: float, unit: str) -> str:
-    return f"{factor * row['read_back']:.4g} {unit}" if row else "not written"
+    if not row:
+        return "not written"
+    return f"{factor * row['read_back'] / (row.get('per_si') or 1.0):.4g} {unit}"
 
 
 def _objections(result: Mapping[str, Any]) -> Iterator[Table]:
