@@ -161,12 +161,12 @@ def _objections(row: TunedRow) -> Iterator[Objection]:
             "the drive found nothing: check the motor's connection, and the item's address and width in the drive file",
         )  # fmt: skip
         return
-    if row.ours is not None and row.plate_low is not None and row.plate_high is not None:
-        if not row.plate_low <= row.ours <= row.plate_high:
-            yield Objection(
-                f"{row.name} is not physical for this nameplate", row.ours, f"{row.plate_low:.4g} ... {row.plate_high:.4g}",
-                "check the plate in the drive, the motor's connection, and the drive file's scale and convention",
-            )  # fmt: skip
+    low, high = row.plate_low, row.plate_high
+    if row.ours is not None and low is not None and high is not None and not low <= row.ours <= high:
+        yield Objection(
+            f"{row.name} is not physical for this nameplate", row.ours, f"{low:.4g} ... {high:.4g}",
+            "check the plate in the drive, the motor's connection, and the drive file's scale and convention",
+        )  # fmt: skip
     if len(row.values) < FEWEST:
         return
     if row.spread_percent > SPREAD_PERCENT:
@@ -176,7 +176,11 @@ def _objections(row: TunedRow) -> Iterator[Objection]:
             f"{row.spread_percent:.2g} %", f"{SPREAD_PERCENT:g} %",
             "keep the shaft at rest and tune again; a repeat that is wrong once makes all of them doubtful",
         )  # fmt: skip
-    elif row.field in ("stator_resistance_ohm", None) and "resistance" in row.name and abs(row.trend_percent) > TREND_PERCENT:
+    elif (
+        row.field in ("stator_resistance_ohm", None)
+        and "resistance" in row.name
+        and abs(row.trend_percent) > TREND_PERCENT
+    ):
         yield Objection(
             f"{row.name} runs away over the repeats: each of them heats the winding",
             f"{row.trend_percent:+.2g} %", f"{TREND_PERCENT:g} %", "let the motor cool down and give a longer --pause",

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-
 from typing import TYPE_CHECKING
 
 from commissioner.errors import ConfigurationError, UsageError

@@ -133,13 +133,19 @@ def _remote(tuning: Tuning) -> Iterator[Problem]:
     kind = facts["standstill"]
     if (kind.item, kind.value) != (facts["start"].item, facts["start"].value):
         chosen = [k for k, s in writes if (s.item, s.value) == (kind.item, kind.value)]
-        looked = [k for k, s in enumerate(tuning.steps) if s.do == "expect" and (s.item, s.value) == (kind.item, kind.value)]
+        looked = [
+            k for k, s in enumerate(tuning.steps) if s.do == "expect" and (s.item, s.value) == (kind.item, kind.value)
+        ]
         if not chosen or not any(chosen[-1] < k < start[0] for k in looked):
             yield "step", (kind.item, "the standstill value written, then read back, before the start")
     ends = [s for s in tuning.steps[start[0] :] if s.do == "await" and s.item == facts["finished"].item]
     if not any(facts["finished"].value in s.done and facts["failed"].value in s.failed and s.busy for s in ends):
         yield "step", (facts["finished"].item, "an await after the start with the sourced done and failed, and busy")
-    stops = [k for k, s in enumerate(tuning.finally_) if (s.do, s.item, s.value) == ("write", facts["stop"].item, facts["stop"].value)]
+    stops = [
+        k
+        for k, s in enumerate(tuning.finally_)
+        if (s.do, s.item, s.value) == ("write", facts["stop"].item, facts["stop"].value)
+    ]
     rest = [k for k, s in enumerate(tuning.finally_) if s.do == "await"]
     if not stops or not any(k > stops[0] for k in rest):
         yield "finally", (len(tuning.finally_), "a write of the stop, then an await of the drive at rest")
@@ -150,6 +156,9 @@ def _assisted(tuning: Tuning) -> Iterator[Problem]:
     for k, step in enumerate((*tuning.steps, *tuning.finally_)):
         is_kind = kind is not None and not is_a_lead(kind.source) and (step.item, step.value) == (kind.item, kind.value)
         if step.do == "write" and not is_kind:
-            yield f"step[{k}].do", ("write", "expect, await or ask: nothing but the sourced standstill value is written")
+            yield (
+                f"step[{k}].do",
+                ("write", "expect, await or ask: nothing but the sourced standstill value is written"),
+            )
     if not any(step.do == "ask" for step in tuning.steps):
         yield "step", (None, "an ask: a person starts it at the drive")

@@ -21,11 +21,11 @@ from commissioner.errors import (
 from commissioner.link.drive.claim import Claim
 from commissioner.link.drive.disarming import DISABLE_VOLTAGE, SHUTDOWN, de_energise
 from commissioner.link.drive.facts import Action, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
-from commissioner.link.drive.found import Implausible, implausible
 from commissioner.link.drive.items import Items, number
+from commissioner.link.drive.ordinary.found import Implausible, implausible
+from commissioner.link.drive.ordinary.tuning import Operator, Tuner
 from commissioner.link.drive.readiness import check_ready, not_ready
 from commissioner.link.drive.reading import read_identity, read_nameplate, read_status
-from commissioner.link.drive.tuning import Operator, Tuner
 from commissioner.link.drive.write_back import WriteBack
 from commissioner.link.wire.port import Port
 from commissioner.motor.circuit import InverseGamma
@@ -273,7 +273,7 @@ class Inverter:
     def keep_tuned(self, values: Mapping[str, float], snapshot: ParameterSnapshot) -> WriteReport:
         """A set that this drive found by its own tuning, in its own terms, in use and stored: no unit needs to be known."""
         self.profile.require("restore")
-        return self._write_back().write(values, snapshot, store=True)
+        return self._write_back().write(values, snapshot, store=True, always=True)
 
     def tuner(self, tuning: Tuning, operator: Operator) -> Tuner:
         """By which the drive tunes itself."""

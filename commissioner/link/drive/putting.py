@@ -50,6 +50,10 @@ class Staged:
         self._await_result("store_result", STORE_RESULTS, "store")
         self._sets.verify(target, self._sets.stored(), "read back the stored values")
 
+    def keep(self, target: Values) -> None:
+        """What is in use becomes lasting."""
+        self.put_in_memory(target)
+
     def take_back(self, values: Values) -> None:
         """A commit that is still under way can after this only bring `values` into use."""
         if self._has_asked_to_commit:
@@ -155,6 +159,15 @@ class Direct:
                     value=seen, limit=f"{value} within {within_s:g} s", remedy="store at the drive's keypad and look again",
                 )  # fmt: skip
             self._sleep(STORE_POLL_S)
+
+    def keep(self, target: Values) -> None:
+        """What is in use becomes lasting, whoever wrote it: by the coil it is written once more, as it stands."""
+        if self._sets.store.coil is not None:
+            self._journal(Intent(Action.STORE, dict(target)))
+            with self._store_mode(True):
+                for name in self._sets.group.order:
+                    self._write(name, target[name])
+        self.put_in_memory(target)
 
     def take_back(self, values: Values) -> None:
         """Nothing is under way."""

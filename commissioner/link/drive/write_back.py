@@ -54,15 +54,16 @@ class WriteBack:
             plate=self._plate(),
         )
 
-    def write(self, values: Values, snapshot: ParameterSnapshot, *, store: bool) -> WriteReport:
-        """`values` in use, and stored if asked. Nothing is written where the drive is not as in the snapshot."""
+    def write(self, values: Values, snapshot: ParameterSnapshot, *, store: bool, always: bool = False) -> WriteReport:
+        """`values` in use, and stored if asked; `always`: also where the drive has them in use already, by its own doing.
+        Nothing is written where the drive is not as in the snapshot."""
         target = self._sets.complete(values, snapshot.in_use)
         present = self._check_present(snapshot, snapshot.in_use, snapshot.stored)
         self._check_stopped()
         if store:
             self._check_endurance(present.store_count, writes=1)
         try:
-            self._bring(target, store=store)
+            self._bring(target, store=store, always=always)
             return self._report(target, present, is_stored=store and self._sets.can_store)
         except DriveError as error:
             raise self._after_failure(error, snapshot) from error
@@ -161,7 +162,7 @@ class WriteBack:
             )
 
     # --- act ----------------------------------------------------------------------------------------------------
-    def _bring(self, target: Values, *, store: bool) -> None:
+    def _bring(self, target: Values, *, store: bool, always: bool = False) -> None:
         """`target` in use and, if asked, stored; verified; only what differs."""
         has_changed = bool(self._sets.differing(target, self._sets.in_use()))
         if has_changed:
@@ -174,6 +175,9 @@ class WriteBack:
         )
         if store and is_unstored:
             self._way.put_in_memory(target)
+        elif store and always:
+            self._way.keep(target)
+            self._sets.verify(target, self._sets.in_use(), "read back the values in use")
 
     def _bring_back(self, snapshot: ParameterSnapshot) -> bool:
         """Both sets of the snapshot; the stored one first where they differ, for a store takes what is in use. True

@@ -39,8 +39,8 @@ from commissioner.registers.profile import (
     check_consistency,
 )
 from commissioner.registers.status import STATUS_BITS
-from commissioner.registers.worked import check_worked
 from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
+from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
 
 DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"

@@ -77,6 +77,14 @@ class ModbusPort:
                 continue
         return self._trusted(lambda: self._ask_apart(address, count))
 
+    def write_register(self, address: int, values: Sequence[int]) -> None:
+        """One register by function 6, whatever the drive file says."""
+        self._trusted(lambda: self._ask_write_one(address, values[0]))
+
+    def write_registers(self, address: int, values: Sequence[int]) -> None:
+        """By function 16, whatever the drive file says."""
+        self._trusted(lambda: self._ask_write(address, list(values)))
+
     def write(self, address: int, values: Sequence[int]) -> None:
         if len(values) == 1 and WRITE_ONE in self._profile.link.write_functions:
             self._trusted(lambda: self._ask_write_one(address, values[0]))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from commissioner.encoding import plain
-from commissioner.errors import CheckFailed, CommissionerError, DriveFault, LinkError, UsageError
+from commissioner.errors import Aborted, CheckFailed, CommissionerError, DriveFault, LinkError, UsageError
 from commissioner.link.drive.facts import Intent
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.drive.tuning import Operator, Tuned
+from commissioner.link.drive.ordinary.tuning import Operator, Tuned
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
@@ -38,6 +38,7 @@ from commissioner.run.tuning.earlier import earlier_values
 
 OpenPort = Callable[[], Any]
 PAUSE_POLL_S = 0.5
+LAST_LEFT = "what its last tuning left, if it found anything: this file knows no way to write"
 POWER_UP_S = 120.0
 """So long a drive may take to answer again after it was switched off and on."""
 
@@ -105,7 +106,9 @@ def tune(
         facts = {"repeat": wanted.repeat, "pause_s": wanted.pause_s, "hardwired_stop": wanted.hardwired_stop}
         folder = order.open_folder(runs, lock, tune=facts)
         with closing(folder):
-            run = _Run(wanted, folder, found, operator, present, clock or Clock(), earlier_values(runs, order.nameplate))
+            run = _Run(
+                wanted, folder, found, operator, present, clock or Clock(), earlier_values(runs, order.nameplate)
+            )
             ended = run.carry_out(opened, lock)
             result = _save(order, folder, found, ended)
     return Commissioned(ended, folder.path, result)
@@ -123,6 +126,14 @@ def _check_supervised(profile: DriveProfile, tuning: Tuning, *, hardwired_stop: 
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class KeptSet:
+    """What was left in the drive, as read back; `is_stored`: as far as its file can store."""
+
+    values: Mapping[str, float]
+    is_stored: bool
+
+
 class _Run:
     def __init__(
         self,
@@ -136,6 +147,7 @@ class _Run:
     ) -> None:
         self._wanted, self._folder, self._found, self._operator = wanted, folder, found, operator
         self._present, self._clock, self._earlier = present, clock, earlier
+        self._kept: KeptSet | None = None
         self._profile, self._plate = wanted.order.profile, wanted.order.nameplate
 
     def carry_out(self, opened: OpenPort, lock: DriveLock) -> RunEnded:
@@ -146,8 +158,8 @@ class _Run:
                 with Mastery(inverter, lock) as mastery:
                     mastery.take(self._identify(inverter))
                     self._all(inverter)
-            if self._wanted.power_cycle and self._found.in_the_drive.startswith("new"):
-                self._prove_power_cycle(opened)
+            if self._wanted.power_cycle and self._kept is not None:
+                self._prove_power_cycle(opened, self._kept)
         except (CommissionerError, OSError) as failure:
             error = failure if isinstance(failure, CommissionerError) else as_error(failure, self._folder)
             ended = ended_by(error, self._folder, 0.0)
@@ -157,6 +169,10 @@ class _Run:
             ended = RunEnded("rejected" if verdict.objections else "commissioned", verdict.reason, 0.0)
         note(self._folder, "run_ended", ended)
         return ended
+
+    @property
+    def _can_write(self) -> bool:
+        return self._profile.parameters is not None and "restore" in self._profile.capabilities
 
     def _inverter(self, port: Port) -> Inverter:
         return Inverter(port, self._profile, self._announce, sleep=self._clock.sleep, clock=self._clock.now)
@@ -215,9 +231,9 @@ class _Run:
             left -= step
             inverter.read_status()
             if why := self._operator.wants_stop():
-                from commissioner.errors import Aborted
-
-                raise Aborted(f"stopped: {why}", step="tune: pause", value=why, limit="no stop", remedy="start again when ready")
+                raise Aborted(
+                    f"stopped: {why}", step="tune: pause", value=why, limit="no stop", remedy="start again when ready"
+                )
 
     def _judge(self, snapshot: ParameterSnapshot) -> None:
         repeats = [done.values for done in self._found.repeats]
@@ -234,25 +250,22 @@ class _Run:
         if verdict.objections or not self._wanted.order.write_back:
             self._bring_back(inverter, snapshot)
             return
-        if self._profile.parameters is None:
-            self._found.in_the_drive = "new: what its last tuning left; this file knows no way to write"
+        if not self._can_write:
+            self._found.in_the_drive = LAST_LEFT
             return
         present = inverter.snapshot()
         report = inverter.keep_tuned(verdict.best, present)
-        names = {row.name for row in report.written}
+        held = inverter.snapshot().in_use
+        self._kept = KeptSet({name: held[name] for name in verdict.best}, report.is_stored)
         self._found.common.written = report.written
         self._folder.journal("parameters_written", report, durable=True)
         kept = "stored" if report.is_stored else "not stored: save at the drive or it is lost at power-off"
         self._found.in_the_drive = f"new: the tuning nearest to the medians, read back, {kept}"
-        if not names:
-            self._found.remarks.append("the last tuning was the one nearest to the medians: it stands in the drive as it is")
 
     def _bring_back(self, inverter: Inverter, snapshot: ParameterSnapshot) -> None:
         """The snapshot; where that fails the end of the run says so instead."""
-        if self._profile.parameters is None or "restore" not in self._profile.capabilities:
-            if self._found.repeats:
-                self._found.in_the_drive = "what its last tuning left: this file knows no way to write the old values back"
-                self._found.remarks.append(self._found.in_the_drive)
+        if not self._can_write:
+            self._found.in_the_drive = LAST_LEFT
             return
         try:
             report = inverter.restore(snapshot)
@@ -266,16 +279,17 @@ class _Run:
         if report.fault:
             self._found.remarks.append(f"the drive reports a fault: {report.fault}")
 
-    def _prove_power_cycle(self, opened: OpenPort) -> None:
-        """Off and on again; then the drive must hold what was written."""
-        written = {row.name: row.after for row in self._found.common.written}
-        if not self._operator.does(
-            "Switch the drive off, wait until its display is dark, switch it on again. Done?"
-        ):
+    def _prove_power_cycle(self, opened: OpenPort, kept: KeptSet) -> None:
+        """Off and on again; then the drive must hold what was kept."""
+        if not kept.is_stored and not self._operator.does("Save the parameters at the drive's keypad. Done?"):
+            self._found.remarks.append("not stored: save at the drive, or the values are lost at power-off")
+            return
+        written = kept.values
+        if not self._operator.does("Switch the drive off, wait until its display is dark, switch it on again. Done?"):
             self._found.remarks.append("not proved by switching off and on")
             return
         held = self._read_again(opened)
-        lost = [name for name, value in written.items() if abs(held[name] - value) > 1e-6 * abs(value)]
+        lost = [name for name, value in written.items() if held[name] != value]
         if lost:
             raise DriveFault(
                 f"{lost[0]} did not outlast a power-off", step="prove by switching off and on", value=held[lost[0]],

@@ -89,9 +89,12 @@ def test_a_32_bit_value_described_as_16_bit_is_found_out_before_anything_is_writ
         "danfoss_fc302", items__stator_resistance__type="u16",
         worked=[{"item": "stator_resistance", "words": [37020], "value": 3.702, "per_phase": 3.702, "source": "wrong"}],
     )  # fmt: skip
-    with LibmodbusDrive(*DANFOSS) as drive, inverter(drive, wrong) as danfoss:
-        with pytest.raises(CheckFailed, match=r"not plausible.*read as u32, big word first it would be 3.6 ohm"):
-            danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
+    with (
+        LibmodbusDrive(*DANFOSS) as drive,
+        inverter(drive, wrong) as danfoss,
+        pytest.raises(CheckFailed, match=r"not plausible.*read as u32, big word first it would be 3.6 ohm"),
+    ):
+        danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
     assert drive.truth["registers"]["1299"] == 0
     assert not [r for r in drive.truth["requests"] if r[0] in (5, 6, 16)]
 
@@ -128,9 +131,12 @@ def test_another_drive_of_the_type_with_another_plate_is_not_restored():
     profile = load_profile("danfoss_fc302")
     with LibmodbusDrive(*DANFOSS) as drive, inverter(drive, profile) as danfoss:
         snapshot = danfoss.snapshot()
-    with LibmodbusDrive(*DANFOSS, "--set", "1239=0,810") as other, inverter(other, profile) as danfoss:
-        with pytest.raises(IdentityMismatch, match="rated_current_a in the drive is not the one of the snapshot"):
-            danfoss.restore(snapshot)
+    with (
+        LibmodbusDrive(*DANFOSS, "--set", "1239=0,810") as other,
+        inverter(other, profile) as danfoss,
+        pytest.raises(IdentityMismatch, match="rated_current_a in the drive is not the one of the snapshot"),
+    ):
+        danfoss.restore(snapshot)
     assert not [r for r in other.truth["requests"] if r[0] in (5, 6, 16)]
 
 
@@ -144,9 +150,12 @@ def test_a_watchdog_of_1_s_is_fed_through_a_settling_pause_of_2_s():
 
 def test_a_drive_that_trips_while_it_settles_is_restored_and_its_fault_told():
     profile = variant("danfoss_fc302", parameters__settle_s=0.3)
-    with LibmodbusDrive(*DANFOSS, "--trip-on", "1299:50199:3") as drive, inverter(drive, profile) as danfoss:
-        with pytest.raises(WriteBackFailed) as failed:
-            danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
+    with (
+        LibmodbusDrive(*DANFOSS, "--trip-on", "1299:50199:3") as drive,
+        inverter(drive, profile) as danfoss,
+        pytest.raises(WriteBackFailed) as failed,
+    ):
+        danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
     assert failed.value.was_restored
     assert "tripped after the parameters were written" in failed.value.what
     assert "the drive reports" in failed.value.what
@@ -164,9 +173,12 @@ def test_a_restore_says_what_a_tripped_drive_reports():
 
 
 def test_under_local_control_nothing_is_written():
-    with LibmodbusDrive(*DANFOSS, "--set", "50199=2") as drive, inverter(drive, load_profile("danfoss_fc302")) as danfoss:
-        with pytest.raises(CheckFailed, match="local control"):
-            danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
+    with (
+        LibmodbusDrive(*DANFOSS, "--set", "50199=2") as drive,
+        inverter(drive, load_profile("danfoss_fc302")) as danfoss,
+        pytest.raises(CheckFailed, match="local control"),
+    ):
+        danfoss.write_circuit(NEW, PLATE, danfoss.snapshot())
     assert drive.truth["registers"]["1300"] == 36000
 
 
@@ -194,9 +206,11 @@ def test_a_drive_that_takes_one_register_at_a_time_cannot_have_a_written_value_o
 
 
 def test_a_value_that_needs_an_enter_is_read_back_after_it():
-    with LibmodbusDrive(*YASKAWA, "--enter", "0x900,0x910") as drive:
-        with inverter(drive, load_profile("yaskawa_a1000")) as yaskawa:
-            report = yaskawa.write_circuit(NEW, PLATE, yaskawa.snapshot())
+    with (
+        LibmodbusDrive(*YASKAWA, "--enter", "0x900,0x910") as drive,
+        inverter(drive, load_profile("yaskawa_a1000")) as yaskawa,
+    ):
+        report = yaskawa.write_circuit(NEW, PLATE, yaskawa.snapshot())
     assert [row.read_back for row in report.written] == pytest.approx([7.4])
     assert drive.truth["registers"][str(0x312)] == 7400
 
@@ -209,11 +223,16 @@ def test_a_line_to_line_resistance_stands_in_the_result_per_phase():
 
 @pytest.mark.parametrize("device", [0, 1, 255])
 def test_every_unit_number_of_tcp_reaches_the_drive(device):
-    with LibmodbusDrive(*YASKAWA) as drive, inverter(drive, load_profile("yaskawa_a1000"), f"?device={device}") as yaskawa:
+    with (
+        LibmodbusDrive(*YASKAWA) as drive,
+        inverter(drive, load_profile("yaskawa_a1000"), f"?device={device}") as yaskawa,
+    ):
         assert yaskawa.read_status().state == "ready to switch on"
 
 
-@pytest.mark.parametrize("address", ["rtu:///dev/ttyS9?device=0", "tcp://x?device=256", "tcp://x?reply=0", "tcp://x?reply=99"])
+@pytest.mark.parametrize(
+    "address", ["rtu:///dev/ttyS9?device=0", "tcp://x?device=256", "tcp://x?reply=0", "tcp://x?reply=99"]
+)
 def test_a_unit_number_or_reply_time_that_cannot_be_is_refused(address):
     with pytest.raises(UsageError):
         parse_url(address)
@@ -223,10 +242,12 @@ def test_a_unit_number_or_reply_time_that_cannot_be_is_refused(address):
 def test_a_slow_drive_is_waited_for_as_long_as_its_address_or_file_says(said_by):
     profile = variant("yaskawa_a1000", **({"link__reply_s": 1.5} if said_by == "file" else {}))
     query = "?reply=1.5" if said_by == "address" else ""
-    with LibmodbusDrive(*YASKAWA, "--delay", "400") as drive:
-        with inverter(drive, profile, query, reply_timeout_s=0.2) as yaskawa:
-            started = time.monotonic()
-            assert yaskawa.read_status().state == "ready to switch on"
+    with (
+        LibmodbusDrive(*YASKAWA, "--delay", "400") as drive,
+        inverter(drive, profile, query, reply_timeout_s=0.2) as yaskawa,
+    ):
+        started = time.monotonic()
+        assert yaskawa.read_status().state == "ready to switch on"
     assert time.monotonic() - started > 0.4
 
 
@@ -235,3 +256,44 @@ def test_blocks_are_no_longer_than_the_drive_takes():
     with LibmodbusDrive(*DANFOSS, "--max-read", "2") as drive, inverter(drive, profile) as danfoss:
         assert danfoss.read_nameplate()["rated_current_a"] == pytest.approx(5.0)
     assert max(r[2] for r in drive.truth["requests"]) == 2
+
+
+def ask_new(drive, out, *lines, options=()):
+    """`drives new` with a person's answers."""
+    from typer.testing import CliRunner
+
+    from commissioner.cli.app import app
+
+    return CliRunner().invoke(
+        app, ["drives", "new", drive.url, "--out", str(out), *options], input="\n".join(lines) + "\n"
+    )
+
+
+LABELS = (
+    "Drive under test", "its manual", "y", "1220", "400", "p. 1", "y", "1240", "5.0", "p. 1", "y", "1230", "50", "p. 2", "n",
+    "n", "n",
+)  # fmt: skip
+
+
+def test_a_new_drive_file_holds_what_the_drive_proved_and_nothing_else(tmp_path):
+    out = tmp_path / "new.toml"
+    with LibmodbusDrive(*DANFOSS, "--max-read", "2", "--functions", "3,16") as drive:
+        answer = ask_new(drive, out, *LABELS, "y", options=("--probe-writes",))
+    assert answer.exit_code == 0, answer.output
+    profile = load_profile(str(out))
+    assert {n: (i.address, i.type, i.scale) for n, i in profile.items.items()} == {
+        "rated_voltage_v": (1219, "u16", 1.0),
+        "rated_current_a": (1239, "u32", 0.01),
+        "rated_frequency_hz": (1229, "u16", 1.0),
+    }
+    assert (profile.link.max_read_registers, profile.link.write_functions) == (2, (16,))
+    assert profile.capabilities == frozenset() and "write_back" in profile.unknown
+    assert drive.truth["registers"]["1219"] == 400
+
+
+def test_labels_that_are_not_in_the_registers_named_make_no_drive_file(tmp_path):
+    out = tmp_path / "new.toml"
+    with LibmodbusDrive(*DANFOSS) as drive:
+        answer = ask_new(drive, out, *LABELS[:4], "p. 1", "y", "1240", "7.3", "p. 1", "n", "n", "n", "n")
+    assert isinstance(answer.exception, CheckFailed | SystemExit) and not out.exists()
+    assert not [r for r in drive.truth["requests"] if r[0] in (5, 6, 16)]

@@ -10,7 +10,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from commissioner.errors import Aborted, CheckFailed, CommissionerError, DriveFault, LinkError, ReplyMismatch, ReplyTimeout
+from commissioner.errors import (
+    Aborted,
+    CheckFailed,
+    CommissionerError,
+    DriveFault,
+    LinkError,
+    ReplyMismatch,
+    ReplyTimeout,
+)
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.reading import read_status
@@ -73,7 +81,7 @@ class Tuner:
         """CheckFailed: a condition did not hold and nothing was started. Aborted: a person or a status nobody listed.
         DriveFault: it failed, hung, or the drive is not at rest after it. However it ends, the last steps have run."""
         began = self._clock()
-        self._journal(Intent(Action.TUNE, {name: "by the drive itself" for name in self._tuning.results}))
+        self._journal(Intent(Action.TUNE, dict.fromkeys(self._tuning.results, "by the drive itself")))
         self._check_no_fault()
         error: BaseException | None = None
         try:
@@ -124,7 +132,9 @@ class Tuner:
 
     def _ask(self, text: str) -> None:
         if not self._operator.does(text):
-            raise Aborted("not done at the drive", step="tune: ask", value="no", limit=text, remedy="start again when ready")
+            raise Aborted(
+                "not done at the drive", step="tune: ask", value="no", limit=text, remedy="start again when ready"
+            )
         self._check_stop()
 
     def _await(self, step: Step) -> None:
@@ -205,6 +215,8 @@ class Tuner:
     def _end(self, error: BaseException | None) -> None:
         """Every last step is tried, whatever came before and whichever of them fails."""
         problems: list[CommissionerError] = []
+        if error is not None and self._tuning.form == "assisted":
+            self._operator.does("Stop the drive's tuning at the drive, if it still runs. Done?")
         for step in self._tuning.finally_:
             try:
                 self._end_step(step)
