@@ -168,6 +168,39 @@ def run(
 
 
 @app.command()
+def tune(
+    drive: Drive,
+    profile: Profile,
+    motor: Motor,
+    repeat: Annotated[int, typer.Option(help="How often the drive tunes itself.")] = 3,
+    pause: Annotated[
+        float | None, typer.Option(help="Seconds between two tunings; the drive file's if not given.")
+    ] = None,
+    write_back: Annotated[
+        bool, typer.Option("--write-back", help="Leave the tuning nearest to the medians in the drive, stored.")
+    ] = False,
+    hardwired_stop: Annotated[
+        bool, typer.Option("--hardwired-stop", help="A tested stop circuit or disconnect is in the operator's reach.")
+    ] = False,
+    power_cycle: Annotated[
+        bool, typer.Option("--power-cycle", help="Ask for the drive to be switched off and on, then read it again.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    procedure: Procedure = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """An ordinary drive's own standstill autotune, repeated, watched and judged; then its best set, or what was there before."""
+    from commissioner.cli.verbs.tune import tune as verb
+    from commissioner.operations.tune import TuneRequest
+
+    request = TuneRequest(
+        drive, profile, motor, runs, repeat, pause, write_back, hardwired_stop, power_cycle, procedure
+    )
+    verb(request, yes=yes, as_json=json)
+
+
+@app.command()
 def identify(
     files: Annotated[
         list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")

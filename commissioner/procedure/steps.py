@@ -56,6 +56,8 @@ class Job:
     """The drive's name of each written parameter -> the inverse-Gamma field it takes."""
     write_back: bool
     link_latency_s: float
+    parameter_factors: dict[str, float] = field(default_factory=dict)
+    """By what the drive multiplies a contract's SI value, where that is not 1: 2 for a line-to-line resistance."""
 
     @property
     def scale_ramp_per_s(self) -> float:

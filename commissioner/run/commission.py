@@ -32,7 +32,7 @@ from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
-from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
+from commissioner.run.job import bounds, make_job, names_of, open_drive, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.run.stopping.stop_file import stopped_by_file
@@ -187,7 +187,7 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
-    result: RunDocument = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
+    result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
     _report(folder, result, findings)
     folder.cover()
     return result

@@ -12,6 +12,7 @@ from commissioner.report.run.certificate import certificate
 from commissioner.report.run.evidence import evidence
 from commissioner.report.run.plain_simulation import plain_simulation
 from commissioner.report.run.subject import Subject
+from commissioner.report.run.tuning import tuning
 from commissioner.report.sheet.document import Margins, Page, document
 
 
@@ -26,6 +27,7 @@ def run_page(
     subject = Subject(result, journal, findings, request or {})
     pages = [
         Page("result", "Result", certificate(subject)),
+        Page("tuning", "Tuning", tuning(subject)),
         Page("evidence", "Evidence", evidence(subject)),
         Page("simulation", "Plain simulation", plain_simulation(subject)),
         Page("a", "A Checks", checks_and_course(subject), is_appendix=True),

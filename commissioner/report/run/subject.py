@@ -90,6 +90,10 @@ class Subject:
         """Rows of what was written, by the contract's name of the parameter."""
         return {row["field"]: row for row in self.result.get("written") or () if row.get("field")}
 
+    def in_si(self, row: Record, key: str) -> float:
+        """A number of a written row in the contract's unit and convention."""
+        return float(row[key]) / float(row.get("per_si") or 1.0)
+
     @property
     def before(self) -> Record:
         return self.result.get("before") or {}
