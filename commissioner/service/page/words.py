@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
+
 from commissioner.service.page.texts import NBSP, Texts
 
 SCRIPT_TEXTS = (
@@ -18,7 +20,7 @@ SCRIPT_TEXTS = (
     "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
     "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
-    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing", "efficiency %s; motors of this size have %s",
+    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
     "Reading the drive …", "The file is being sent …", "no value",
 )  # fmt: skip
 """What scripts say; the page hands it to them in its own language."""
@@ -65,6 +67,13 @@ CAUSES = {
 }  # fmt: skip
 
 
+def _named(text: str) -> str:
+    """A sentence with the parameters' names in place of their keys."""
+    for quantity in QUANTITIES:
+        text = text.replace(quantity.key, quantity.name)
+    return text
+
+
 class Words:
     """The same in one language."""
 
@@ -77,7 +86,7 @@ class Words:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
         plain = re.sub(r", deg[A-Z]$", "", name)
         plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        said = self._t.gettext(plain)
+        said = self._t.tell(plain)
         return said[:1].upper() + said[1:]
 
     def check_value(self, check: Mapping[str, Any]) -> str:
@@ -100,14 +109,12 @@ class Words:
             text = f"{text} {unit}"
         return self._localised(text)
 
-    def sentence(self, text: str) -> str:
-        """A sentence of the core, with its first letter as a sentence has it."""
-        said = self._t.gettext(text)
-        return said[:1].upper() + said[1:]
-
-    def is_checked(self, check: Mapping[str, Any]) -> bool:
-        """A check without a value was not made: it locks like one that failed."""
-        return check["value"] is not None
+    def sentence(self, text: object) -> str:
+        """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
+        plain = _named(str(text))
+        said = self._t.tell(plain)
+        said = said[:1].upper() + said[1:]
+        return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:
         return self._t.gettext(CAUSES[name][0]) if name in CAUSES else name.replace("_", " ").capitalize()
@@ -133,7 +140,7 @@ class Words:
 
     def _localised(self, text: str) -> str:
         """`at most 120 degC` with marks, units and no-break spaces of the language."""
-        if (said := self._t.gettext(text)) != text:
+        if (said := self._t.tell(text)) != text:
             return said
         text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
         text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)

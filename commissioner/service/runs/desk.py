@@ -49,6 +49,11 @@ class LiveRun:
     follower: asyncio.Task[None] | None = None
 
     @property
+    def has_result(self) -> bool:
+        """The run is over for whoever looks: its result is saved, or nobody will save one any more."""
+        return self.is_over or (self.feed.state.is_over and (self.feed.folder / "result.json").is_file())
+
+    @property
     def is_cut_off(self) -> bool:
         """Its process is gone, and it has no end."""
         return self.is_over and self.feed.state.end is None

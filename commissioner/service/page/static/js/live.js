@@ -22,24 +22,25 @@ function limitLines(value) {
 }
 function plot(element, span, range, splits, series, limit, bands) {
   const size = () => ({ width: Math.max(160, element.clientWidth), height: Math.max(80, element.clientHeight) });
-  const axis = { stroke: css("--ink2"), grid: { stroke: css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
+  const axis = { stroke: () => css("--ink2"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
   const made = new uPlot({
     ...size(), legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
     scales: { x: { time: false, range: (u, low, high) => [(high ?? span) - span, high ?? span] }, y: { range } },
     axes: [{ ...axis, size: 24, splits: (u) => [0, 1, 2, 3, 4].map((k) => u.scales.x.max - span + (k * span) / 4), values: (u, at) => at.map((x) => number(x - u.scales.x.max, 1, "s")) },
       { ...axis, size: 48, splits, values: (u, at) => at.map((y) => number(y, Math.abs(y) < 1 && y !== 0 ? 2 : 0)) }],
-    series: [{}, ...series.map((extra) => ({ stroke: css("--trace"), width: 1.2, points: { show: false }, spanGaps: false, ...extra }))],
+    series: [{}, ...series.map((extra) => ({ stroke: () => css("--trace"), width: 1.2, points: { show: false }, spanGaps: false, ...extra }))],
     bands, plugins: [limitLines(limit)],
   }, [[], ...series.map(() => [])], element);
   new ResizeObserver(() => made.setSize(size())).observe(element);
   return made;
 }
 const currentTop = () => 1.12 * (limits.current ?? 1), fluxTop = () => 1.12 * (limits.flux ?? 1);
-const fill = () => css("--band95");
 const plots = {
-  current: plot($("#pi"), WINDOW_S, () => [-currentTop(), currentTop()], () => [-Math.round(limits.current ?? 1), 0, Math.round(limits.current ?? 1)], [{}, {}], () => limits.current && [limits.current, -limits.current], [{ series: [2, 1], fill }]),
+  current: plot($("#pi"), WINDOW_S, () => [-currentTop(), currentTop()], () => [-Math.round(limits.current ?? 1), 0, Math.round(limits.current ?? 1)], [{}, {}], () => limits.current && [limits.current, -limits.current], [{ series: [2, 1], fill: () => css("--band95") }]),
   flux: plot($("#pf"), FLUX_WINDOW_S, () => [0, fluxTop()], () => [0, 0.5 * (limits.flux ?? 1), limits.flux ?? 1], [{ width: 1.6 }], () => limits.flux && [limits.flux], []),
 };
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { for (const made of Object.values(plots)) made.redraw(false, true); });
 
 /* ---- samples ---------------------------------------------------------------------------------------------------------- */
 on("samples", (event) => {
