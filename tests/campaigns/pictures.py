@@ -158,16 +158,17 @@ def main() -> None:
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     parts: list[Callable[[Album], None]] = [work, ends]
-    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
-        with (
-            ServiceProcess(Path(folder) / "s", speed=asked.speed, diagnosis=True) as service,
-            technician(browser, service, asked.language) as hand,
-        ):
-            album = Album(hand, asked.out, set(filter(None, asked.only.split(","))))
-            for part in parts:
-                part(album)
-            for fault in (*album.faults, *hand.complaints):
-                print(fault)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        chromium() as browser,
+        ServiceProcess(Path(folder) / "s", speed=asked.speed, diagnosis=True) as service,
+        technician(browser, service, asked.language) as hand,
+    ):
+        album = Album(hand, asked.out, set(filter(None, asked.only.split(","))))
+        for part in parts:
+            part(album)
+        for fault in (*album.faults, *hand.complaints):
+            print(fault)
 
 
 if __name__ == "__main__":

@@ -121,7 +121,7 @@ class Technician:
     def wait_energised(self) -> None:
         expect(self.page.locator("#big")).to_have_text(str(self.words["energised"]), timeout=SLOW_MS)
 
-    def wait_result(self, timeout_ms: float = 180_000) -> None:
+    def wait_result(self, timeout_ms: float = 600_000) -> None:
         expect(self.page.locator(".verdict")).to_be_visible(timeout=timeout_ms)
 
     # --- judging ---------------------------------------------------------------------------------------------------

@@ -129,6 +129,11 @@ def texts_of(connection: HTTPConnection) -> Texts:
     return Texts(next((w[:2].lower() for w in wanted if w[:2].lower() in LANGUAGES), "en"))
 
 
+def sentence(text: str) -> str:
+    """With its first letter as a sentence has it."""
+    return text[:1].upper() + text[1:]
+
+
 def told(refusal: Refusal, texts: Texts) -> Refusal:
     """The same refusal in the language of a page's script."""
     facts = refusal.problem.model_dump(exclude={"status", "title"})

@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from commissioner.service.page.texts import NBSP, Texts
+from commissioner.service.page.texts import NBSP, Texts, sentence
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -86,8 +86,7 @@ class Words:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
         plain = re.sub(r", deg[A-Z]$", "", name)
         plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        said = self._t.tell(plain)
-        return said[:1].upper() + said[1:]
+        return sentence(self._t.tell(plain))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -112,8 +111,7 @@ class Words:
     def sentence(self, text: object) -> str:
         """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
         plain = _named(str(text))
-        said = self._t.tell(plain)
-        said = said[:1].upper() + said[1:]
+        said = sentence(self._t.tell(plain))
         return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:

@@ -24,7 +24,7 @@ from commissioner.service.library import (
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
-from commissioner.service.page.texts import Texts, texts_of
+from commissioner.service.page.texts import Texts, sentence, texts_of
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
@@ -149,7 +149,7 @@ def _motor_page(
 def say_plate(judged: dict[str, Any], t: Texts) -> dict[str, Any]:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
-        key: "" if field["ok"] else f"{t.tell(field['what']).capitalize()}: {t.tell(field['remedy'])}"
+        key: "" if field["ok"] else f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}"
         for key, field in judged["fields"].items()
     }
     if judged["efficiency"] is None:

@@ -144,7 +144,8 @@ class Desk:
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
     def _arguments(self, drive: Drive, motor: Motor, axes_deg: Sequence[float], write_back: bool) -> list[str]:
-        axes = ["--axes", ",".join(f"{axis:g}" for axis in axes_deg)] if axes_deg else []
+        chosen = axes_deg or self.settings.file.service.axes_deg
+        axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
         more += [] if self.settings.file.service.diagnosis else ["--no-diagnosis"]
         return [

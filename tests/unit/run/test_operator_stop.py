@@ -49,7 +49,11 @@ def open_gate(monkeypatch):
 @pytest.mark.parametrize("by", ["another thread", "a signal"])
 def test_a_run_that_computes_ends_at_once(folder, by):
     stop = OperatorStop()
-    act = (lambda: stop.ask("somebody", "enough")) if by == "another thread" else (lambda: signal.raise_signal(signal.SIGTERM))
+    act = (
+        (lambda: stop.ask("somebody", "enough"))
+        if by == "another thread"
+        else (lambda: signal.raise_signal(signal.SIGTERM))
+    )
     timer = threading.Timer(0.3, act)
     timer.start()
     began = time.monotonic()
