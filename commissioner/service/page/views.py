@@ -12,7 +12,7 @@ from commissioner.service.access.visitors import visitor_of
 from commissioner.service.page import shelves, work
 from commissioner.service.page.frame import ToLogin, local, refused
 from commissioner.service.page.texts import texts_of, told
-from commissioner.service.problems import Refusal, refusal_of, respond
+from commissioner.service.problems import Refusal, disk_refuses, refusal_of, respond
 
 router = APIRouter()
 router.include_router(shelves.router)
@@ -33,6 +33,11 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(CommissionerError)
     async def fail(request: Request, error: CommissionerError) -> Response:
         return answer(request, refusal_of(error))
+
+
+    @app.exception_handler(OSError)
+    async def lost(request: Request, failure: OSError) -> Response:
+        return answer(request, disk_refuses(failure))
 
 
 def answer(request: Request, refusal: Refusal) -> Response:

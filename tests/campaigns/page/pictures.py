@@ -1,6 +1,6 @@
 """Every view of the technician's page as pictures, at three widths, light and dark: to be looked at.
 
-python -m tests.campaigns.pictures OUT [--language de] [--only live,result]
+python -m tests.campaigns.page.pictures OUT [--language de] [--only live,result]
 """
 
 from __future__ import annotations
