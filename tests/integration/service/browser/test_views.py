@@ -129,3 +129,21 @@ def test_foreign_markup_stays_text(service, browser, shelf):
             assert not hand.page.evaluate(HIT), place
             assert "Content-Security-Policy" not in str(hand.complaints), place
         hand.complaints.clear()
+
+
+DROP = """([name, text]) => { const data = new DataTransfer(); data.items.add(new File([text], name));
+document.querySelector('#drop').dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true })); }"""
+
+
+def test_a_file_that_is_dropped_is_answered_by_the_same_verb(service, browser):
+    """`identify`, whose refusal has step, value, limit and remedy here as on the command line."""
+    with technician(browser, service) as hand:
+        hand.go("/")
+        hand.page.evaluate(DROP, ["pump.csv", "time_s,current_u_a\n0,1\n1,2\n"])
+        assert hand.page.evaluate("() => document.querySelector('#file').files[0].name") == "pump.csv"
+        hand.button("Send the file")
+        expect(hand.page.locator("h2").filter(has_text="No answer from these data")).to_be_visible(timeout=SLOW_MS)
+        job = service.client.get(f"/api/recordings/{hand.page.url.rsplit('/', 1)[1]}").json()
+        assert job["exit_code"] in (2, 3) and job["problem"]["remedy"]
+        expect(hand.page.locator("main")).to_contain_text(str(job["problem"]["limit"]))
+        assert hand.violations() == []
