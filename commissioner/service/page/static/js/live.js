@@ -7,7 +7,7 @@ const FACTOR = [1, 1, 1e3, 1e3], DIGITS = [3, 3, 3, 1], SYMBOL = ["R_s", "R_R", 
 const WANTED = ["resistance_std_percent", "rotor_resistance_std_percent", "leakage_std_percent", "magnetizing_std_percent"];
 const first = JSON.parse($("#livedata").textContent), acceptance = first.acceptance;
 let limits = { current: first.live.current.limit_a, flux: first.live.flux.limit_wb };
-let current = { t: [], low: [], high: [] }, flux = { t: [], y: [] }, history = [], newest = performance.now(), segment = null;
+let current = { t: [], low: [], high: [] }, flux = { t: [], y: [] }, history = [], newest = performance.now(), segment = null, isOn = first.live.output === "on";
 
 /* ---- plots --------------------------------------------------------------------------------------------------------- */
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -126,13 +126,14 @@ function show(live) {
   }
   draw();
 }
-on("live", (live) => { newest = performance.now(); show(live); });
+on("live", (live) => { newest = performance.now(); isOn = live.output === "on"; show(live); });
 on("history", (past) => { history = past; sparks(); });
 setInterval(() => {
   const age = $("#age"); if (!age) return;
   const seconds = (performance.now() - newest) / 1000;
-  age.textContent = say(seconds > 2 ? "%s old: stale" : "%s old", number(seconds, 1, "s"));
-  age.classList.toggle("old", seconds > 1);
+  const isSilent = isOn && seconds > 1; /* between tests the computer works and nothing is said: that is no loss */
+  age.textContent = say(isSilent && seconds > 2 ? "%s old: stale" : "%s old", number(seconds, 1, "s"));
+  age.classList.toggle("old", isSilent);
   $("#live")?.classList.toggle("stale", seconds > 2);
 }, 200);
 show(first.live);
