@@ -6,13 +6,21 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike, NDArray
 
 FAST: Any = {"cache": True, "fastmath": True, "error_model": "numpy", "nogil": True}
 kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
 inlined: Any = njit(inline="always", **FAST)
 """A part of a kernel too small to be called."""
+
+
+def writable(signal: ArrayLike) -> NDArray[np.float64]:
+    """As compiled code takes it: contiguous, and writable, for another signature (columns of a file are read-only) is
+    compiled anew."""
+    return np.require(signal, np.float64, ["C", "W"])
 
 
 def forget_stale_kernels(folder: str, beside: str) -> None:

@@ -152,10 +152,44 @@ def _current_at_end(
 def _push_of_loss(
     basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array
 ) -> None:
-    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on."""
-    at0, at = _locate(basis.shape[0], per_a, i0), _locate(basis.shape[0], per_a, i)
+    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on:
+
+    the mean of `_mean_loss`, whose shares of the tables' rows are the same for every shape.
+    """
+    (cell0, in0, out0) = _locate(basis.shape[0], per_a, i0)
+    (cell1, in1, out1) = _locate(basis.shape[0], per_a, i)
+    sign0, sign1 = (1.0 if i0 >= 0.0 else -1.0), (1.0 if i >= 0.0 else -1.0)
+    # Shares of the rows cell0, cell0 + 1, cell1, cell1 + 1 of the table, and the rows of the integral that are counted from.
+    low0, high0, low1, high1 = 0.0, 0.0, 0.0, 0.0
+    from0, from1, share = cell0, cell1, 0.0
+    if sign0 == sign1 and cell0 == cell1 and (out0 > 0.0) == (out1 > 0.0):
+        low0, high0 = 0.5 * sign0 * (1.0 - in0), 0.5 * sign0 * in0
+        low1, high1 = 0.5 * sign0 * (1.0 - in1), 0.5 * sign0 * in1
+    else:
+        share = 1.0 / ((i - i0) * per_a)
+        if sign0 != sign1:
+            end0, end1 = -(0.5 * in0 + out0), 0.5 * in1 + out1
+            low0, high0 = end0 * (1.0 - in0) - 0.5 * in0, end0 * in0
+            low1, high1 = end1 * (1.0 - in1) + 0.5 * in1, end1 * in1
+        elif cell1 + in1 + out1 > cell0 + in0 + out0:
+            end1 = 0.5 * in1 + out1 - out0
+            low0, high0 = 0.5 * (1.0 - in0) * (1.0 - in0), 0.5 * (1.0 - in0) * (1.0 + in0)
+            low1, high1 = end1 * (1.0 - in1) + 0.5 * in1, end1 * in1
+            from0 = cell0 + 1
+        else:
+            end0 = -(0.5 * in0 + out0 - out1)
+            low0, high0 = end0 * (1.0 - in0) - 0.5 * in0, end0 * in0
+            low1, high1 = -0.5 * (1.0 - in1) * (1.0 - in1), -0.5 * (1.0 - in1) * (1.0 + in1)
+            from1 = cell1 + 1
+        low0, high0, low1, high1 = share * low0, share * high0, share * low1, share * high1
     for c in range(basis.shape[1]):
-        push[first + c] = -_mean_loss(basis[:, c], basis_integral[:, c], per_a, i0, i, at0, at)[0]
+        push[first + c] = -(
+            low0 * basis[cell0, c]
+            + high0 * basis[cell0 + 1, c]
+            + low1 * basis[cell1, c]
+            + high1 * basis[cell1 + 1, c]
+            + share * (basis_integral[from1, c] - basis_integral[from0, c])
+        )
 
 
 @njit(cache=True, inline="always")

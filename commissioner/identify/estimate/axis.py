@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import writable
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
@@ -153,7 +154,10 @@ def _better_with_link(stretches: list[Stretch], period_s: float, fit: BatchFit) 
 def segments(stretches: Sequence[Stretch]) -> list[Segment]:
     """Between segments the cage still carries what the current left behind, and iron may be remanent before the first:
     no segment is taken to start at rest."""
-    return [Segment(s.voltage_v, s.current_a, s.axis_deg, starts_at_rest=False, kind=s.kind) for s in stretches]
+    return [
+        Segment(writable(s.voltage_v), writable(s.current_a), s.axis_deg, starts_at_rest=False, kind=s.kind)
+        for s in stretches
+    ]
 
 
 def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estimator) -> AxisResult:

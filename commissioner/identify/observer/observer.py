@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import writable
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
 from commissioner.identify.observer import kernels
 from commissioner.identify.observer.coordinates import (
@@ -144,8 +145,7 @@ class ParallelObserver:
         block and has come to rest; known parameters stay, states start from zero. Without `adapts` only the states
         follow the voltage: for samples that tell about the inverter's dead band and not about the machine.
         """
-        voltage_v = np.ascontiguousarray(voltage_v, dtype=np.float64)
-        current_a = np.ascontiguousarray(current_a, dtype=np.float64)
+        voltage_v, current_a = writable(voltage_v), writable(current_a)
         if voltage_v.ndim != 1 or voltage_v.shape != current_a.shape:
             raise ValueError(f"voltage {voltage_v.shape} and current {current_a.shape} must be equal (n,)")
         if self.law == "lyapunov" and not self._gamma.any():
@@ -261,7 +261,8 @@ class ParallelObserver:
         if piece.restarts or piece.begins_at_rest:
             _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
-            self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
+            known = writable(piece.open_loop_v)
+            self._kernel(shell, known, np.zeros_like(known), kernels.FROZEN)
         chosen = self._law if law is None else law
         return self._kernel(shell, piece.voltage_v, piece.current_a, chosen if piece.adapts else kernels.FROZEN)
 
@@ -269,7 +270,7 @@ class ParallelObserver:
         signals = tuple(np.empty_like(voltage_v) for _ in range(3))
         compensation = self.compensation
         kernels.advance(
-            np.ascontiguousarray(voltage_v, dtype=np.float64),
+            voltage_v,
             current_a,
             self._filter,
             self.sample_period_s,
