@@ -29,7 +29,8 @@ SHARED = 5
 OWN = 3
 PARTS = 4
 """Steps of a period in which the current passes zero."""
-_SOLVED = 1e-12
+_SOLVED = 1e-9
+"""Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
 _ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
@@ -265,7 +266,7 @@ def simulate(
 
     x1, x2 = own[1], own[2]
     s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
-    dg, dg_last = np.zeros(p), np.zeros(p)
+    dg, dg_last, push, d1, d2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
@@ -354,14 +355,20 @@ def simulate(
             _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
             scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
             h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
+            # One array is written by each loop: of more, the compiler does not see that they are apart, and takes one by one.
             for j in range(p):
-                push = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
-                dg_last[j] = dg[j]
-                d1 = a11 * s1[j] + a12 * s2[j] + b11 * push + to_s1[j]
-                d2 = a21 * s1[j] + a22 * s2[j] + b12 * push + to_s2[j]
-                moved = (h_g * d1 + h_r * d2 + to_i[j]) * scale * wanted[j]
-                si[j] = moved
-                s1[j] = d1 - back1 * moved
-                s2[j] = d2 - back2 * moved
+                push[j] = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+            dg, dg_last = dg_last, dg
+            for j in range(p):
+                d1[j] = a11 * s1[j] + a12 * s2[j] + b11 * push[j] + to_s1[j]
+            for j in range(p):
+                d2[j] = a21 * s1[j] + a22 * s2[j] + b12 * push[j] + to_s2[j]
+            for j in range(p):
+                si[j] = (h_g * d1[j] + h_r * d2[j] + to_i[j]) * (scale * wanted[j])
+            for j in range(p):
+                s1[j] = d1[j] - back1 * si[j]
+            for j in range(p):
+                s2[j] = d2[j] - back2 * si[j]
+            for j in range(p):
                 dg[j] = slope_g * s1[j] + to_g[j]
     return total
