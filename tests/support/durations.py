@@ -53,6 +53,4 @@ def _cpu_s() -> float:
 
 if __name__ == "__main__":
     TABLE.unlink(missing_ok=True)
-    sys.exit(
-        subprocess.run([sys.executable, "-m", "pytest", "-p", "tests.support.durations", "--costs", TABLE]).returncode
-    )
+    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.durations", "--costs", TABLE]))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 FEWEST_SHARE = 0.06
@@ -15,7 +16,7 @@ APART, CROWDED = 0.4, 5.0
 """Tones nearer than this, in logarithms, cost so much each."""
 
 
-@njit(cache=True)
+@njit()
 def minimax_cost(point: Array, bounds: Array, machine: Array, limits: Array) -> float:
     """Logarithm of the worst variance of (R_s, R_R, L_sigma, L_M), relative, and what tones too near each other cost.
 
@@ -71,7 +72,7 @@ def minimax_cost(point: Array, bounds: Array, machine: Array, limits: Array) -> 
     return math.log(worst) + CROWDED * crowding
 
 
-@njit(cache=True)
+@njit()
 def _largest_variance(information: Array) -> float:
     """The largest diagonal element of the inverse, (4, 4), by Cholesky's factor; infinite where there is none."""
     n = information.shape[0]

@@ -14,8 +14,8 @@ from commissioner.procedure.verdict import evidence_of
 from commissioner.records import Signal
 from commissioner.report.page import Page, Picture, Section, Table, Tone, picture, render
 from commissioner.report.run import figures
-from commissioner.report.run.standing import ACCEPTED, standing
-from commissioner.report.run.summary import diagnosis_sentences, finding_sentences
+from commissioner.report.run.standing import ACCEPTED, finding_sentences, standing
+from commissioner.report.run.summary import diagnosis_sentences
 
 _TONES: dict[str, Tone] = {"commissioned": "good", "rejected": "warn", "aborted": "warn", "faulted": "bad"}
 _STANDING = {ACCEPTED: "Measured and accepted, not written: the drive holds its old values"}

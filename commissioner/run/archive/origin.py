@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import getpass
 import hashlib
 import os
 import platform
 import sys
-import uuid
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from commissioner.link.wire.secrets import shown_call
@@ -53,6 +50,8 @@ def this_process() -> Origin:
 
 def user_name() -> str:
     """The account of this process; a number where it has no name."""
+    import getpass
+
     try:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):
@@ -61,6 +60,8 @@ def user_name() -> str:
 
 @cache
 def program_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("commissioner")
     except PackageNotFoundError:
@@ -72,6 +73,8 @@ def machine_part() -> str:
     """Six hexadecimal digits that tell this machine from others, so that runs of two laptops never share an id."""
     marks = [platform.node(), *(_text(Path(path)) for path in _MACHINE_IDS)]
     if not any(marks[1:]):
+        import uuid
+
         marks.append(f"{uuid.getnode():012x}")
     return hashlib.sha256("\n".join(marks).encode()).hexdigest()[:6]
 
