@@ -44,7 +44,7 @@ class Foresight:
         gain = np.linalg.solve(normal, free.T @ left / scale) / scale
         squares = self.seen.squares - 2.0 * moved @ score + moved @ information @ moved - gain @ (free.T @ left)
         n = self.problem.samples
-        return float(n * math.log(max(squares, 1e-9 * self.seen.squares) / n + 1e-300) + PRICE * free.shape[1])
+        return float(n * math.log(max(float(squares), 1e-9 * self.seen.squares) / n + 1e-300) + PRICE * free.shape[1])
 
     def _free(self, model: ModelChoice) -> tuple[Matrix, np.ndarray]:
         """(all numbers, those of `model`): what each free number of `model` moves; and which numbers it holds at zero."""
