@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from commissioner.errors import CheckFailed, CommissionerError, DriveError, IdentityMismatch, WriteBackFailed
 from commissioner.link.drive.facts import Journal, WriteReport
-from commissioner.link.drive.items import Items
+from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
 from commissioner.link.drive.putting import Direct, Staged
 from commissioner.link.drive.reading import read_identity, read_status
@@ -154,9 +154,12 @@ class WriteBack:
     def _report(self, target: Values, before: ParameterSnapshot, *, is_stored: bool) -> WriteReport:
         after = self._sets.in_use()
         rows = tuple(
-            WrittenParameter(name, self._profile.item(name).address, before.in_use[name], target[name], after[name])
+            WrittenParameter(
+                name, self._profile.item(name).address, before.in_use[name],
+                number(self._items.as_held(name, target[name])), after[name],
+            )
             for name in self._sets.differing(target, before.in_use)
-        )
+        )  # fmt: skip
         store = self._profile.store
         return WriteReport(
             written=rows,
