@@ -13,6 +13,8 @@ OTHER_MEANING = {
     ("identify/document.py", "lost_samples"),
     ("cli/screens/identification.py", "lost_samples"),
     ("monitor/intake/levels.py", "clipping"),
+    ("report/run/appendix.py", "lost_samples"),
+    ("report/run/certificate.py", "lost_samples"),
 }
 """Counts of an identification's own audit, and a level of the monitor's: no diagnosis has a part in them."""
 

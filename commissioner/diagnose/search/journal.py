@@ -37,6 +37,17 @@ class Nominal:
 
 
 @dataclass(frozen=True)
+class Began:
+    """Steps from these causes, on so many samples: a part of the recording, more of it, or other data."""
+
+    accepted: tuple[str, ...]
+    samples: int
+
+    def __str__(self) -> str:
+        return f"from {', '.join(self.accepted) or 'no cause'} on {self.samples} samples"
+
+
+@dataclass(frozen=True)
 class Beside:
     """What is known of the accepted causes when another is judged."""
 
@@ -171,7 +182,7 @@ class Refined:
         return f"  {self.says}: gained {self.gained_chi2:.4g}"
 
 
-Step = Said | Nominal | Screened | Tried | Accepted | Dropped | Exchanged | Refined
+Step = Said | Nominal | Began | Screened | Tried | Accepted | Dropped | Exchanged | Refined
 KINDS: Mapping[str, type] = {k.__name__.lower(): k for k in get_args(Step)}
 
 
@@ -290,6 +301,9 @@ def replayed(steps: Iterable[Step], rules: Rules = RULES) -> Replayed:
 
     for step in steps:
         match step:
+            case Began():
+                settle(None)
+                screened, tried, accepted = None, [], list(step.accepted)
             case Screened():
                 settle(None)
                 screened, tried = step, []

@@ -19,7 +19,7 @@ from commissioner.diagnose.rules import RULES, Rules
 from commissioner.diagnose.search.acceptance import LINES_OF_THEIR_OWN, guard_of_lost_samples, losses_of
 from commissioner.diagnose.search.adjust import with_new_dictionaries
 from commissioner.diagnose.search.dictionaries import begun_with, carried_over, respread
-from commissioner.diagnose.search.journal import Nominal, RuledOut, Said, Step
+from commissioner.diagnose.search.journal import Began, Nominal, RuledOut, Said, Step
 from commissioner.diagnose.search.nominal import (
     bare_layout,
     from_segment_to_segment,
@@ -96,7 +96,10 @@ def search(
     yield Said("much is left beside lost samples: sought again in the data as they came")
     as_it_came = replace(problem, names=tuple(n for n in problem.names if n not in MENDED))
     other = yield from _searched(record, as_it_came, None)
-    return other if other.fit.normal.unexplained < found.fit.normal.unexplained else found
+    if other.fit.normal.unexplained < found.fit.normal.unexplained:
+        return other
+    yield Began(found.accepted, found.record.samples)
+    return found
 
 
 def _searched(record: Record, problem: Problem, check: Callable[[Fit, Record], None] | None) -> Search:

@@ -11,12 +11,14 @@ from dataclasses import replace
 from commissioner.diagnose.search.adjust import adjusted, with_finer_curves, with_more_to_see
 from commissioner.diagnose.search.exchanges import exchange
 from commissioner.diagnose.search.forward import backward, forward
+from commissioner.diagnose.search.journal import Began
 from commissioner.diagnose.search.screening import screen
 from commissioner.diagnose.search.state import Problem, State, Steps
 
 
 def stepwise(state: State, problem: Problem, *, adds: bool = True) -> Steps:
     """From a start that has some causes to one that no step makes better; `adds` False: none is added."""
+    yield Began(state.accepted, state.record.samples)
     state = yield from with_finer_curves(state, problem)
     refused: frozenset[str] = frozenset()
     idle: frozenset[str] = frozenset()

@@ -13,6 +13,7 @@ from commissioner.diagnose.rules import RULES, Rules
 from commissioner.diagnose.search import journal
 from commissioner.diagnose.search.journal import (
     Accepted,
+    Began,
     Beside,
     Dropped,
     Exchanged,
@@ -62,6 +63,12 @@ def test_other_rules_say_what_they_would_have_chosen(seen):
     assert replayed(seen.steps, replace(RULES, most_looks=7)).differs == ()
 
 
+def test_a_search_that_begins_again_forgets_what_it_had():
+    steps = (Began((), 100), Accepted("remanence", 1.0), Began((), 300), Accepted("dead_time", 1.0))
+    assert [replayed(steps[:k]).accepted for k in (2, 3)] == [("remanence",), ()]
+    assert replayed((*steps, Began(("remanence",), 300))).accepted == ("remanence",)
+
+
 def test_every_try_says_what_it_would_have_had_to_gain_and_why(seen):
     tried = [s for s in seen.steps if isinstance(s, Tried)]
     assert tried and all(t.wanted_chi2 >= RULES.required_chi2(t.numbers) and t.wanted_by for t in tried)
@@ -99,6 +106,7 @@ def test_every_rule_says_what_it_decides_and_what_sets_it():
 def test_every_kind_of_record_is_known_by_its_name():
     assert sorted(journal.KINDS) == [
         "accepted",
+        "began",
         "dropped",
         "exchanged",
         "nominal",
