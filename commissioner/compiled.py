@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+import numba
 
-FAST: Any = {"cache": True, "fastmath": True, "error_model": "numpy", "nogil": True}
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """numba's `njit`, cached where a folder may be written; else compiled anew by every process, as in a sealed container.
+
+    numba itself ends the import there (RuntimeError: no locator available).
+    """
+
+    def compile_later(function: Callable[..., Any]) -> Callable[..., Any]:
+        compiled: Callable[..., Any]
+        try:
+            compiled = numba.njit(cache=True, **options)(function)
+        except RuntimeError:
+            compiled = numba.njit(**options)(function)
+        return compiled
+
+    return compile_later
+
+
+FAST: Any = {"fastmath": True, "error_model": "numpy", "nogil": True}
 kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
 inlined: Any = njit(inline="always", **FAST)

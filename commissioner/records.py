@@ -164,7 +164,7 @@ class ParameterSnapshot:
 
 @dataclass(frozen=True)
 class WrittenParameter:
-    """One row of the contract's `written` list."""
+    """One row of the contract's `written` list. `after`: what was written, rounded to the drive's own words."""
 
     name: str
     register: int

@@ -16,6 +16,7 @@ from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
+from commissioner.validation import wanted
 
 SIMULATOR = "simulator"
 PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
@@ -118,7 +119,7 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
             name = str(problem["loc"][0])
             described = MotorFile.model_fields[name].description if name in MotorFile.model_fields else None
             missing = problem["type"] == "missing" or values.get(name) in (None, "")
-            what = "is missing" if missing else str(problem["msg"])
+            what = "is missing" if missing else wanted(problem)
             if name in fields:
                 fields[name] = {"ok": False, "what": what, "remedy": described or "read the plate again"}
         return {"ok": False, "fields": fields, "efficiency": None, "questions": []}

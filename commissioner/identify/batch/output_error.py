@@ -17,8 +17,9 @@ F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 Exponents = NDArray[np.int64]
@@ -35,7 +36,7 @@ _ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
 
 
-@njit(cache=True)
+@njit()
 def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     """(cell, fraction inside it, rows beyond the table) of the size of a current."""
     at = abs(i) * per_a
@@ -45,7 +46,7 @@ def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     return cell, at - cell, 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _mean_loss(
     table: Array,
     integral: Array,
@@ -81,7 +82,7 @@ def _mean_loss(
     return mean, (mean - sign0 * f0) / apart, (sign1 * f1 - mean) / apart
 
 
-@njit(cache=True)
+@njit()
 def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
     """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
     relative = flux / flux_scale
@@ -96,7 +97,7 @@ def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, p
     return g, slope
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
     """Share of this part of the period in which the voltage before still acts, and its derivative by `delay` (in periods)."""
     late, d_late = delay * parts - part, float(parts)
@@ -108,7 +109,7 @@ def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
     return late, d_late
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _current_at_end(
     theta: Array,
     exponents: Exponents,
@@ -148,7 +149,7 @@ def _current_at_end(
     return i, mean, by_i0, by_i1, g, slope_g
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _push_of_loss(
     basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array
 ) -> None:
@@ -158,7 +159,7 @@ def _push_of_loss(
         push[first + c] = -_mean_loss(basis[:, c], basis_integral[:, c], per_a, i0, i, at0, at)[0]
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _add_rows(rows: Array, missed: Array, information: Array, score: Array, block_score: Array) -> None:
     """Weighted sensitivities (rows, p) and residuals (rows,) into the normal equations."""
     information += np.dot(rows.T, rows)
@@ -167,7 +168,7 @@ def _add_rows(rows: Array, missed: Array, information: Array, score: Array, bloc
     block_score += added
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _add_directly(
     x1: float, x2: float, l_l: float, l_0: float, power: Array, first_g: int, to_i: Array, to_g: Array
 ) -> None:
@@ -177,7 +178,7 @@ def _add_directly(
         to_g[first_g + m] = to_i[first_g + m] = power[m]
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate(
     u: Array,
     y: Array,

@@ -214,9 +214,12 @@ class WriteBack:
     def _report(self, target: Values, before: ParameterSnapshot, *, is_stored: bool) -> WriteReport:
         after = self._sets.in_use()
         rows = tuple(
-            WrittenParameter(name, self._profile.item(name).address, before.in_use[name], target[name], after[name])
+            WrittenParameter(
+                name, self._profile.item(name).address, before.in_use[name],
+                number(self._items.as_held(name, target[name])), after[name],
+            )
             for name in self._sets.differing(target, before.in_use)
-        )
+        )  # fmt: skip
         store = self._profile.store
         return WriteReport(
             written=rows,

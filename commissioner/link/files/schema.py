@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from commissioner.errors import ConfigurationError
+from commissioner.validation import first_problem
 
 Word = Annotated[int, Field(ge=0, le=0xFFFF)]
 Bit = Annotated[int, Field(ge=0, le=15)]
@@ -198,32 +198,6 @@ class DriveFile(Table):
 
 
 def explained(error: ValidationError, file: str) -> ConfigurationError:
-    first = error.errors()[0]
-    location = [str(part) for part in first["loc"]]
-    value = None if first["type"] == "missing" else first["input"]
-    return ConfigurationError(file=file, key=".".join(location), value=value, expected=_expected(first))
-
-
-def _expected(problem: Any) -> str:
-    if problem["type"] == "missing":
-        return "this key is needed; see config/drives/simulated.toml for a complete file"
-    if problem["type"] == "extra_forbidden":
-        return "no such key; known here: " + ", ".join(_keys_at(problem["loc"][:-1]))
-    return str(problem["msg"])
-
-
-def _keys_at(location: tuple[object, ...]) -> list[str]:
-    model: type[BaseModel] = DriveFile
-    for part in location:
-        if str(part) in model.model_fields:
-            model = _table_in(model.model_fields[str(part)].annotation) or model
-    return sorted(model.model_fields)
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """The table model inside an annotation such as `X`, `X | None` or `dict[str, X]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    if get_origin(annotation) in (UnionType, Union, dict):
-        return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
-    return None
+    problem = first_problem(error, DriveFile)
+    see = "; see config/drives/simulated.toml for a complete file" if problem.value is None else ""
+    return ConfigurationError(file=file, key=problem.key, value=problem.value, expected=problem.expected + see)

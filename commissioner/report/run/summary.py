@@ -45,14 +45,6 @@ def summarise(
     return cast("RunDocument", document)
 
 
-def finding_sentences(result: Mapping[str, Any]) -> list[str]:
-    """What the axes' comparison saw, each with its size."""
-    return [
-        f"{f['sentence']}, by {100 * abs(f['relative_size']):.2g} ± {100 * f['relative_std']:.2g} %"
-        for f in result.get("findings") or ()
-    ]
-
-
 def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
     """What the diagnosis of the run's samples means for the run's `parameters`, a sentence each."""
     names = [" or ".join((c["name"], *c["equivalent"])).replace("_", " ") for c in diagnosis["causes"]]

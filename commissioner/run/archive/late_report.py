@@ -14,6 +14,7 @@ from commissioner.report.run.summary import summarise
 from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.replay import learn_again
+from commissioner.run.archive.summary import read_file
 
 
 def mark_restored(run: RunSummary) -> None:
@@ -35,4 +36,4 @@ def make_report(run: RunSummary) -> None:
     result = plain(summarise(findings, ended, run.run, job.parameter_names, job.parameter_factors))
     journal = read_journal(path / "journal.jsonl")
     with closing(RunFolder(path)) as folder:
-        folder.save_text("report.html", run_page(result, journal, findings))
+        folder.save_text("report.html", run_page(result, journal, findings, read_file(path / "request.json")))
