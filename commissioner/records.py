@@ -19,11 +19,14 @@ POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
 POINT_RESISTANCES = (
     "winding_resistance_uv_ohm",
-    "winding_resistance_ohm",
-    "resistance_ohm",
     "winding_resistance_line_ohm",
+    "terminal_resistance_ohm",
+    "winding_resistance_ohm",
+    "phase_resistance_ohm",
+    "stator_resistance_ohm",
+    "resistance_ohm",
 )
-"""Names under which it may have the winding's resistance between two terminals, at every point."""
+"""Names under which it may have the windings' resistance, at every point; what each holds: `diagnose.points.resistance`."""
 
 
 @dataclass(frozen=True)

@@ -126,13 +126,15 @@ def check(
     profile: Profile = "simulated",
     motor: Motor = "motor_2kw2",
     procedure: Procedure = None,
+    axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     json: Json = False,
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
+    from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.check import check as verb
     from commissioner.operations.check import CheckRequest
 
-    verb(CheckRequest(drive, profile, motor, procedure), as_json=json)
+    verb(CheckRequest(drive, profile, motor, procedure, parse_axes(axes)), as_json=json)
 
 
 @app.command()

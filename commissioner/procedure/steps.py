@@ -210,7 +210,9 @@ def judge(job: Job, findings: Findings) -> Step:
     """All segments together, by the same code as `identify` uses offline; then the verdict."""
     recording = assemble(findings.blocks, {}, "live run")
     assert recording is not None
-    identification = identify(recording, job.nameplate, winding_temperature_degc=findings.winding_degc)
+    identification = identify(
+        recording, job.nameplate, winding_temperature_degc=findings.winding_degc, earlier=findings.look
+    )
     findings.identification = identification
     verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict

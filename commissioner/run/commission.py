@@ -34,7 +34,7 @@ from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import bounds, make_job, names_of, open_drive, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
-from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
 from commissioner.run.stopping.stop_file import stopped_by_file
 
 BUSY = 3.0
@@ -106,7 +106,8 @@ def commission(
         with closing(folder), asked, stopped_by_file(folder.path, asked):
             begun(folder.path)
             _tell(folder, present, WarmingUp())
-            warm_up(nameplate)
+            with suppress(Abandoned), asked.computing():
+                warm_up(nameplate)
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
             result = close_run(order, folder, findings, ended)
             if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:

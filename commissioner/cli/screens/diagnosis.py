@@ -56,6 +56,8 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     else:
         _error(document)
     _uncertain(document)
+    if document["kind"] == "points":
+        _parameters(document)
     if document["verdict"] == "nothing_significant" and (limits := _limits(document)):
         screen.print(f"[dim]would have been seen: {limits}[/]")
     for who, what in actions(document):
@@ -77,6 +79,17 @@ def _error(document: Mapping[str, Any]) -> None:
     if gain["rmse_before_a"] is not None:
         noise = f", noise {number(gain['noise_floor_a'] * 1e3)} mA" if gain["noise_floor_a"] else ""
         screen.print(f"error of the plain simulation {number(gain['rmse_before_a'] * 1e3)} mA rms{noise}")
+
+
+def _parameters(document: Mapping[str, Any]) -> None:
+    """R and L of test points, per phase of the star equivalent."""
+    rows = [
+        (name, f"{q['value']:.5g}", "not known" if q["std"] is None else f"± {2.0 * q['std']:.2g}")
+        for name, q in document["parameters_after"].items()
+    ]
+    if rows:
+        screen.print(table("per star phase", ("parameter", "value", "±"), rows))
+        screen.print(f"[dim]{PLUS_MINUS}[/]")
 
 
 def _causes(document: Mapping[str, Any]) -> None:

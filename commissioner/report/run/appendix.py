@@ -155,9 +155,11 @@ def _registers(subject: Subject) -> Iterator[tuple[Text, ...]]:
         quantity = BY_FIELD.get(name)
         if quantity is None:
             continue
-        old, after, back = (held(quantity.factor * row[key]) for key in ("before", "after", "read_back"))
+        own = "per_si" in row
+        factor, unit = (1.0, "the drive’s own") if own else (quantity.factor, quantity.unit)
+        old, after, back = (held(factor * row[key]) for key in ("before", "after", "read_back"))
         yield (
-            str(row["register"]), Markup("{} {}").format(quantity.symbol, quantity.words), old, after, back, quantity.unit,
+            str(row["register"]), Markup("{} {}").format(quantity.symbol, quantity.words), old, after, back, unit,
             marks.judged("equal" if after == back else "differs", is_good=after == back),
         )  # fmt: skip
 

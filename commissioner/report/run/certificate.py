@@ -69,6 +69,8 @@ def _said(subject: Subject) -> tuple[str, str]:
             "Accepted, not written: the drive holds its old values",
             f"Each value is surer than it must be{agree}, and no limit was reached. Nothing was written into the drive.",
         )
+    if subject.is_good and not subject.parameters:
+        return "Commissioned", f"{_sentence(str(subject.result['reason']))} {_kept(subject) if subject.written else ''}"
     if subject.is_good:
         return (
             f"Commissioned: {_counted(len(subject.written))} values accepted, written and read back",
@@ -128,7 +130,7 @@ def _why(subject: Subject) -> Markup:
 def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
     """Five numbers with what was allowed."""
     result = subject.result
-    if subject.is_good:
+    if subject.is_good and subject.parameters:
         nearest = max(FOUR, key=lambda quantity: _of_allowed(subject, quantity))
         std_percent = _std_percent(subject.parameters[nearest.field])
         allowed = subject.allowed_percent(nearest.field)
@@ -206,13 +208,13 @@ def _drive(subject: Subject) -> Markup:
     seen = {row["name"]: row["value"] for row in subject.result.get("checks") or ()}
     rows: list[tuple[Text, Text]] = [
         ("Type", str(drive["drive_type"])),
-        ("Serial no.", "not known" if drive["serial_number"] is None else str(drive["serial_number"])),
+        ("Serial no.", _known(drive["serial_number"])),
+        ("Firmware", _known(drive["firmware_version"])),
     ]
-    if drive.get("firmware_version"):
-        rows.append(("Firmware", f"{drive['firmware_version']}, register map {drive['map_version']}"))
-    if drive.get("rated_drive_current_a") and drive.get("switching_frequency_hz"):
-        khz = 1e-3 * drive["switching_frequency_hz"]
-        rows.append(("Rated", f"{drive['rated_drive_current_a']:.1f} A, switching at {khz:g} kHz"))
+    if drive["map_version"] is not None:
+        rows.append(("Register map", str(drive["map_version"])))
+    if (rated := drive["rated_drive_current_a"]) is not None and math.isfinite(rated):
+        rows.append(("Rated", f"{rated:.1f} A, switching at {1e-3 * drive['switching_frequency_hz']:g} kHz"))
     rows += [(words, f"{_shown(seen[check])} {unit}") for check, words, unit in _SEEN if seen.get(check) is not None]
     return marks.section("Drive", marks.facts(rows))
 
@@ -275,8 +277,10 @@ def _held(quantity: Quantity, row: Record | None, half: float, subject: Subject)
     if row is None:
         return "not in the drive" if subject.written else "not written"
     same = row["after"] == row["read_back"]
-    text = f"{like(quantity.factor * row['read_back'], half)} {quantity.unit}"
-    return marks.judged(text if same else f"{text}, not {held(quantity.factor * row['after'])}", is_good=same)
+    text = f"{like(quantity.factor * subject.in_si(row, 'read_back'), half)} {quantity.unit}"
+    return marks.judged(
+        text if same else f"{text}, not {held(quantity.factor * subject.in_si(row, 'after'))}", is_good=same
+    )
 
 
 def _conditions(subject: Subject) -> Iterator[tuple[Text, Text]]:
@@ -432,6 +436,11 @@ def _worded(text: str) -> Text:
             before, _, after = text.partition(name)
             return Markup("{}{}{}").format(before, quantity.symbol, after)
     return text
+
+
+def _known(value: object) -> str:
+    """What a drive file knows no register for is unknown, never 0."""
+    return "unknown" if value is None or value == "" else str(value)
 
 
 def _shown(value: object) -> str:

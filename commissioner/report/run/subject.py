@@ -16,7 +16,6 @@ from commissioner.report.run.standing import standing
 
 Record = Mapping[str, Any]
 DAY_S = 86400.0
-_HELD = ("before", "after", "read_back")
 _ALLOWED = {
     "stator_resistance_ohm": "resistance_std_percent",
     "rotor_resistance_ohm": "rotor_resistance_std_percent",
@@ -88,9 +87,12 @@ class Subject:
 
     @property
     def written(self) -> dict[str, Record]:
-        """Rows of what was written, per phase in SI as everything here, by the contract's name of the parameter."""
-        rows = [row for row in self.result.get("written") or () if row.get("field")]
-        return {row["field"]: row | {k: row[k] / row.get("per_si", 1.0) for k in _HELD} for row in rows}
+        """Rows of what was written, by the contract's name of the parameter."""
+        return {row["field"]: row for row in self.result.get("written") or () if row.get("field")}
+
+    def in_si(self, row: Record, key: str) -> float:
+        """A number of a written row in the contract's unit and convention."""
+        return float(row[key]) / float(row.get("per_si") or 1.0)
 
     @property
     def before(self) -> Record:

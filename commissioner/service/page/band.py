@@ -270,8 +270,7 @@ def _drive_facts(live: LiveRun | None, drive: Drive | None, seen: Seen, t: Texts
     if live is not None:
         found = live.feed.state.drive
         name = drive_words(found["drive_type"], found["serial_number"]) if found else (drive.name if drive else live.id)
-        age_s = _age(live.feed.state.utc)
-        return name, t.say("data %(age)s old", age=t.number(age_s, 1, "s"))
+        return name, t.say("data %(age)s old", age=t.number(live.feed.age_s, 1, "s"))
     if drive is None:
         return t.gettext("none"), ""
     if not drive.url:
@@ -283,12 +282,6 @@ def _drive_facts(live: LiveRun | None, drive: Drive | None, seen: Seen, t: Texts
         return name, t.say("no answer for %(age)s", age=t.number(seen.age_s, 1, "s"))
     latency = t.number(1e3 * seen.latency_s, 1, "ms")
     return name, t.say("data %(age)s old, link %(latency)s", age=t.number(seen.age_s, 1, "s"), latency=latency)
-
-
-def _age(utc: str) -> float:
-    if not utc:
-        return 0.0
-    return max(0.0, (dt.datetime.now(dt.UTC) - dt.datetime.fromisoformat(utc)).total_seconds())
 
 
 def _control(parts: Parts, who: Visitor, drive: Drive | None, live: LiveRun | None, t: Texts) -> tuple[str, str]:

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from commissioner.service.page.texts import NBSP, Texts
+from markupsafe import Markup
+
+from commissioner.service.page.texts import NBSP, Texts, sentence
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -18,7 +20,7 @@ SCRIPT_TEXTS = (
     "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
     "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
-    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing", "efficiency %s; motors of this size have %s",
+    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
     "Reading the drive …", "The file is being sent …", "no value",
 )  # fmt: skip
 """What scripts say; the page hands it to them in its own language."""
@@ -54,6 +56,13 @@ UNITS: Mapping[str, tuple[str, int]] = {
 }  # fmt: skip
 
 
+def _named(text: str) -> str:
+    """A sentence with the parameters' names in place of their keys."""
+    for quantity in QUANTITIES:
+        text = text.replace(quantity.key, quantity.name)
+    return text
+
+
 class Words:
     """The same in one language."""
 
@@ -66,8 +75,7 @@ class Words:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
         plain = re.sub(r", deg[A-Z]$", "", name)
         plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        said = self._t.gettext(plain)
-        return said[:1].upper() + said[1:]
+        return sentence(self._t.tell(plain))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -89,14 +97,11 @@ class Words:
             text = f"{text} {unit}"
         return self._localised(text)
 
-    def sentence(self, text: str) -> str:
-        """A sentence of the core, with its first letter as a sentence has it."""
-        said = self._t.gettext(text)
-        return said[:1].upper() + said[1:]
-
-    def is_checked(self, check: Mapping[str, Any]) -> bool:
-        """A check without a value was not made: it locks like one that failed."""
-        return check["value"] is not None
+    def sentence(self, text: object) -> str:
+        """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
+        plain = _named(str(text))
+        said = sentence(self._t.tell(plain))
+        return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:
         from commissioner.diagnose.causes import CATALOGUE
@@ -128,7 +133,7 @@ class Words:
 
     def _localised(self, text: str) -> str:
         """`at most 120 degC` with marks, units and no-break spaces of the language."""
-        if (said := self._t.gettext(text)) != text:
+        if (said := self._t.tell(text)) != text:
             return said
         text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
         text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)
