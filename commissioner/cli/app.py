@@ -77,6 +77,23 @@ Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` fo
 RUNS = Path("runs")
 
 
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"commissioner {version('commissioner')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_verb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Which version this is.")
+    ] = False,
+) -> None:
+    """Commission an induction motor at standstill: identify it through its drive, judge the result, write it back."""
+
+
 @app.command()
 def demo(
     json: Json = False,
@@ -111,13 +128,15 @@ def check(
     profile: Profile = "simulated",
     motor: Motor = "motor_2kw2",
     procedure: Procedure = None,
+    axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     json: Json = False,
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
+    from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.check import check as verb
     from commissioner.operations.check import CheckRequest
 
-    verb(CheckRequest(drive, profile, motor, procedure), as_json=json)
+    verb(CheckRequest(drive, profile, motor, procedure, parse_axes(axes)), as_json=json)
 
 
 @app.command()
@@ -155,6 +174,39 @@ def run(
         tag, motor_serial,
     )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
+
+
+@app.command()
+def tune(
+    drive: Drive,
+    profile: Profile,
+    motor: Motor,
+    repeat: Annotated[int, typer.Option(help="How often the drive tunes itself.")] = 3,
+    pause: Annotated[
+        float | None, typer.Option(help="Seconds between two tunings; the drive file's if not given.")
+    ] = None,
+    write_back: Annotated[
+        bool, typer.Option("--write-back", help="Leave the tuning nearest to the medians in the drive, stored.")
+    ] = False,
+    hardwired_stop: Annotated[
+        bool, typer.Option("--hardwired-stop", help="A tested stop circuit or disconnect is in the operator's reach.")
+    ] = False,
+    power_cycle: Annotated[
+        bool, typer.Option("--power-cycle", help="Ask for the drive to be switched off and on, then read it again.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    procedure: Procedure = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """An ordinary drive's own standstill autotune, repeated, watched and judged; then its best set, or what was there before."""
+    from commissioner.cli.verbs.tune import tune as verb
+    from commissioner.operations.tune import TuneRequest
+
+    request = TuneRequest(
+        drive, profile, motor, runs, repeat, pause, write_back, hardwired_stop, power_cycle, procedure
+    )
+    verb(request, yes=yes, as_json=json)
 
 
 @app.command()
@@ -294,7 +346,7 @@ def runs_find(
 ) -> None:
     """The runs that hold all of these words."""
     from commissioner.cli.verbs.archived.runs import SHOWN, list_runs
-    from commissioner.operations.runs import Wanted
+    from commissioner.operations.history.runs import Wanted
 
     most = limit if limit is not None else 0 if json else SHOWN
     wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
@@ -339,15 +391,16 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 @runs_app.command("export")
 def runs_export(
     run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
+    form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
     salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
-    """The samples of a run as one recording; works for runs that were cut off, too."""
+    """The samples of a run as one recording, or its parameters in the form of another program (--form)."""
     from commissioner.cli.verbs.archived.runs import export_run
 
-    export_run(runs, run, out, as_json=json, salvage=salvage)
+    export_run(runs, run, out, form, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
@@ -392,7 +445,7 @@ def runs_motors(
 ) -> None:
     """The motors of the archive; which of them a run was made on, by its parameters; or saying so."""
     from commissioner.cli.verbs.archived.motors import motors
-    from commissioner.operations.runs import Archive
+    from commissioner.operations.history.runs import Archive
 
     motors(Archive(runs, archive), run, tag=tag, serial=motor_serial, confirm=confirm, as_json=json)
 
@@ -410,7 +463,7 @@ def runs_trend(
 ) -> None:
     """A motor over the years at one flux and temperature: intervals, drift, steps, alarms at a stated false-alarm rate."""
     from commissioner.cli.verbs.archived.motors import show_trend
-    from commissioner.operations.runs import Archive
+    from commissioner.operations.history.runs import Archive
 
     show_trend(Archive(runs, archive), motor, baseline, out, as_json=json)
 

@@ -140,6 +140,7 @@ def outcome_mark(standing: str) -> str:
 
 def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     """A run's result as the technician reads it; `standing_now` where something has happened since."""
+
     out.print()
     out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")

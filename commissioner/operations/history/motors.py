@@ -11,7 +11,7 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.identify.estimate.axes import Comparison, Identity, compare
 from commissioner.identify.estimate.common_ground import brought_together
 from commissioner.operations.history.results import has_result, result_of
-from commissioner.operations.runs import Archive, Wanted, find_runs
+from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.run.archive.catalogue import RunSummary, find_run, read_run
 from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.origin import this_process

@@ -11,7 +11,7 @@ from commissioner.history.motor import Measured, Trends, indicator_trends, motor
 from commissioner.monitor.trend.trend import is_same_point
 from commissioner.operations.history.motors import runs_of
 from commissioner.operations.history.results import has_result, result_of
-from commissioner.operations.runs import Archive
+from commissioner.operations.history.runs import Archive
 from commissioner.recordings.baseline import read
 from commissioner.run.archive.catalogue import read_run
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 import os
 import platform
@@ -19,7 +20,8 @@ _MACHINE_IDS = ("/etc/machine-id", "/var/lib/dbus/machine-id")
 
 @dataclass(frozen=True)
 class Origin:
-    """`person` is who asked, `user` whose process it is; they differ where a service acts for somebody."""
+    """`person` is who asked, `user` whose process it is; they differ where a service acts for somebody. `local_time` is
+    that of the machine, with its offset to UTC."""
 
     version: str
     host: str
@@ -30,6 +32,7 @@ class Origin:
     command: str
     python: str
     system: str
+    local_time: str
 
 
 def this_process() -> Origin:
@@ -45,6 +48,7 @@ def this_process() -> Origin:
         command=shown_call([Path(sys.argv[0]).name, *sys.argv[1:]]),
         python=platform.python_version(),
         system=platform.platform(),
+        local_time=dt.datetime.now().astimezone().isoformat(" ", "seconds"),
     )
 
 

@@ -207,4 +207,4 @@ def _wear(report: Any) -> str:
 
 
 def _touches_parameters(intent: Any) -> bool:
-    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store")
+    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store", "tune")

@@ -49,6 +49,7 @@ def environment(language: str) -> Environment:
     texts = Texts(language)
     made.install_gettext_callables(texts.gettext, texts.ngettext, newstyle=True)  # type: ignore[attr-defined]
     made.globals |= {"t": texts, "w": Words(texts), "n": texts.number, "signed": texts.signed, "short": texts.short}
+    made.globals |= {"tell": texts.tell}
     return made
 
 

@@ -1,6 +1,6 @@
-"""Kills while the index is written: the short version of `python -m tests.campaigns.index_kills`."""
+"""Kills while the index is written: the short version of `python -m tests.campaigns.archive.index_kills`."""
 
-from tests.campaigns.index_kills import campaign
+from tests.campaigns.archive.index_kills import campaign
 
 
 def test_eight_kills_lose_no_run_and_leave_a_true_list():

@@ -13,10 +13,10 @@ from commissioner.history.series import FALSE_ALARM
 from commissioner.identify.estimate.axes import Identity
 from commissioner.operations.history.compare import compare_runs
 from commissioner.operations.history.motors import judge_motor, list_motors, name_motor, runs_of
+from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.operations.history.trend import trend, trend_of_indicators
-from commissioner.operations.runs import Archive, Wanted, find_runs
 from commissioner.run.archive.verify import verify
-from tests.support.synthetic_archive import MACHINE, make_run, result_of
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
 from tests.unit.cli.test_failures import leave
 
 COPPER = 234.5

@@ -18,7 +18,7 @@ from commissioner.run.archive.catalogue import read_runs
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
 from commissioner.run.index.index import Wanted, find, refresh
-from tests.support.synthetic_archive import make_archive
+from tests.support.archive.synthetic import make_archive
 
 
 def block(first):

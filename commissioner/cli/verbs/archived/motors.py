@@ -7,8 +7,8 @@ from pathlib import Path
 from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
 from commissioner.operations.history.motors import Likeness, judge_motor, list_motors, name_motor
+from commissioner.operations.history.runs import Archive
 from commissioner.operations.history.trend import MotorTrend, trend, trend_of_indicators
-from commissioner.operations.runs import Archive
 
 
 def motors(archive: Archive, run: str | None, *, tag: str, serial: str, confirm: bool, as_json: bool) -> None:

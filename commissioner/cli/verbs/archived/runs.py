@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.operations.runs import Archive, Wanted, find_runs, index_runs
-from commissioner.operations.runs import show_run as look_up
+from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs
+from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.catalogue import RunSummary
 
 SHOWN = 50
@@ -83,8 +83,17 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
         screen.out.print(done.report, soft_wrap=True)
 
 
-def export_run(folder: Path, name: str, out: Path, *, as_json: bool, salvage: bool = False) -> None:
-    """The run's whole samples as a recording in the contract's format."""
+def export_run(folder: Path, name: str, out: Path, form: str, *, as_json: bool, salvage: bool = False) -> None:
+    """The run's whole samples as a recording in the contract's format, or its parameters in another form."""
+    if form != "samples":
+        from commissioner.operations.export import export_model
+
+        model = export_model(folder, name, out, form)
+        if as_json:
+            screen.emit(model)
+        else:
+            screen.out.print(f"{model.form}: {screen.text(model.model)}", soft_wrap=True)
+        return
     from commissioner.operations import archive
 
     done = archive.export_run(folder, name, out, salvage=salvage)
