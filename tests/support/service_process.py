@@ -88,14 +88,14 @@ class ServiceProcess:
         assert answer.status_code == 201, answer.text
         return str(answer.json()["id"])
 
-    def wait_for(self, run: str, reached: Any, timeout_s: float = 60.0) -> dict[str, Any]:
+    def wait_for(self, run: str, reached: Any, timeout_s: float = 120.0) -> dict[str, Any]:
         """The run's document as soon as `reached` says so of it."""
         end = time.monotonic() + timeout_s
         while time.monotonic() < end:
             document = self.client.get(f"/api/runs/{run}").json()
             if reached(document):
                 return document
-            time.sleep(0.02)
+            time.sleep(0.03)
         raise AssertionError(f"not reached within {timeout_s} s: {document}")
 
     def wait_energised(self, run: str) -> None:

@@ -34,7 +34,6 @@ def install(app: FastAPI) -> None:
     async def fail(request: Request, error: CommissionerError) -> Response:
         return answer(request, refusal_of(error))
 
-
     @app.exception_handler(OSError)
     async def lost(request: Request, failure: OSError) -> Response:
         return answer(request, disk_refuses(failure))
