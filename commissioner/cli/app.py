@@ -55,8 +55,41 @@ Seal = Annotated[
 Salvage = Annotated[
     bool, typer.Option("--salvage", help="Go on with what is whole of a damaged run; the loss is still named.")
 ]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--archive",
+        envvar="COMMISSIONER_ARCHIVE",
+        help="Index that several computers share: postgresql+psycopg://USER@HOST/DATABASE; the password from ~/.pgpass.",
+    ),
+]
+WhichMotor = Annotated[str, typer.Option("--motor", help="Part of the motor's tag, serial number or plate.")]
+WhichDrive = Annotated[str, typer.Option("--drive", help="Part of the drive's type and number.")]
+WhichSerial = Annotated[str, typer.Option("--serial", help="Serial number of the drive or the motor.")]
+WhichPerson = Annotated[str, typer.Option("--person", help="Part of the name of who asked for the run.")]
+WhichOutcome = Annotated[str, typer.Option("--outcome", help="commissioned, rejected, aborted, faulted, cut off ...")]
+Since = Annotated[str, typer.Option("--since", help="UTC date, as 2026-11-25 or the start of one.")]
+Until = Annotated[str, typer.Option("--until", help="UTC date, included.")]
+Limit = Annotated[int | None, typer.Option("--limit", min=0, help="So many of the newest; 0: all.")]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"commissioner {version('commissioner')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_verb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Which version this is.")
+    ] = False,
+) -> None:
+    """Commission an induction motor at standstill: identify it through its drive, judge the result, write it back."""
 
 
 @app.command()
@@ -134,6 +167,39 @@ def run(
         drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal
     )
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
+
+
+@app.command()
+def tune(
+    drive: Drive,
+    profile: Profile,
+    motor: Motor,
+    repeat: Annotated[int, typer.Option(help="How often the drive tunes itself.")] = 3,
+    pause: Annotated[
+        float | None, typer.Option(help="Seconds between two tunings; the drive file's if not given.")
+    ] = None,
+    write_back: Annotated[
+        bool, typer.Option("--write-back", help="Leave the tuning nearest to the medians in the drive, stored.")
+    ] = False,
+    hardwired_stop: Annotated[
+        bool, typer.Option("--hardwired-stop", help="A tested stop circuit or disconnect is in the operator's reach.")
+    ] = False,
+    power_cycle: Annotated[
+        bool, typer.Option("--power-cycle", help="Ask for the drive to be switched off and on, then read it again.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    procedure: Procedure = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """An ordinary drive's own standstill autotune, repeated, watched and judged; then its best set, or what was there before."""
+    from commissioner.cli.verbs.tune import tune as verb
+    from commissioner.operations.tune import TuneRequest
+
+    request = TuneRequest(
+        drive, profile, motor, runs, repeat, pause, write_back, hardwired_stop, power_cycle, procedure
+    )
+    verb(request, yes=yes, as_json=json)
 
 
 @app.command()
@@ -237,11 +303,62 @@ def simulate(
 
 
 @runs_app.command("list")
-def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
+def runs_list(
+    motor: WhichMotor = "",
+    drive: WhichDrive = "",
+    serial: WhichSerial = "",
+    person: WhichPerson = "",
+    outcome: WhichOutcome = "",
+    since: Since = "",
+    until: Until = "",
+    limit: Limit = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.archived.runs import list_runs
+    runs_find([], motor, drive, serial, person, outcome, since, until, limit, archive, runs, json)
 
-    list_runs(runs, as_json=json)
+
+@runs_app.command("find")
+def runs_find(
+    text: Annotated[
+        list[str], typer.Argument(help="Words, each anywhere in run, motor, drive, person, outcome or reason.")
+    ],
+    motor: WhichMotor = "",
+    drive: WhichDrive = "",
+    serial: WhichSerial = "",
+    person: WhichPerson = "",
+    outcome: WhichOutcome = "",
+    since: Since = "",
+    until: Until = "",
+    limit: Limit = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The runs that hold all of these words."""
+    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs
+    from commissioner.operations.runs import Wanted
+
+    most = limit if limit is not None else 0 if json else SHOWN
+    wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
+    list_runs(runs, as_json=json, wanted=wanted, database=archive)
+
+
+@runs_app.command("index")
+def runs_index(
+    rebuild: Annotated[
+        bool, typer.Option("--rebuild", help="From the folders alone, whatever the index held.")
+    ] = False,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The archive's index in step with the folders, which are the truth: it can be deleted at any time."""
+    from commissioner.cli.verbs.archived.runs import index
+
+    index(runs, rebuild=rebuild, database=archive, as_json=json)
 
 
 @runs_app.command("show")
@@ -267,21 +384,22 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 @runs_app.command("export")
 def runs_export(
     run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
+    form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
     salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
-    """The samples of a run as one recording; works for runs that were cut off, too."""
+    """The samples of a run as one recording, or its parameters in the form of another program (--form)."""
     from commissioner.cli.verbs.archived.runs import export_run
 
-    export_run(runs, run, out, as_json=json, salvage=salvage)
+    export_run(runs, run, out, form, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
 def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
     """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.archived.runs import compare_runs
+    from commissioner.cli.verbs.archived.comparing import compare_runs
 
     compare_runs(runs, before, after, as_json=json)
 

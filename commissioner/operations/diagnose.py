@@ -18,7 +18,7 @@ from commissioner.diagnose.points.table import Points, is_points_table, read_poi
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
-from commissioner.operations.intake import require_one_motor, standstill, without_copies
+from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
@@ -85,7 +85,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     if request.out is not None:
         folder_to_write(request.out)
     if all(is_points_table(list(t.columns)) for t in tables):
-        return _points(tables, request.out)
+        return _points(tables, request.motor, request.out)
     return _recordings(tables, request, observe, go_on)
 
 
@@ -115,9 +115,10 @@ def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, t
     _write(out, document, seen.model, page, "report.html")
 
 
-def _points(tables: Sequence[Table], out: Path | None) -> Diagnosed:
+def _points(tables: Sequence[Table], motor: str | None, out: Path | None) -> Diagnosed:
     """The stator resistance of a locked-rotor table serves the others."""
-    read = [read_points(t.columns, Path(t.source).stem) for t in tables]
+    plate = plate_metadata(motor)
+    read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
     resistance_ohm = float(known[0]) if known else None
     documents = [

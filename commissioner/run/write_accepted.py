@@ -56,7 +56,7 @@ class Plan:
     run: str
     what: str
     drive_type: str
-    serial_number: int
+    serial_number: int | None
     rows: tuple[PlannedRow, ...]
 
     @property
@@ -199,15 +199,12 @@ def _drive(ready: _Ready) -> Iterator[Inverter]:
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
     identity = inverter.identify()
-    if (identity.drive_type, identity.serial_number) != (
-        ready.snapshot.identity.drive_type,
-        ready.snapshot.identity.serial_number,
-    ):
+    if identity.words != ready.snapshot.identity.words:
         raise IdentityMismatch(
             "this is not the drive of the run",
             step=what,
-            value=f"{identity.drive_type} #{identity.serial_number}",
-            limit=f"{ready.snapshot.identity.drive_type} #{ready.snapshot.identity.serial_number}",
+            value=identity.words,
+            limit=ready.snapshot.identity.words,
             remedy="connect the drive that was measured, or measure this one",
         )
     present = inverter.snapshot().in_use

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from commissioner.errors import Aborted, CommissionerError, DataRefused, DriveError, UsageError
+from commissioner.validation import wanted
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -95,16 +96,16 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
     async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
-        unreadable = first["type"] == "json_invalid"
+        unreadable, expected = first["type"] == "json_invalid", wanted(first)
         return answer(
             request,
             Refusal(
                 400 if unreadable else 422,
                 f"{where or 'the body'} cannot be used",
-                detail=str(first["msg"]),
+                detail=expected,
                 step="read the request",
                 value=_shown(first.get("input")),
-                limit=str(first["msg"]),
+                limit=expected,
                 remedy=f"correct {where or 'the body'}; /openapi.json describes it",
             ),
         )

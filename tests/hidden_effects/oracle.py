@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.export import playback as player
 from commissioner.diagnose.fit.gauss_newton import fit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.operations.events import SearchSaid
 from commissioner.report.diagnosis.names import said, spoken
 

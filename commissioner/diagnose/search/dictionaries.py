@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
-from commissioner.diagnose.catalogue.regressors import with_fine_speed_splines
+from commissioner.diagnose.causes import CATALOGUE, Setting
+from commissioner.diagnose.causes.regressors import with_fine_speed_splines
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.fit.normal_equations import NormalEquations, whiten
 from commissioner.diagnose.intake.noise import Noise
@@ -19,9 +19,9 @@ from commissioner.diagnose.intake.record import TO_PHASES, Record, each_segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
 from commissioner.diagnose.search.refinement import CLOSER, with_closer_loops, without_curves, without_springs
-from commissioner.diagnose.search.screening import required_chi2
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -31,8 +31,6 @@ CURVES = {
     kinds.LEGS: ("legs_vectors", odd_vectors),
 }
 RANGES = {kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")}
-CLOSER_SHARE = 0.5
-"""Loops of closer radii must make so much of what is left."""
 ACTING_SHARE = 1e-3
 """Of the strongest second path: a weaker one is idle."""
 SHORTEST_BRANCH_S, LONGEST_BRANCH_S = 5e-5, 0.03
@@ -41,10 +39,6 @@ GRID = 200
 """Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
 """A curve of more knots than this is not refined again."""
-FINER_SHARE = 2e-3
-"""Of what is not explained, so much must go with finer knots: beside a cause that lacks, no curve need be right to the last digit."""
-FASTER_SHARE = 0.2
-"""Of what is not explained, so much must go with a faster speed: else another cause makes it."""
 SAME_SLACK = 0.2
 """The slack of a leg's tail is taken anew where it has moved by more than this part of itself."""
 SAME_RATIO = 0.05
@@ -153,10 +147,12 @@ def with_faster_speed(
     """
     record = with_fine_speed_splines(full, setting.lines_hz)
     there = replace(setting, record=record.first(setting.record.commanded))
-    speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
+    turning = dict.fromkeys(t.effect for t in current.model.terms if t.kind == kinds.OMEGA)
+    speed = [t for name in turning for t in CATALOGUE[name].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
     wanted = current.chi2 - max(
-        required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained
+        RULES.required_chi2(len(model.terms) - len(current.model.terms)),
+        RULES.faster_speed_share * current.normal.unexplained,
     )
     if left_across(current.model, setting, noise) < current.chi2 - wanted:
         return current, full, setting
@@ -211,7 +207,9 @@ def with_closer_radii(
     dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
-    wanted = current.chi2 - max(_least_gain(current, len(model.terms)), CLOSER_SHARE * current.normal.unexplained)
+    wanted = current.chi2 - max(
+        _least_gain(current, len(model.terms)), RULES.closer_loops_share * current.normal.unexplained
+    )
     trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
     report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
     return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
@@ -219,7 +217,10 @@ def with_closer_radii(
 
 def _least_gain(current: Fit, numbers: int) -> float:
     """What a model of so many numbers must gain over the present one."""
-    return max(required_chi2(max(numbers - len(current.model.terms), 1)), FINER_SHARE * current.normal.unexplained)
+    return max(
+        RULES.required_chi2(max(numbers - len(current.model.terms), 1)),
+        RULES.finer_curve_share * current.normal.unexplained,
+    )
 
 
 def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Setting) -> Model:

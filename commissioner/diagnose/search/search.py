@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
+from commissioner.diagnose.causes import CATALOGUE, MENDED, Setting
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.fit.lost_samples import Loss, mend
 from commissioner.diagnose.fit.normal_equations import NormalEquations
@@ -30,8 +30,8 @@ from commissioner.diagnose.search.stepwise import Report, RuledOut, Steps, surel
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
-MENDED = 3
-"""Rounds of putting lost samples right and fitting again."""
+MENDING_ROUNDS = 3
+"""Of putting lost samples right and fitting again."""
 MENDED_AT_ONCE = 0.5
 """A round that leaves more of the misfit than this is the last: what remains is not made by lost samples."""
 MENDED_SHARE, MENDED_LEAST_SHARE = 0.7, 0.3
@@ -86,7 +86,7 @@ def search(
     if not found.losses or not _leaves(UNKNOWN_SIGMA, found.fit, found.nominal, noise):
         return found
     report("much is left beside lost samples: sought again in the data as they came")
-    other = _searched(record, noise, (*excluded, "lost_samples"), report, None, go_on)
+    other = _searched(record, noise, (*excluded, *MENDED), report, None, go_on)
     return other if other.fit.normal.unexplained < found.fit.normal.unexplained else found
 
 
@@ -103,7 +103,7 @@ def _searched(
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     raw = record.segments
     losses: tuple[Loss, ...] = ()
-    if "lost_samples" not in excluded:
+    if not set(excluded) >= MENDED:
         record, nominal, losses = _mended(record, nominal, bare, noise, report)
     if check is not None:
         check(nominal, record)
@@ -114,7 +114,7 @@ def _searched(
     leakage_side = reached.steps.leakage_side
     if reached.accepted and losses:
         reached, losses = _losses_doubted(reached, raw, losses)
-    if reached.accepted and "lost_samples" not in excluded:
+    if reached.accepted and not set(excluded) >= MENDED:
         reached, losses = _losses_completed(reached, losses)
     return _refined(reached, nominal, first, losses, has_leakage_side=_has_leakage_side(leakage_side, reached.accepted))
 
@@ -252,7 +252,7 @@ def _mended(
     """
     losses: tuple[Loss, ...] = ()
     mended, better = record, current
-    for _ in range(MENDED):
+    for _ in range(MENDING_ROUNDS):
         # from the data as they came: the better model places what the worse one misplaced
         again, seen = mend(record, better.model, layout, noise, is_first=not losses)
         if not seen:

@@ -11,73 +11,40 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
-from commissioner.diagnose.catalogue.magnetics import CARRIED
-from commissioner.diagnose.catalogue.mains_lines import LINES, with_clearer_lines
-from commissioner.diagnose.catalogue.regressors import FINE_SPEED_SPLINE
+from commissioner.diagnose.causes import CATALOGUE, FROM_THE_SAMPLE, LINEAR, LINES, Setting
+from commissioner.diagnose.causes.cause import Standing
+from commissioner.diagnose.causes.mains_lines import with_clearer_lines
+from commissioner.diagnose.causes.regressors import FINE_SPEED_SPLINE
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels import kinds
+from commissioner.diagnose.plant.impedance import impedance_starts
 from commissioner.diagnose.plant.model import Layout
-from commissioner.diagnose.search.acceptance import (
-    LINEAR,
-    MATERIAL_SHARE,
-    effects_of,
-    guard,
-    is_plausible,
-    is_ruled_out,
-    losses_of,
-    meets_tones,
-)
+from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.acceptance import effects_of, guard, is_plausible, losses_of, meets_tones
 from commissioner.diagnose.search.dictionaries import following, with_closer_radii, with_faster_speed, with_finer_curves
 from commissioner.diagnose.search.exchanges import (
-    LATE,
     Exchanged,
-    as_a_delay,
-    as_a_lag,
-    as_read_late,
-    as_rippled,
+    begun_outright,
     in_other_forms,
-    large_delay,
+    proposed,
+    proposers,
     regrouped,
 )
-from commissioner.diagnose.search.nominal import impedance_starts, is_outside_the_box, with_flux_before
+from commissioner.diagnose.search.nominal import is_outside_the_box, with_flux_before
 from commissioner.diagnose.search.refinement import leakage_side
-from commissioner.diagnose.search.screening import Score, Screening, price, required_chi2, screen
+from commissioner.diagnose.search.screening import Score, Screening, screen
 
-MOST_CAUSES = 6
-REFITTED = 4
-IMPLAUSIBLE = 2
-"""A candidate whose refit came out implausible so often is not refitted again."""
-RIVAL = 2.5
-"""A candidate is refitted only if this multiple of its promise reaches the best gain so far."""
-HOPELESS = 0.4
-"""A candidate that promises less than this share of what its guard wants is not refitted."""
 CARRIED_ROUNDS = 3
 """Times that what the iron remembers is told anew by a better model."""
-MOST_LOOKS = 3
-"""Times that lines are looked for again: once they are, what was beside them is known better."""
-STEPS_GUARD = 0.5
-"""As GUARD, of the power of coarse converter steps that repeat with the signal: where currents creep or rest, most of it lies in
-slow changes from segment to segment, as a shaft's motion or a drift does."""
-LARGE_UNEXPLAINED, LEAST_SHARE_OF_REST, NOISE_DOUBT = 0.1, 0.15, 2.0
-"""Unexplained chi2 above this multiple of the noise, beyond so many standard errors of its power, of which the best candidate takes less than
-
-this share is left as it is; so is what a cause that was ruled out would take."""
-
-WRONG_VALLEY = 1.0
-"""Unexplained chi2 above this multiple of the noise, once the first cause is in the model: what it made of the currents may have led the four
-parameters out of the box of a motor of this kind."""
-ENTIRELY = 0.98
-"""Of a large unexplained chi2: a cause that takes so much of it is no part of another's form."""
 
 Report = Callable[[str], None]
 
 
 def surely_left(fitted: Fit, noise: Noise) -> float:
     """Power that is not explained, over the noise's, of which a noise measured too low makes none."""
-    return fitted.chi2 / float(fitted.normal.count.sum()) - 1.0 - NOISE_DOUBT * noise.uncertainty
+    return fitted.chi2 / float(fitted.normal.count.sum()) - 1.0 - RULES.noise_doubt * noise.uncertainty
 
 
 @dataclass(frozen=True)
@@ -108,7 +75,7 @@ class Steps:
         self.ruled_out = RuledOut()
         self.regrouped: set[frozenset[str]] = set()
         self.reformed: set[frozenset[str]] = set()
-        self.lagging: set[frozenset[str]] = set()
+        self.proposed: set[tuple[str, frozenset[str]]] = set()
         self.looks = 0
         self.leakage_side: frozenset[str] = frozenset()
         self.tried: tuple[Fit | None, dict[str, tuple[Fit, float]]] = (None, {})
@@ -141,9 +108,9 @@ class Steps:
 
     @property
     def material_chi2(self) -> float:
-        """Delta chi2 of a contribution of MATERIAL_SHARE of the current's rms, or of what coarse steps may imitate."""
-        material = (MATERIAL_SHARE * self.rms_a) ** 2 * float(np.mean(self.noise.sigma_a**-2.0))
-        return self.count * max(material, STEPS_GUARD * self.noise.rounding_share)
+        """Delta chi2 of a contribution of RULES.material_share of the current's rms, or of what coarse steps may imitate."""
+        material = (RULES.material_share * self.rms_a) ** 2 * float(np.mean(self.noise.sigma_a**-2.0))
+        return self.count * max(material, RULES.steps_share * self.noise.rounding_share)
 
     def _guard(self, losses: Mapping[str, float], name: str, unexplained_chi2: float) -> float:
         """What a cause must gain beside others that have these losses, where without it `unexplained_chi2` is left: no more than
@@ -151,17 +118,17 @@ class Steps:
         nearly all of that where it is large, for what the form of another cause leaves behind no simple cause takes entirely.
         """
         left = guard(losses, name, ripple_meets_tones=self.ripple_meets_tones)
-        return min(left, ENTIRELY * unexplained_chi2) if self._is_large(unexplained_chi2) else left
+        return min(left, RULES.entirely_share * unexplained_chi2) if self._is_large(unexplained_chi2) else left
 
     def _unexplained_chi2(self, fitted: Fit) -> float:
         """Chi2 that is surely not explained."""
         return max(surely_left(fitted, self.noise), 0.0) * self.count
 
     def _is_large(self, unexplained_chi2: float) -> bool:
-        return unexplained_chi2 > LARGE_UNEXPLAINED**2 * self.count
+        return unexplained_chi2 > RULES.large_rest_sigma**2 * self.count
 
     def threshold(self, numbers: int) -> float:
-        return max(required_chi2(numbers), self.material_chi2)
+        return max(RULES.required_chi2(numbers), self.material_chi2)
 
     def run(
         self, start: Fit, accepted: tuple[str, ...], *, adds: bool = True
@@ -174,7 +141,7 @@ class Steps:
             absent = [n for n in self.names if n not in accepted]
             screening = screen(current.model, self.record, self.layout, self.noise, self.setting, absent)
             self.first = self.first or screening
-            is_over = not adds or len(accepted) >= MOST_CAUSES or not self.go_on()
+            is_over = not adds or len(accepted) >= RULES.most_causes or not self.go_on()
             step = None if is_over else self._forward(current, screening, refused)
             if step is None:
                 current, accepted, dropped = self._backward(current, accepted, accepted)
@@ -196,7 +163,7 @@ class Steps:
             accepted = (*accepted, name)
             self.report(f"accepted {name}: {np.sqrt(current.chi2 / current.normal.count.sum()):.4g} times the noise")
             if (
-                len(accepted) == 1 and self._unexplained_chi2(current) > WRONG_VALLEY**2 * self.count
+                len(accepted) == 1 and self._unexplained_chi2(current) > RULES.wrong_valley_sigma**2 * self.count
             ) or is_outside_the_box(current.model, self.layout):
                 current = self._from_other_starts(current)
             if any(t.effect == name and t.kind == kinds.NU for t in current.model.terms):
@@ -204,7 +171,7 @@ class Steps:
                     leakage_side(current, self.record, self.layout, self.noise),
                     frozenset(accepted),
                 )
-            rippled = as_rippled(current, name, accepted, self.setting, self.noise, self.names, self.report)
+            rippled = self._proposed_beside(current, name, accepted)
             if rippled is not None:
                 current, accepted, self.setting = rippled
             current = self._with_unequal_legs(current, accepted[:-1])
@@ -231,9 +198,9 @@ class Steps:
 
     def _with_clearer_lines(self, current: Fit, accepted: Sequence[str]) -> Fit | None:
         """The fit where ripple or mains lie at other frequencies than were looked at so far, once the causes are in the model."""
-        kept = [kind for kind, name in LINES.items() if name in accepted]
+        kept = {kind: name for kind, name in LINES.items() if name in accepted}
         full, lines = with_clearer_lines(self.full, current.model, self.layout, self.noise, self.setting.lines_hz, kept)
-        if lines == self.setting.lines_hz or self.looks == MOST_LOOKS:
+        if lines == self.setting.lines_hz or self.looks == RULES.most_looks:
             return None
         self.looks += 1
         self.report(f"  looking at {', '.join(f'{name} ({hz:.2f} Hz)' for name, hz in lines.items())}")
@@ -248,7 +215,7 @@ class Steps:
         """The fit in which a shaft swings faster, where it does; tried once something is left beside all other causes."""
         is_left = self._unexplained_chi2(current) > self.threshold(1)
         if (
-            "shaft_motion" not in accepted
+            not current.model.has_kind(kinds.OMEGA)
             or not is_left
             or any(n.startswith(FINE_SPEED_SPLINE) for n in self.record.channel_names)
         ):
@@ -259,20 +226,26 @@ class Steps:
     def _forward(self, current: Fit, screening: Screening, refused: set[str]) -> tuple[str, Fit] | None:
         """The candidate whose refit gains most, if it passes the rule."""
         ranked = [
-            s for s in screening.ranked() if s.name not in refused and self.implausible.count(s.name) < IMPLAUSIBLE
+            s
+            for s in screening.ranked()
+            if s.name not in refused and self.implausible.count(s.name) < RULES.most_implausible
         ]
         losses = losses_of(current, effects_of(current.model))
         unexplained_chi2 = self._unexplained_chi2(current)
         guards = {name: self._guard(losses, name, unexplained_chi2) for name in screening.scores}
         least = {name: max(guards[name], self.threshold(score.numbers)) for name, score in screening.scores.items()}
-        promising = [s for s in ranked if s.delta_chi2 > max(0.7 * s.threshold, HOPELESS * guards[s.name])]
-        best = None if "sampling_delay" in refused else self._large_delay(current)
-        for score in promising[:REFITTED]:
-            if best is not None and RIVAL * score.net < best[0]:
+        promising = [
+            s
+            for s in ranked
+            if s.delta_chi2 > max(RULES.promised_share * s.threshold, RULES.hopeless_share * guards[s.name])
+        ]
+        best = self._outright(current, refused)
+        for score in promising[: RULES.refitted]:
+            if best is not None and RULES.rival_promise * score.net < best[0]:
                 break
             # every number of the effect: how a curve splits between stator and rotor shows only once it bends
             wanted = least[score.name]
-            to_beat = wanted if best is None else max(wanted, best[0] + price(score.numbers))
+            to_beat = wanted if best is None else max(wanted, best[0] + RULES.price(score.numbers))
             trial = self._tried(current, score, current.chi2 - to_beat)
             gain = current.chi2 - trial.chi2
             self.report(f"  try {score.name}: promised {score.delta_chi2:.4g}, gained {gain:.4g}")
@@ -283,13 +256,13 @@ class Steps:
                     trial, gain, is_sound = equal, current.chi2 - equal.chi2, True
             if not is_sound:
                 self.implausible.append(score.name)
-                if is_ruled_out(trial.model, score.name, self.record):
+                if CATALOGUE[score.name].is_ruled_out(trial.model, self.record):
                     self.kept_of_ruled_out[score.name] = min(gain / score.delta_chi2, 1.0)
             if gain < wanted or not is_sound:
-                if required_chi2(score.numbers) < gain:
+                if RULES.required_chi2(score.numbers) < gain:
                     self.below[score.name] = gain
                 continue
-            net = gain - price(score.numbers)
+            net = gain - RULES.price(score.numbers)
             if best is None or net > best[0]:
                 best = (net, score.name, trial)
         self.ruled_out = self._most_ruled_out(screening, least)
@@ -329,7 +302,7 @@ class Steps:
         for name in accepted:
             shares = [t for t in CATALOGUE[name].terms(self.setting) if t.kind == kinds.LEG_SHARE]
             if shares and not current.model.has_kind(kinds.LEG_SHARE):
-                wanted = current.chi2 - required_chi2(len(shares))
+                wanted = current.chi2 - RULES.required_chi2(len(shares))
                 trial = fit(current.model.with_terms(shares), self.record, self.layout, self.noise, wanted_chi2=wanted)
                 if trial.chi2 <= wanted and is_plausible(trial.model, name, self.setting):
                     current = trial
@@ -364,16 +337,30 @@ class Steps:
 
     def _least_chi2_of_rest(self, unexplained_chi2: float) -> float:
         """What the best candidate must take where much is left: else no cause makes it, and six small causes name nothing."""
-        return LEAST_SHARE_OF_REST * max(
+        return RULES.least_share_of_rest * max(
             unexplained_chi2 if self._is_large(unexplained_chi2) else 0.0, self.ruled_out.chi2
         )
 
-    def _large_delay(self, current: Fit) -> tuple[float, str, Fit] | None:
-        trial = large_delay(current, self.setting, self.noise, self.report) if "sampling_delay" in self.names else None
-        if trial is None:
-            return None
-        numbers, gain = sum(t.effect == "sampling_delay" for t in trial.model.terms), current.chi2 - trial.chi2
-        return (gain - price(numbers), "sampling_delay", trial) if gain >= self.threshold(numbers) else None
+    def _outright(self, current: Fit, refused: set[str]) -> tuple[float, str, Fit] | None:
+        """The best of the causes that no promise shows."""
+        found = []
+        for cause in (CATALOGUE[n] for n in self.names if n not in refused):
+            trial = begun_outright(cause, current, self.setting, self.noise, self.report)
+            if trial is not None:
+                numbers, gain = len(trial.model.of(cause.name)), current.chi2 - trial.chi2
+                if gain >= self.threshold(numbers):
+                    found.append((gain - RULES.price(numbers), cause.name, trial))
+        return max(found, key=lambda x: x[0], default=None)
+
+    def _standing(self, current: Fit, accepted: tuple[str, ...]) -> Standing:
+        samples = float(current.normal.count.sum())
+        return Standing(current.model, accepted, self.names, self.setting, samples, RULES)
+
+    def _proposed_beside(self, current: Fit, name: str, accepted: tuple[str, ...]) -> Exchanged | None:
+        """What a cause proposes in place of the one that was accepted just now."""
+        here = self._standing(current, accepted)
+        groups = (group for cause in FROM_THE_SAMPLE for group in cause.in_place_of(name, here))
+        return proposed(groups, current, here, self.noise, self.report, more="")
 
     def _exchanged(self, current: Fit, accepted: tuple[str, ...]) -> Exchanged | None:
         """Causes in other forms, and linear ones for others, that fit clearly better; each set tried once."""
@@ -382,22 +369,15 @@ class Steps:
             other_form = in_other_forms(current, accepted, self.setting, self.noise, self.report)
             if other_form is not None:
                 return other_form, accepted, self.setting
-        mine, late = (frozenset(n for n in accepted if n in names) for names in (LINEAR, LATE))
-        if "cable_capacitance" in late and "sensor_lag" in self.names and late not in self.lagging:
-            self.lagging.add(late)
-            other = as_a_lag(current, accepted, self.setting, self.noise, self.names, self.report)
+        for cause, at in proposers(accepted, self.names):
+            if (cause.name, at) in self.proposed:
+                continue
+            self.proposed.add((cause.name, at))
+            here = self._standing(current, accepted)
+            other = proposed(cause.proposals(here), current, here, self.noise, self.report)
             if other is not None:
                 return other
-        if late == {"sensor_lag"} and late not in self.lagging:
-            self.lagging.add(late)
-            other = as_a_delay(current, accepted, self.setting, self.noise, self.names, self.report)
-            if other is not None:
-                return other
-        if "iron_loss" in mine and mine not in self.lagging:
-            self.lagging.add(mine)
-            other = as_read_late(current, accepted, self.setting, self.noise, self.names, self.report)
-            if other is not None:
-                return other
+        mine = frozenset(n for n in accepted if n in LINEAR)
         if not 1 <= len(mine) <= 2 or mine in self.regrouped:
             return None
         self.regrouped.add(mine)
@@ -414,9 +394,10 @@ class Steps:
             numbers = sum(1 for t in current.model.terms if t.effect == name)
             wanted = max(self._guard(losses, name, self._unexplained_chi2(current) + loss), self.threshold(numbers))
             # starts that came before the carried flux was right hold its place: only a fit without them tells
-            holds_place = name == "remanence" and current.model.has_kind(kinds.CARRY)
+            begins = any(t.effect == name and t.kind == kinds.INITIAL_FLUX for t in current.model.terms)
+            holds_place = begins and current.model.has_kind(kinds.CARRY)
             is_sound = is_plausible(current.model, name, self.setting)
-            if holds_place or loss < 10.0 * wanted or not is_sound:
+            if holds_place or loss < RULES.doubted_loss * wanted or not is_sound:
                 trial = self._without(current, name, current.chi2 + wanted if is_sound else np.inf)
                 is_idle = trial.chi2 - current.chi2 < wanted or not is_sound
                 # what was left runs away alone: better an implausible cause than no model
@@ -449,18 +430,24 @@ class Steps:
         """The fit in which the iron goes into every segment with what it remembers of the one before, where that is better."""
         if current.model.has_kind(kinds.MEMORY) or not any(s.iron_before_wb is not None for s in self.record.segments):
             return current
+        iron = (
+            n
+            for n in effects_of(current.model)
+            if any(t.effect == n and t.kind == kinds.STOP for t in current.model.terms)
+        )
+        carried = [t for name in iron for t in CATALOGUE[name].exchanged if t.kind == kinds.MEMORY]
         best, full = current, self.full
         for _ in range(CARRIED_ROUNDS):
-            model = best.model if best is not current else current.model.with_terms([CARRIED])
+            model = best.model if best is not current else current.model.with_terms(carried)
             told = with_flux_before(full, model, self.layout)
             trial = fit(
-                model, self._part_of(told), self.layout, self.noise, wanted_chi2=current.chi2 - required_chi2(1)
+                model, self._part_of(told), self.layout, self.noise, wanted_chi2=current.chi2 - RULES.required_chi2(1)
             )
             if trial.chi2 >= best.chi2:
                 break
             best, full = trial, told
         self.report(f"  iron that remembers the segment before: gained {current.chi2 - best.chi2:.4g}")
-        if current.chi2 - best.chi2 < required_chi2(1):
+        if current.chi2 - best.chi2 < RULES.required_chi2(1):
             return current
         self.full, self.setting = full, replace(self.setting, record=self._part_of(full))
         return best

@@ -54,17 +54,6 @@ UNITS: Mapping[str, tuple[str, int]] = {
     "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
     "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
 }  # fmt: skip
-CAUSES = {
-    "dead_time": ("Dead time of the inverter legs", "Normal for an inverter. The identification takes it off; nothing to do."),
-    "device_drop": ("Voltage drop of the devices", "Normal for an inverter. The identification takes it off; nothing to do."),
-    "sensor_offset": ("Offset of the current sensors", "Zero them at the drive if it offers that."),
-    "magnetizing_saturation": ("Saturation of the main flux path", "Normal. Give the drive its saturation curve if it takes one."),
-    "sensor_gain_mismatch": ("Current sensors of unequal gain", "Values change with the axis. Beyond 1 %: have the sensors compared."),
-    "sensor_lag": ("Lag of the current sensors", "Normal where it is a part of a sample period."),
-    "sampling_delay": ("Delay of sampling", "Normal where it is a part of a sample period."),
-    "leakage_saturation": ("Saturation of the leakage path", "Normal in small motors with closed slots."),
-    "iron_loss": ("Iron loss", "Normal."), "rotor_skin_effect": ("Deep bars of the rotor", "Normal in larger motors."),
-}  # fmt: skip
 
 
 def _named(text: str) -> str:
@@ -115,10 +104,16 @@ class Words:
         return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:
-        return self._t.gettext(CAUSES[name][0]) if name in CAUSES else name.replace("_", " ").capitalize()
+        from commissioner.diagnose.causes import CATALOGUE
+
+        called = CATALOGUE[name].in_service[0] if name in CATALOGUE else ""
+        return self._t.gettext(called) if called else name.replace("_", " ").capitalize()
 
     def cause_advice(self, name: str) -> str:
-        return self._t.gettext(CAUSES[name][1]) if name in CAUSES else ""
+        from commissioner.diagnose.causes import CATALOGUE
+
+        advice = CATALOGUE[name].in_service[1] if name in CATALOGUE else ""
+        return self._t.gettext(advice) if advice else ""
 
     def size(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         """Sizes of a cause, each with its 95 % interval and unit."""

@@ -35,6 +35,7 @@ from commissioner.service.runs.control import Party
 from commissioner.service.runs.live import live_document
 from commissioner.service.simulator import SCENARIOS
 from commissioner.settings import MotorFile
+from commissioner.validation import first_problem
 
 router = APIRouter()
 START = View("work/start.html", "What do you want to measure?", 1)
@@ -98,15 +99,14 @@ def _drive_table(parts: Parts, name: str, fields: dict[str, str]) -> DriveTable:
             id=identifier, name=name, url=fields.get("url", "").strip(), profile=fields.get("profile", "")
         )
     except ValidationError as error:
-        first = error.errors()[0]
-        key = str(first["loc"][0])
+        problem = first_problem(error, DriveTable)
         raise Refusal(
             422,
-            f"{key} cannot be used",
+            f"{problem.key} cannot be used",
             step="add a drive",
-            value=str(first["input"])[:100],
-            limit=str(first["msg"]),
-            remedy=f"correct {key}",
+            value=str(problem.value)[:100],
+            limit=problem.expected,
+            remedy=f"correct {problem.key}",
         ) from error
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.export.model_file import model_document, model_from, plain
 from commissioner.diagnose.export.playback import PAUSE_S, play
 from commissioner.diagnose.plant.model import Model

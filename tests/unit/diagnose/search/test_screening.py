@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.acceptance import guard
 from commissioner.diagnose.search.screening import joint_net, screen
-from commissioner.diagnose.search.stepwise import ENTIRELY, LEAST_SHARE_OF_REST, RuledOut, Steps
+from commissioner.diagnose.search.stepwise import RuledOut, Steps
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
@@ -58,7 +59,7 @@ def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_fo
     large, small = 0.05 * steps.count, 0.005 * steps.count
     asked = [steps._guard(losses, "inductance_anisotropy", rest) for rest in (large, small, 1e9)]
     assert asked == pytest.approx(
-        [ENTIRELY * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")]
+        [RULES.entirely_share * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")]
     )
 
 
@@ -85,8 +86,8 @@ def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_not_nam
         ruled_out.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
         and ruled_out.chi2 > steps.material_chi2
     )
-    assert steps._least_chi2_of_rest(0.0) == LEAST_SHARE_OF_REST * ruled_out.chi2
+    assert steps._least_chi2_of_rest(0.0) == RULES.least_share_of_rest * ruled_out.chi2
     assert steps._most_ruled_out(screening, guards | {"sampling_delay": 2.0 * ruled_out.chi2}) == RuledOut()
     small, large = 0.005 * steps.count, 0.05 * steps.count
     steps.ruled_out = RuledOut()
-    assert [steps._least_chi2_of_rest(rest) for rest in (small, large)] == [0.0, LEAST_SHARE_OF_REST * large]
+    assert [steps._least_chi2_of_rest(rest) for rest in (small, large)] == [0.0, RULES.least_share_of_rest * large]
