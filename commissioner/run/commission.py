@@ -109,6 +109,7 @@ def commission(
             with suppress(Abandoned), asked.computing():
                 warm_up(nameplate)
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
+            lock.release()  # the drive is let go: what follows is the archive's
             result = close_run(order, folder, findings, ended)
             if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
                 _tell(folder, present, Diagnosing(diagnosis_s))
