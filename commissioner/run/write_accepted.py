@@ -28,6 +28,7 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
+from commissioner.run.job import parameter_names
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -88,6 +89,16 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
     ready = _ready(run, url)
     with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
+
+
+def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    ready = _ready(run, url)
+    with _drive(ready) as inverter:
+        snapshot = inverter.snapshot()
+    names = parameter_names(ready.profile)
+    held = {names[name]: value for name, value in snapshot.in_use.items() if name in names}
+    return f"{snapshot.identity.drive_type} #{snapshot.identity.serial_number}", held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
