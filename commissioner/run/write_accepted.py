@@ -18,7 +18,7 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import ParameterSnapshot
+from commissioner.records import DriveIdentity, ParameterSnapshot
 from commissioner.registers.convention import drive_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
@@ -28,7 +28,7 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
-from commissioner.run.job import parameter_names
+from commissioner.run.job import names_of
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -92,12 +92,14 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
 
 
 def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
-    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing.
+    IdentityMismatch: another drive answers."""
     ready = _ready(run, url)
     with _drive(ready) as inverter:
+        _require_the_runs_drive(inverter, ready, "compare")
         snapshot = inverter.snapshot()
-    names = parameter_names(ready.profile)
-    held = {names[name]: value for name, value in snapshot.in_use.items() if name in names}
+    names, factors = names_of(ready.profile)
+    held = {names[name]: value / factors.get(name, 1.0) for name, value in snapshot.in_use.items() if name in names}
     return f"{snapshot.identity.drive_type} #{snapshot.identity.serial_number}", held
 
 
@@ -209,18 +211,24 @@ def _drive(ready: _Ready) -> Iterator[Inverter]:
 
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
+    identity = _require_the_runs_drive(inverter, ready, what)
+    present = inverter.snapshot().in_use
+    rows = tuple(_row(ready.profile, name, present[name], value) for name, value in wanted.items())
+    return Plan(run.run, what, identity.drive_type, identity.serial_number, rows)
+
+
+def _require_the_runs_drive(inverter: Inverter, ready: _Ready, step: str) -> DriveIdentity:
+    """Who answers. IdentityMismatch: another one than the run was made on."""
     identity = inverter.identify()
     if identity.words != ready.snapshot.identity.words:
         raise IdentityMismatch(
             "this is not the drive of the run",
-            step=what,
+            step=step,
             value=identity.words,
             limit=ready.snapshot.identity.words,
             remedy="connect the drive that was measured, or measure this one",
         )
-    present = inverter.snapshot().in_use
-    rows = tuple(_row(ready.profile, name, present[name], value) for name, value in wanted.items())
-    return Plan(run.run, what, identity.drive_type, identity.serial_number, rows)
+    return identity
 
 
 def _row(profile: DriveProfile, name: str, now: float, will_be: float) -> PlannedRow:
