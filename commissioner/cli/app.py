@@ -279,13 +279,16 @@ def diagnose(
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
     mapping: Map = None,
+    why: Annotated[
+        bool, typer.Option("--why", help="Show every step of the search, with what was gained and wanted.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
     from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json, why=why)
 
 
 @app.command()
