@@ -58,7 +58,7 @@ def test_a_drive_that_holds_the_runs_values_in_single_precision_holds_them(bench
 
 def test_another_drive_is_not_compared(bench):
     path = close_with(bench, MACHINE)
-    bench.drive.put("serial_number", 4711)
+    bench.drive.put("serial_number", 4712)
     with pytest.raises(IdentityMismatch):
         compare_with_drive(path.parent, "last")
 
