@@ -18,8 +18,8 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import DriveIdentity, ParameterSnapshot
-from commissioner.registers.convention import drive_values
+from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
+from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
@@ -28,7 +28,6 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
-from commissioner.run.job import names_of
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -98,9 +97,9 @@ def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, f
     with _drive(ready) as inverter:
         _require_the_runs_drive(inverter, ready, "compare")
         snapshot = inverter.snapshot()
-    names, factors = names_of(ready.profile)
-    held = {names[name]: value / factors.get(name, 1.0) for name, value in snapshot.in_use.items() if name in names}
-    return f"{snapshot.identity.drive_type} #{snapshot.identity.serial_number}", held
+    ours = our_values(ready.profile, snapshot.in_use, ready.plate)
+    held = {one.field: one.value for one in ours.values()}
+    return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
