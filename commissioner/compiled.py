@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -32,6 +34,12 @@ kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
 inlined: Any = njit(inline="always", **FAST)
 """A part of a kernel too small to be called."""
+
+
+def writable(signal: ArrayLike) -> NDArray[np.float64]:
+    """As compiled code takes it: contiguous, and writable, for another signature (columns of a file are read-only) is
+    compiled anew."""
+    return np.require(signal, np.float64, ["C", "W"])
 
 
 def forget_stale_kernels(folder: str, beside: str) -> None:

@@ -51,6 +51,8 @@ class ServiceTable(_Table):
     hand_over_s: Annotated[float, Field(ge=1, le=600)] = 15.0
     session_idle_s: Annotated[float, Field(ge=1, le=86400)] = 1800.0
     diagnosis: bool = True
+    axes_deg: list[Annotated[float, Field(ge=0, lt=360)]] = []
+    """Of runs from the page, in electrical degrees; none: the procedure's own."""
 
 
 class ServiceFile(_Table):

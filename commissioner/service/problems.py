@@ -45,6 +45,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (429, "Too often."),
         (502, "The drive or the link failed."),
         (503, "Not ready yet."),
+        (507, "The disk takes no more."),
     )
 }
 """For OpenAPI: what any route may answer beside its success."""
@@ -65,6 +66,14 @@ def refusal_of(error: CommissionerError) -> Refusal:
     return Refusal(
         status, error.what, detail=error.what, step=error.step, value=_shown(error.value), limit=_shown(error.limit),
         remedy=error.remedy,
+    )  # fmt: skip
+
+
+def disk_refuses(failure: OSError) -> Refusal:
+    """What needs an entry on the disk is not done without one."""
+    return Refusal(
+        507, "the disk takes no more", detail=str(failure)[:200], step="write down", value=failure.strerror or str(failure)[:200],
+        limit="room for an entry before anything is done", remedy="make room on the service's disk, then repeat; STOP works without",
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from commissioner.errors import DriveFault, LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.foreign import Watched
 from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, Port, Words
-from commissioner.registers.codec import Value, decode_span, encode_item, encode_span
+from commissioner.registers.codec import Value, decode_item, decode_span, encode_item, encode_span
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
 
 
@@ -75,6 +75,11 @@ class Items:
         except (ReplyTimeout, ReplyMismatch) as failure:
             return failure
         return None
+
+    def as_held(self, name: str, value: Value) -> Value:
+        """The value as the drive's own words hold it."""
+        item = self.profile.item(name)
+        return decode_item(item, encode_item(item, value))
 
     def _write(self, span: Span, values: Mapping[str, Value]) -> None:
         try:

@@ -22,7 +22,7 @@ from commissioner.link.wire.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, 
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.profile import DriveProfile
 
-READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x03, 0x05, 0x06, 0x10, 0x17
+READ_COIL, READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x01, 0x03, 0x05, 0x06, 0x10, 0x17
 COIL_ON = 0xFF00
 ILLEGAL_FUNCTION = 1
 
@@ -74,7 +74,7 @@ class ModbusPort:
         self._connect_timeout_s = connect_timeout_s
         self._url, self._profile = url, profile
         self._exceptions = EXCEPTION_MEANINGS | dict(profile.exceptions)
-        self._device = url.device or profile.link.device_id
+        self._device = profile.link.device_id if url.device is None else url.device
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
         self._token = time.time_ns() & 0xFFFF
@@ -91,8 +91,19 @@ class ModbusPort:
                 continue
         return self._trusted(lambda: self._ask_apart(address, count), repeats=True)
 
-    def write(self, address: int, values: Sequence[int]) -> None:
+    def write_register(self, address: int, values: Sequence[int]) -> None:
+        """One register by function 6, whatever the drive file says."""
+        self._trusted(lambda: self._ask_write_one(address, values[0]))
+
+    def write_registers(self, address: int, values: Sequence[int]) -> None:
+        """By function 16, whatever the drive file says."""
         self._trusted(lambda: self._ask_write(address, list(values)))
+
+    def write(self, address: int, values: Sequence[int]) -> None:
+        if len(values) == 1 and WRITE_ONE in self._profile.link.write_functions:
+            self._trusted(lambda: self._ask_write_one(address, values[0]))
+        else:
+            self._trusted(lambda: self._ask_write(address, list(values)))
         if self._profile.link.write_pause_s:
             self._sleep(self._profile.link.write_pause_s)
 
@@ -115,6 +126,9 @@ class ModbusPort:
 
     def write_coil(self, address: int, value: bool) -> None:
         self._trusted(lambda: self._ask_write_coil(address, value))
+
+    def read_coil(self, address: int) -> bool:
+        return self._trusted(lambda: self._ask_read_coil(address))
 
     def doubt(self) -> None:
         self._trust.doubt_content()
@@ -190,6 +204,14 @@ class ModbusPort:
             lambda: self._client.write_coil(address, value, device_id=self._device),
         )
         self._expect(what, (reply.address, reply.bits[:1]), (address, [value]))
+
+    def _ask_read_coil(self, address: int) -> bool:
+        what = f"read coil {address}"
+        reply = self._transact(
+            (READ_COIL, address), what, lambda: self._client.read_coils(address, count=1, device_id=self._device)
+        )
+        self._expect(what, len(reply.bits) > 0, True)
+        return bool(reply.bits[0])
 
     def _ask_exchange(self, write_address: int, values: list[int], read_address: int, count: int) -> Words:
         what = f"write {len(values)} registers at {write_address} and read {count} at {read_address}"
@@ -377,10 +399,13 @@ class ModbusPort:
 def open_port(
     url: DriveUrl, profile: DriveProfile, *, reply_timeout_s: float = 0.5, connect_timeout_s: float = 2.0
 ) -> ModbusPort:
-    """A connected port. `reply_timeout_s` is on top of the time the longest frames take on a serial line.
+    """A connected port. `reply_timeout_s` holds where neither the address (`reply=`) nor the drive file names another
+    time; it is on top of the time the longest frames take on a serial line.
 
     Raises LinkUnreachable where nothing answers, UsageError where a TLS file cannot be used.
     """
+    said = url.reply_s if url.reply_s is not None else profile.link.reply_s
+    reply_timeout_s = reply_timeout_s if said is None else said
     wire_s = 2 * MAX_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
     port = ModbusPort(url, profile, reply_timeout_s=reply_timeout_s + wire_s, connect_timeout_s=connect_timeout_s)
     port.connect()

@@ -63,7 +63,7 @@ class Port(Protocol):
         ...
 
     def write(self, address: int, values: Sequence[int]) -> None:
-        """Write the registers in one transaction (FC16)."""
+        """Write the registers in one transaction: FC06 where there is one and the drive file names it, else FC16."""
         ...
 
     def exchange(
@@ -77,6 +77,10 @@ class Port(Protocol):
 
     def write_coil(self, address: int, value: bool) -> None:
         """Set one coil (FC05)."""
+        ...
+
+    def read_coil(self, address: int) -> bool:
+        """One coil (FC01)."""
         ...
 
     def doubt(self) -> None:

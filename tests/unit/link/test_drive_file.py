@@ -48,7 +48,7 @@ def test_a_base_of_one_is_taken_off_every_address():
     document = {
         "drive": {"name": "x", "kind": "commercial", "capabilities": [], "status_decoder": "none"},
         "link": SIMULATED["link"] | {"address_base": 1},
-        "items": {"dc_link_v": {"address": 0x6001, "type": "u16", "access": "r"}},
+        "items": {"dc_link_v": {"address": 0x6001, "type": "u16", "access": "r", "source": "manual"}},
     }
     assert build(document, "x.toml").item("dc_link_v").address == 0x6000
 
@@ -64,7 +64,7 @@ def test_a_base_of_one_is_taken_off_every_address():
         ("drive.status_decoder", "cia", "drive.status_decoder", "'cia402'"),
         ("link", MISSING, "link", "needed"),
         ("link.device_id", "1", "link.device_id", "whole number"),
-        ("link.device_id", 0, "link.device_id", "1 or more"),
+        ("link.device_id", 256, "link.device_id", "at most 255"),
         ("link.max_read_registers", 126, "link.max_read_registers", "at most 125"),
         ("link.word_order", "middle", "link.word_order", "'big'"),
         ("link.has_read_write_multiple", 1, "link.has_read_write_multiple", "true or false"),
