@@ -15,7 +15,8 @@ from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
-from commissioner.identify.estimate.sufficiency import require_alignment, require_conditioned
+from commissioner.identify.estimate.sufficiency import require_conditioned
+from commissioner.identify.intake.alignment import more_periods
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
 from commissioner.identify.inverter.staircase import InverterError, Staircase, dc_levels, fit_staircase
@@ -79,15 +80,15 @@ def fit_axis(
     stairs = _staircase(stretches)
     first_leg = leg or (stairs.inverter if stairs else None)
     fit = _fitted(stretches, stairs, plate, period_s, guess, first_leg, like)
+    if more_periods(fit.batch.delay, period_s):
+        return fit  # on the wrong rows nothing else of it counts
     try:
-        require_alignment(fit.batch)
         require_conditioned(fit.batch)
     except DataRefused:
         if leg is not None or stairs is None:
             raise
         # what was taken for settled levels was none: begin as if there were none
         fit = _fitted(stretches, None, plate, period_s, guess, None, None)
-        require_alignment(fit.batch)
         require_conditioned(fit.batch)
     return fit
 
