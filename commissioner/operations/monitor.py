@@ -14,6 +14,7 @@ from commissioner.monitor.trend.indicators import pulses, trendable
 from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.trust import trust_from
 from commissioner.recordings.baseline import update
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of, start_from
@@ -34,6 +35,7 @@ class MonitorRequest:
     learn: bool = False
     out: Path | None = None
     mapping: Path | None = None
+    trust: str | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | N
     plate = plate_of(recording.metadata, str(request.file), request.motor)
     start = start_from(request.start) if request.start else None
     observe(Began("looking for speed and load"))
-    seen = watch(recording, plate, Wishes(request.load_hz, request.inertia_kg_m2, start))
+    seen = watch(recording, plate, Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust)))
     if isinstance(seen, Refused):
         return _refused(seen, request.file)
     made = pulses(seen)
