@@ -19,6 +19,7 @@ import numpy as np
 from commissioner.errors import UsageError
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import BatchFit, extended
+from commissioner.identify.batch.starts import periods_late
 from commissioner.identify.estimate.axes import AxisEstimate, Combined, combine
 from commissioner.identify.estimate.axis import (
     LARGEST_DISAGREEMENT,
@@ -34,13 +35,13 @@ from commissioner.identify.estimate.axis import (
 from commissioner.identify.estimate.leg_family import one_inverter
 from commissioner.identify.estimate.leg_refit import with_known_law
 from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
-from commissioner.identify.intake.alignment import FARTHEST, TimeShift, more_periods, require_near, shifted
+from commissioner.identify.intake.alignment import FARTHEST, TimeShift, more_periods, require_near, rows_off, shifted
 from commissioner.identify.intake.audit import Audit, audit
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
-from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
+from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
 from commissioner.records import StandstillRecording
 
 if TYPE_CHECKING:
@@ -122,7 +123,10 @@ def identify(
     require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
     first, *others = _by_test(examined)
-    fit, late = _aligned(first, partial(fit_axis, plate=plate, period_s=period_s, guess=start, leg=inverter, like=None))
+    guess = rows_off(periods_late(first, period_s, prior(plate)))
+    fit, late = _aligned(
+        first, guess, partial(fit_axis, plate=plate, period_s=period_s, guess=start, leg=inverter, like=None)
+    )
     fits = [fit]
     for stretches in others:
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
@@ -139,9 +143,11 @@ def identify(
     )
 
 
-def _aligned(stretches: Sequence[Stretch], fit: Callable[[Sequence[Stretch]], AxisFit]) -> tuple[AxisFit, int]:
-    """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late."""
-    late = 0
+def _aligned(
+    stretches: Sequence[Stretch], late: int, fit: Callable[[Sequence[Stretch]], AxisFit]
+) -> tuple[AxisFit, int]:
+    """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late; `late`: to
+    begin with."""
     for _ in range(MOST_SHIFTS):
         found = fit(shifted(stretches, late))
         period_s = found.batch.sample_period_s
@@ -166,7 +172,13 @@ def _time_shift(results: Sequence[AxisResult], fits: Sequence[AxisFit], late: in
         with_delay = replace(batch.model, with_delay=True)
         parts = segments(fits[0].stretches)
         batch = fit_segments(
-            parts, period_s, batch.gamma.as_inverse_gamma(), with_delay, extended(batch, with_delay), TRIAL_STEPS, own_start=batch.own
+            parts,
+            period_s,
+            batch.gamma.as_inverse_gamma(),
+            with_delay,
+            extended(batch, with_delay),
+            TRIAL_STEPS,
+            own_start=batch.own,
         )
     return _as_fitted(batch, late, period_s)
 
@@ -227,7 +239,12 @@ def _summary(
         lost_samples=examined.lost_samples,
         duration_s=examined.duration_s,
         stator_resistance_20degc_ohm=at_20,
-        remarks=(*examined.remarks, *([shift.sentence] if shift.is_significant else []), *combined.remarks, *_remarks(results, rated, flux)),
+        remarks=(
+            *examined.remarks,
+            *([shift.sentence] if shift.is_significant else []),
+            *combined.remarks,
+            *_remarks(results, rated, flux),
+        ),
     )
 
 

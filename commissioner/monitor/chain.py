@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.against_plate import against_plate, of_contradiction, over_currents
+from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.loads.mean_speed import whole_record_speed
 from commissioner.monitor.loads.members import members_of, pole_count, with_wobble

@@ -17,10 +17,10 @@ from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_po
 from commissioner.diagnose.points.table import Points, is_points_table, read_points
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
-from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.plate_match import contradiction, rated_point
+from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
 from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
@@ -120,7 +120,9 @@ def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str]
     if any(key not in plate for key in NAMEPLATE_KEYS) or any(name not in values for name in PARAMETERS):
         return []
     nameplate = nameplate_from(plate)
-    found = contradiction(rated_point(InverseGamma(*(values[name]["value"] for name in PARAMETERS)), nameplate), nameplate)
+    found = contradiction(
+        rated_point(InverseGamma(*(values[name]["value"] for name in PARAMETERS)), nameplate), nameplate
+    )
     if found is None:
         return []
     if trust != "data":

@@ -25,8 +25,24 @@ def show_refused(seen: Refused) -> None:
         )
 
 
+def _states(document: Mapping[str, Any]) -> None:
+    """The recording's stretches, where there is more than one."""
+    stretches = document.get("states", [])
+    if len(stretches) < 2:
+        return
+    rows = []
+    for s in stretches:
+        own = "the answer below" if s["used"] else s.get("withheld", "")
+        if "mean_torque_nm" in s:
+            speed, torque = s["mean_speed_rad_per_s"], s["mean_torque_nm"]
+            own = f"{speed['value'] * 9.5493:.6g} 1/min, {torque['value']:.4g} N m (std {torque['std']:.2g})"
+        rows.append((s["state"], f"{s['start_s']:.3g} ... {s['end_s']:.3g} s", f"{s['current_a']:.3g} A", own))
+    out.print(table("", ("state", "from, to", "current", ""), rows))
+
+
 def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None) -> None:
     """The human view: what turns how fast against what, how sure, and what was put right."""
+    _states(document)
     wiring = miswired(seen.findings)
     for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")

@@ -14,6 +14,8 @@ MOST_PERIODS = 3.0
 """By which the currents may lie off the voltage, either way; what is beyond is another fault than a late channel."""
 FARTHEST = 6
 """Whole periods that are tried, so that a refusal can name the value."""
+COARSE = 0.6
+"""Of a period, by which a coarse look may be wrong."""
 SLACK = 0.05
 """Of a period, beyond none and one, that is still the fit's own: the model bends there by less than it is known."""
 
@@ -45,6 +47,11 @@ def more_periods(delay: Quantity, period_s: float) -> int:
     if late < -SLACK and late < -3.0 * std:
         return math.floor(late)
     return math.floor(late) if late > 1.0 + SLACK else 0
+
+
+def rows_off(coarse_periods: float) -> int:
+    """Whole periods to take off before any fit: none where the fit itself finds the way from where it begins."""
+    return math.floor(coarse_periods) if not -COARSE < coarse_periods < 1.0 + COARSE else 0
 
 
 def shifted(stretches: Sequence[Stretch], periods: int) -> list[Stretch]:
