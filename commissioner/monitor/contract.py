@@ -31,7 +31,8 @@ class LoadPeriod(TypedDict):
 
 class State(TypedDict):
     """A stretch of the recording: off | residual | start | ramp | load step | steady | coast-down; `used`: the answer is of it.
-    Of another steady stretch its own speed and torque, or why it has none."""
+    Of a steady stretch beside it, or one that is too short, its own speed and torque; `withheld`: why they are of the terminals
+    and the plate only."""
 
     state: str
     start_s: float

@@ -153,7 +153,7 @@ LARGEST_SLIP, LARGEST_SLIP_OF_MORE_W = 0.25, (300.0, 0.16)
 
 def typical_efficiency(power_w: float) -> float:
     """Of a cage motor of this rated power: 0.65 at 0.18 kW, 0.82 at 2.2 kW, 0.95 at 200 kW (IE1 to IE3 lie within 0.1)."""
-    return max(1.0 - 0.22 * (power_w / 1000.0) ** -0.27, 0.35)
+    return max(1.0 - 0.22 * float((power_w / 1000.0) ** -0.27), 0.35)
 
 
 LEAST_OF_TYPICAL = 0.7

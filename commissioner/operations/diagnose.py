@@ -121,7 +121,7 @@ def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str]
         return []
     nameplate = nameplate_from(plate)
     found = contradiction(
-        rated_point(InverseGamma(*(values[name]["value"] for name in PARAMETERS)), nameplate), nameplate
+        rated_point(InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS)), nameplate), nameplate
     )
     if found is None:
         return []

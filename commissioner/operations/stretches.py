@@ -11,13 +11,12 @@ from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.intake.states import Stretch, cut_out, states
+from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
 
 MARGIN_S = 0.06
 """At either end of a steady stretch: the window that finds it reaches so far over its edge."""
-LEAST_S = 0.6
-"""Of a steady stretch beside the longest that is watched as well."""
 
 
 def in_its_states(
@@ -48,21 +47,27 @@ def in_its_states(
     seen = observe(replace(part, notes=(*part.notes, note)), plate, wishes)
     out = [_state(s, used=s is longest) for s in stretches]
     for stretch, state in zip(stretches, out, strict=True):
-        if stretch in steady and stretch is not longest:
-            _add_own(state, recording, stretch, plate, wishes)
+        if stretch in steady:
+            _add_own(state, recording, stretch, plate, wishes, is_watched=stretch is longest)
     return seen, part, out
 
 
-def _add_own(state: State, recording: RunningRecording, stretch: Stretch, plate: Nameplate, wishes: Wishes) -> None:
-    if stretch.duration_s < LEAST_S:
-        state["withheld"] = f"{stretch.duration_s:.2g} s: {LEAST_S:g} s at least"
-        return
-    own = observe(cut_out(recording, stretch, MARGIN_S), plate, wishes)
-    if isinstance(own, Refused):
-        state["withheld"] = own.reason.what
-        return
-    state["mean_speed_rad_per_s"] = {"value": own.mean_speed_rad_per_s, "std": own.mean_speed_std}
-    state["mean_torque_nm"] = {"value": own.mean_torque_nm, "std": own.mean_torque_std}
+def _add_own(
+    state: State, recording: RunningRecording, stretch: Stretch, plate: Nameplate, wishes: Wishes, *, is_watched: bool
+) -> None:
+    """What a steady stretch says: as the chain has it, else, of a short one, as its terminals do, and why no more."""
+    part = cut_out(recording, stretch, MARGIN_S)
+    if not is_watched:
+        own = observe(part, plate, wishes)
+        if isinstance(own, Observation):
+            state["mean_speed_rad_per_s"] = {"value": own.mean_speed_rad_per_s, "std": own.mean_speed_std}
+            state["mean_torque_nm"] = {"value": own.mean_torque_nm, "std": own.mean_torque_std}
+            return
+        state["withheld"] = f"from current, voltage and plate only: {own.reason.what}"
+    terminal = from_terminals(part, plate, stretch.frequency_hz)
+    if terminal is not None:
+        state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
+        state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
 
 
 def _state(stretch: Stretch, *, used: bool) -> State:

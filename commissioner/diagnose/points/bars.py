@@ -157,7 +157,7 @@ class _Fit:
             step = np.zeros(self.x.size)
             step[k] = 1e-4
             gradient[k] = (self._log_slow(self.x + step) - self._log_slow(self.x - step)) / 2e-4
-        return float(np.sqrt(max(gradient @ self.covariance @ gradient, 0.0)))
+        return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
 
     @property
     def rise(self) -> float:
