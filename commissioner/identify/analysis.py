@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,6 +73,8 @@ class Identification:
     duration_s: float
     stator_resistance_20degc_ohm: tuple[float, float] | None
     remarks: tuple[str, ...]
+    fits: tuple[AxisFit, ...] = ()
+    """Of the tests, each by itself."""
 
     @property
     def delay_s(self) -> tuple[float, float]:
@@ -101,12 +102,14 @@ def identify(
     winding_temperature_degc: float | None = None,
     assumption: str = EQUAL_LEAKAGE,
     is_final: bool = True,
+    earlier: Identification | None = None,
 ) -> Identification:
     """Everything a standstill recording says about the motor.
 
     `nameplate` defaults to the recording's metadata. `inverter` (from an earlier staircase) and `start` only give the
     search a start. `is_final` is False for a look that only designs the next test: the inverter's law is not fitted to the
-    samples then. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
+    samples then. `earlier`: an identification of a part of these samples, begun without a start; its fits of tests that
+    have the same samples are not made again. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
     """
     if estimator not in ("pao", "lyapunov", "nls"):
         raise UsageError(
@@ -123,13 +126,16 @@ def identify(
     require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
     first, *others = _by_test(examined)
-    guess = rows_off(periods_late(first, period_s, prior(plate)))
-    fit, late = _aligned(
-        first, guess, partial(fit_axis, plate=plate, period_s=period_s, guess=start, leg=inverter, like=None)
-    )
+
+    def one(stretches: Sequence[Stretch]) -> AxisFit:
+        done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
+        return done or fit_axis(stretches, plate, period_s, start, inverter, None)
+
+    fit, late = _aligned(first, rows_off(periods_late(first, period_s, prior(plate))), one)
     fits = [fit]
     for stretches in others:
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
+    as_fitted = tuple(fits)
     free = [f.batch for f in fits]
     legs = one_inverter(free)
     if is_final:
@@ -138,9 +144,8 @@ def identify(
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
     shift = _time_shift(results, fits, late, period_s) if is_final else _as_fitted(results[0].batch, late, period_s)
     require_near(shift)
-    return _summary(
-        results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption, shift
-    )
+    temperature = winding_temperature_degc or _temperature(recording)
+    return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
 
 
 def _aligned(

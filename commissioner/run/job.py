@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from commissioner.errors import RequestRefused
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.checks import DriveLimits, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.procedure.verdict import PARAMETERS
-from commissioner.registers.convention import INDUCTANCES, RESISTANCES, is_our_own
+from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
+from commissioner.run.acting import CHANNELS
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
 
@@ -24,6 +27,8 @@ LOST_SAMPLES_S = 0.05
 FLUX_FRACTION = 1.1
 """Of the guard's own limit: the guard acts first, the watch is the second line."""
 LATENCY_PROBES = 20
+PACE_PROBES = 5
+"""Only a link whose fastest answer is too slow is surely too slow: the others of a busy host are none of its own."""
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
 
@@ -44,22 +49,47 @@ def make_job(
     inverter = Inverter(port, profile)
     for _ in range(LATENCY_PROBES):
         inverter.read_status()
+    names, factors = names_of(profile)
     return Job(
         plan=plan,
         nameplate=nameplate,
         drive_limits=drive_limits(profile),
-        parameter_names=parameter_names(profile),
+        parameter_names=names,
+        parameter_factors=factors,
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
+        pace=_pace(profile, port),
     )
 
 
-def parameter_names(profile: DriveProfile) -> dict[str, str]:
-    """The drive's name of each parameter that is one of the contract's, not another circuit's or in another form."""
-    by_quantity = dict(zip((*RESISTANCES, *INDUCTANCES[:2]), PARAMETERS, strict=True))
-    items = [profile.item(name) for name in profile.parameters.order] if profile.parameters else []
-    known = {item.name: by_quantity.get(item.quantity or item.name) for item in items if is_our_own(item)}
-    return {name: field for name, field in known.items() if field is not None}
+def _pace(profile: DriveProfile, port: ModbusPort) -> StreamPace | None:
+    """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now."""
+    layout = profile.window
+    if layout is None:
+        return None
+    times_s = []
+    for _ in range(PACE_PROBES):
+        began_s = time.monotonic()
+        try:
+            port.read(layout.address, layout.words)
+        except RequestRefused:
+            return None
+        times_s.append(time.monotonic() - began_s)
+    return StreamPace(min(times_s), layout.data_registers // len(CHANNELS), layout.words)
+
+
+def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:
+    """Of each parameter that says one of the contract's by itself: the drive's name -> that field, and the factor by
+    which the drive multiplies its SI value where that is not 1."""
+    order = profile.parameters.order if profile.parameters else ()
+    names: dict[str, str] = {}
+    factors: dict[str, float] = {}
+    for name, ours in our_values(profile, dict.fromkeys(order, 1.0), None).items():
+        if ours.field in PARAMETERS and not ours.is_of_a_set:
+            names[name] = ours.field
+            if ours.value != 1.0:
+                factors[name] = 1.0 / ours.value
+    return names, factors
 
 
 def drive_limits(profile: DriveProfile) -> DriveLimits:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Generator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,8 +19,9 @@ from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, Param
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
-from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
+from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, with_host, write_lost
+from commissioner.run.holding.priority import raised_priority
+from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
 from commissioner.run.stream import Stream, stop_if
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -84,11 +86,11 @@ class Runner:
         """Run the course to its end. Faults, guards and the operator end it as a value; the drive is disarmed."""
         error: CommissionerError | None = None
         ended: RunEnded | None = None
-        with self._stop:
+        with self._stop, raised_priority():
             try:
                 ended = self._drive(course)
             except CommissionerError as failure:
-                error = failure
+                error = self._with_host(failure)
             except Exception as surprise:  # must not leave a motor energised or a run without an end
                 error = as_error(surprise, self._folder)
             finally:
@@ -109,21 +111,24 @@ class Runner:
         reply: object = None
         while True:
             if self._stop.wish is not None and not self._progress.has_written:  # what is written ends as written
-                self._progress.granted = self._stop.wish
-                raise Aborted(
-                    "stopped by the operator",
-                    step="run",
-                    value=self._stop.asked,
-                    limit="no stop",
-                    remedy="start again when ready",
-                )
+                raise self._granted(self._stop.wish)
             try:
-                command = course.send(reply)
+                with nullcontext() if self._progress.has_written else self._stop.computing():
+                    command = course.send(reply)
+            except Abandoned:
+                assert self._stop.wish is not None
+                raise self._granted(self._stop.wish) from None
             except StopIteration as stop:
                 ended = stop.value
                 assert isinstance(ended, RunEnded)
                 return replace(ended, energised_s=self.energised_s)
             reply = self._carry_out(command)
+
+    def _granted(self, wish: StopAsked) -> Aborted:
+        self._progress.granted = wish
+        return Aborted(
+            "stopped by the operator", step="run", value=str(wish), limit="no stop", remedy="start again when ready"
+        )
 
     def _carry_out(self, command: ask.Command) -> object:
         refusal = permit(command, self._progress.facts, self._bounds)
@@ -205,8 +210,13 @@ class Runner:
         limits = progress.facts.drive_limits
         began_s = time.monotonic()
         cursor = self._inverter.enable()
+        self._inverter.port.stats.longest_gap_s = 0.0
         sensors = SensorWatch(limits.current_a if limits else math.inf)
         self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
+
+    def _with_host(self, error: CommissionerError) -> CommissionerError:
+        facts = self._progress.facts
+        return with_host(error, self._inverter.port.stats.longest_gap_s, facts.watchdog_s) if facts.energised else error
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""

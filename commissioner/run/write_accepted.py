@@ -18,8 +18,8 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import ParameterSnapshot
-from commissioner.registers.convention import drive_values
+from commissioner.records import ParameterSnapshot, drive_words
+from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
@@ -56,7 +56,7 @@ class Plan:
     run: str
     what: str
     drive_type: str
-    serial_number: int
+    serial_number: int | None
     rows: tuple[PlannedRow, ...]
 
     @property
@@ -88,6 +88,16 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
     ready = _ready(run, url)
     with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
+
+
+def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    ready = _ready(run, url)
+    with _drive(ready) as inverter:
+        snapshot = inverter.snapshot()
+    ours = our_values(ready.profile, snapshot.in_use, ready.plate)
+    held = {one.field: one.value for one in ours.values()}
+    return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
@@ -199,15 +209,12 @@ def _drive(ready: _Ready) -> Iterator[Inverter]:
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
     identity = inverter.identify()
-    if (identity.drive_type, identity.serial_number) != (
-        ready.snapshot.identity.drive_type,
-        ready.snapshot.identity.serial_number,
-    ):
+    if identity.words != ready.snapshot.identity.words:
         raise IdentityMismatch(
             "this is not the drive of the run",
             step=what,
-            value=f"{identity.drive_type} #{identity.serial_number}",
-            limit=f"{ready.snapshot.identity.drive_type} #{ready.snapshot.identity.serial_number}",
+            value=identity.words,
+            limit=ready.snapshot.identity.words,
             remedy="connect the drive that was measured, or measure this one",
         )
     present = inverter.snapshot().in_use
