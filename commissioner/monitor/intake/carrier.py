@@ -12,6 +12,10 @@ from commissioner.records import RunningRecording, Signal
 
 LEAST_RATE = 10.0
 """Samples per carrier period from which a mean over whole periods is the mean of the pulses: edges fall between samples."""
+KNOWN_TO = 0.98
+"""Of the rate: a carrier is found to a fraction of the supply's frequency."""
+LEAST_SAMPLES = 24
+"""In a mean, where the fundamental allows: an edge between two samples is a part of the mean that small."""
 SWITCHED = 0.35
 """Share of the voltage's rms beside its fundamental and slower parts that makes it a switched one."""
 SLOW = 12.0
@@ -46,7 +50,7 @@ def means_over_carrier(recording: RunningRecording) -> tuple[RunningRecording, F
     if found is None:
         return recording, None
     rate = 1.0 / (period * found.frequency_hz)
-    if rate < LEAST_RATE:
+    if rate < KNOWN_TO * LEAST_RATE:
         return recording, Finding(
             "switched_voltage", "refused",
             f"the voltages are those of a switching inverter (carrier {found.frequency_hz / 1e3:.3g} kHz) at {rate:.3g} samples a "
@@ -91,7 +95,8 @@ def _window(carrier_hz: float, period_s: float, fundamental_hz: float) -> int:
     """Samples that hold a whole number of carrier periods best, within a twentieth of the fundamental's period."""
     one = 1.0 / (carrier_hz * period_s)
     most = max(1, min(MOST_PERIODS, int(LONGEST_WINDOW / fundamental_hz * carrier_hz)))
-    choices = [(abs(round(m * one) / one - m) + 0.01 * m, round(m * one)) for m in range(1, most + 1)]
+    enough = [m for m in range(1, most + 1) if m * one >= LEAST_SAMPLES] or [most]
+    choices = [(abs(round(m * one) / one - m) + 0.01 * m, round(m * one)) for m in enough]
     return max(min(choices)[1], 1)
 
 
