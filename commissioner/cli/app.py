@@ -35,6 +35,9 @@ Diagnosed = Annotated[
     bool, typer.Option("--diagnosis/--no-diagnosis", help="End with a diagnosis of the run's own samples.")
 ]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
+Trust = Annotated[
+    str | None, typer.Option("--trust", help="plate | data: which is right where the two contradict each other.")
+]
 Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
 Drive = Annotated[
     str,
@@ -225,6 +228,7 @@ def identify(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     mapping: Map = None,
+    trust: Trust = None,
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
@@ -232,7 +236,7 @@ def identify(
     from commissioner.cli.verbs.identify import identify_and_write
     from commissioner.operations.identify import IdentifyRequest
 
-    request = IdentifyRequest(tuple(files), motor, estimator, mapping)
+    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust)
     if write_back:
         identify_and_write(request, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs, as_json=json)
     else:
@@ -256,13 +260,15 @@ def monitor(
     ] = None,
     inertia: Annotated[float | None, typer.Option("--inertia", help="Total inertia in kg m2, for load torque.")] = None,
     mapping: Map = None,
+    trust: Trust = None,
     json: Json = False,
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
     from commissioner.cli.verbs.monitor import monitor as verb
     from commissioner.operations.monitor import MonitorRequest
 
-    verb(MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping), as_json=json)
+    request = MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping, trust)
+    verb(request, as_json=json)
 
 
 @app.command()
@@ -279,6 +285,7 @@ def diagnose(
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
     mapping: Map = None,
+    trust: Trust = None,
     why: Annotated[
         bool, typer.Option("--why", help="Show every step of the search, with what was gained and wanted.")
     ] = False,
@@ -288,7 +295,7 @@ def diagnose(
     from commissioner.cli.verbs.diagnose import diagnose as verb
     from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json, why=why)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping, trust=trust), as_json=json, why=why)
 
 
 @app.command()
