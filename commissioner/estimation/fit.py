@@ -21,6 +21,8 @@ LARGEST_STEP = 0.7
 """Of a logarithm in one step: a factor of 2."""
 ENDED = 0.05
 """Change of chi-square below which a fit has ended; a name needs 36."""
+SLOW = 0.3
+"""Of the last step's gain: a step that gains more asks for a new Jacobian."""
 EDGE = 2
 """Samples at each end of a window that an interpolated delay has no neighbours for."""
 
@@ -250,41 +252,50 @@ def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots:
     return tuple(out)
 
 
-def refine(problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = 12, first_jacobian: Array | None = None, tolerance: float = ENDED) -> Fit:
-    """Levenberg-Marquardt from `machine`; a given first Jacobian is used for the first step."""
+def refine(
+    problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = 12, first_jacobian: Array | None = None,
+    tolerance: float = ENDED, is_final: bool = True,
+) -> Fit:  # fmt: skip
+    """Levenberg-Marquardt from `machine`; a given first Jacobian is used for the first steps.
+
+    A Jacobian serves as long as steps with it shrink fast (a simulation costs a thirtieth of it). `is_final`: end with a
+    fresh one.
+    """
     parts = residuals(problem, machine)
     rest = fitted_part(problem, parts)
-    chi2, damping, j = float(rest @ rest), 0.0, first_jacobian
-    is_fresh = False
+    chi2, damping, j, is_fresh, before = float(rest @ rest), 0.0, first_jacobian, False, np.inf
     for _ in range(most):
         if j is None:
-            j = jacobian(problem, machine, columns)
-            is_fresh = True
-        step = _step(j, rest, columns, damping)
-        trial = machine.moved(columns, step)
+            j, is_fresh, before = jacobian(problem, machine, columns), True, np.inf
+        trial = machine.moved(columns, _step(j, rest, columns, damping))
         trial_parts = residuals(problem, trial)
         trial_rest = fitted_part(problem, trial_parts)
-        trial_chi2 = float(trial_rest @ trial_rest)
-        if trial_chi2 < chi2:
-            gained = chi2 - trial_chi2
-            machine, parts, rest, chi2 = trial, trial_parts, trial_rest, trial_chi2
+        gained = chi2 - float(trial_rest @ trial_rest)
+        if gained > 0.0:
+            machine, parts, rest, chi2 = trial, trial_parts, trial_rest, chi2 - gained
             damping *= 0.1
             if gained < tolerance * max(chi2 / rest.size, 1.0):
                 break
-            predicted = 1.0 - gained / max(gained + chi2, 1e-30)
-            j = None if (not is_fresh or predicted < 0.999) else j
-            is_fresh = False if j is None else is_fresh
-            continue
-        if not is_fresh:
+            if gained > SLOW * before or before == np.inf and not is_fresh:
+                j = None
+            is_fresh, before = False, gained
+        elif not is_fresh:
+            if j is not None and before < np.inf and -gained < tolerance:
+                break
             j = None
-            continue
-        if trial_chi2 - chi2 < tolerance or damping > 1e6:
+        elif -gained < tolerance or damping > 1e6:
             break
-        damping = max(10.0 * damping, 1e-3)
-    if j is None:
+        else:
+            damping = max(10.0 * damping, 1e-3)
+    if j is None or (is_final and not is_fresh):
         j = jacobian(problem, machine, columns)
     held = held_part(problem, parts)
     return Fit(machine, tuple(columns), chi2, rest, j, float(held @ held), int(held.size))
+
+
+def refreshed(problem: Problem, fit: Fit) -> Fit:
+    """The same fit with the Jacobian of where it ended."""
+    return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
 
 
 def _step(j: Array, rest: Array, columns: Sequence[Column], damping: float) -> Array:
