@@ -22,6 +22,8 @@ class Noise:
     sigma: float
     zero: float
     has_zero: bool
+    total: float = 0.0
+    """Standard deviation of alpha and beta, not whitened, A."""
 
     def white(self, x: Array) -> Array:
         """(..., n, 3) -> (..., n, 2 or 3), unit variance where only chance is left."""
@@ -31,7 +33,8 @@ class Noise:
 
 def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:
     """Of white currents, before a machine is known."""
-    return Noise(np.array([1.0]), float(np.hypot(sigma_a[0], sigma_a[1]) / np.sqrt(2)), sigma_a[2], has_zero)
+    sigma = float(np.hypot(sigma_a[0], sigma_a[1]) / np.sqrt(2))
+    return Noise(np.array([1.0]), sigma, sigma_a[2], has_zero, sigma)
 
 
 def through_machine(shown: Array, sigma_a: tuple[float, float, float], has_zero: bool, rng: np.random.Generator) -> Noise:
@@ -42,4 +45,4 @@ def through_machine(shown: Array, sigma_a: tuple[float, float, float], has_zero:
     lags = np.array([np.sum(x[: n - k] * x[k:]) / n for k in range(ORDER + 1)]) / 2.0
     lags[0] *= 1.0 + 1e-9
     taps = solve_toeplitz(lags[:-1], lags[1:])
-    return Noise(np.concatenate([[1.0], -taps]), float(np.sqrt(lags[0] - taps @ lags[1:])), sigma_a[2], has_zero)
+    return Noise(np.concatenate([[1.0], -taps]), float(np.sqrt(lags[0] - taps @ lags[1:])), sigma_a[2], has_zero, float(np.sqrt(lags[0])))
