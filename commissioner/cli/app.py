@@ -195,7 +195,7 @@ def diagnose(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Standstill recordings of one motor, or tables of locked-rotor or no-load points: columns frequency_hz, "
+            help="Recordings of one motor, at standstill or running (a start tells most), or tables of locked-rotor or no-load points: columns frequency_hz, "
             "voltage_line_v, current_line_a, power_w, and winding_resistance_uv_ohm where it is known."
         ),
     ],

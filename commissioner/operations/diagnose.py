@@ -1,4 +1,4 @@
-"""What the simulation gets wrong about recordings of one motor at standstill, or about tables of test points, by name."""
+"""What the simulation gets wrong about recordings of one motor, at standstill or running, or about tables of test points, by name."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
 from commissioner.operations.intake import require_one_motor, standstill, without_copies
+from commissioner.operations.running import diagnosed, is_running
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
 KEPT = re.compile(r"^accepted (\w+):")
 """How the search says that it takes a cause in."""
@@ -44,11 +46,13 @@ class DiagnoseRequest:
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """`document` is the contract's JSON; of several tables of points, each one's own lies under `tables`. `seen`: None of points."""
+    """`document` is the contract's JSON; of several tables of points, each one's own lies under `tables`. `seen`: of recordings at
+    standstill, `running`: of a running motor."""
 
     document: DiagnosisDocument
     out: Path | None
     seen: Diagnosis | None = None
+    running: RunningDiagnosis | None = None
 
     @property
     def is_refused(self) -> bool:
@@ -75,9 +79,9 @@ class _Search:
 
 
 def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = always) -> Diagnosed:
-    """Recordings together; where all files are tables of test points, each on its own.
+    """Recordings together, of one motor at standstill or running; where all files are tables of test points, each on its own.
 
-    Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor at standstill.
+    Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
     `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
     """
     said = read_mapping(request.mapping) if request.mapping else None
@@ -86,6 +90,9 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
         folder_to_write(request.out)
     if all(is_points_table(list(t.columns)) for t in tables):
         return _points(tables, request.out)
+    if any(is_running(t) for t in tables):
+        document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
+        return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
     return _recordings(tables, request, observe, go_on)
 
 
