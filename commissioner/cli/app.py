@@ -137,7 +137,10 @@ def run(
 @app.command()
 def identify(
     files: Annotated[
-        list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")
+        list[Path],
+        typer.Argument(
+            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE."
+        ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",

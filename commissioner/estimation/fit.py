@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.kernel import STATES, march, tangents
+from commissioner.estimation.kernels.march import STATES, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
+from commissioner.estimation.record import STATES as RECORD_STATES
 from commissioner.estimation.record import Record, Window, between
 
 Array = NDArray[np.float64]
+BUSY = RECORD_STATES.index("transient")
 FIRST = (0, 1, 2, 3)
 """Numbers of a window's first state that are free: both fluxes. (8 is the speed, where the shaft is modelled and already turns.)"""
 LARGEST_STEP = 0.7
@@ -43,13 +45,21 @@ class Column:
 
 @dataclass(frozen=True)
 class Machine:
-    """Numbers in fit coordinates (logarithms of the positive ones), first states (windows, states), knots of the load."""
+    """Numbers in fit coordinates (logarithms of the positive ones), first states (windows, states), knots of the load and their
+    times (windows, knots)."""
 
     theta: Array
     first: Array
     knots: Array
-    knot_s: float
+    knot_times_s: Array
     has_shaft: bool = False
+
+    def places(self, window: int, count: int, period_s: float) -> Array:
+        """Where the samples and what lies between them fall among the window's knots."""
+        if not self.has_shaft:
+            return np.zeros(2 * count - 1)
+        times = self.knot_times_s[window]
+        return np.asarray(np.interp(0.5 * period_s * np.arange(2 * count - 1), times, np.arange(times.size)))
 
     def physical(self) -> Array:
         """As the kernel takes them."""
@@ -78,7 +88,7 @@ class Machine:
             elif column.kind == "x":
                 first[column.window, column.index] += s
             else:
-                knots[column.index] += s
+                knots[column.window, column.index] += s
         return replace(self, theta=theta, first=first, knots=knots)
 
     def with_values(self, values: dict[str, float]) -> Machine:
@@ -90,18 +100,37 @@ class Machine:
         return replace(self, theta=theta)
 
 
-def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0, has_shaft: bool = False, knot_s: float = 0.25) -> Machine:
+def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0, has_shaft: bool = False) -> Machine:
     """Four numbers, nothing added, motors at rest or with the flux of their voltage."""
     theta = np.zeros(COUNT)
     values = dict(DEFAULTS) | dict(zip(NAMES[:4], four, strict=True)) | ({"inertia": inertia} if inertia else {})
-    longest = max(w.time_s[-1] for w in record.windows)
-    knots = np.zeros(max(int(np.ceil(longest / knot_s)) + 2, 2))
+    times = knot_times(record) if has_shaft else np.zeros((len(record.windows), 2))
     first = np.zeros((len(record.windows), STATES))
     for k, w in enumerate(record.windows):
         if not w.is_from_rest:
             first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
             first[k, 8] = (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
-    return Machine(theta, first, knots, knot_s, has_shaft).with_values(values)
+    return Machine(theta, first, np.zeros(times.shape), times, has_shaft).with_values(values)
+
+
+CALM_S, BUSY_S, AROUND_S = 0.15, 5e-3, 0.03
+"""Between knots of an unknown load where nothing changes, and around a load step, which reaches so far."""
+
+
+def knot_times(record: Record) -> Array:
+    """(windows, knots), denser where the current changes after the start; short rows are filled up far beyond the end."""
+    rows = []
+    for w in record.windows:
+        end = float(w.time_s[-1])
+        times = set(np.arange(0.0, end + CALM_S, CALM_S))
+        changes = np.flatnonzero((w.state == BUSY) & (np.roll(w.state, 1) != BUSY))
+        for first in changes:
+            last = first + int(np.argmax(w.state[first:] != BUSY))
+            low, high = w.time_s[first] - AROUND_S, w.time_s[max(last, first)] + AROUND_S
+            times |= set(np.arange(max(low, 0.0), min(high, end), BUSY_S))
+        rows.append(np.array(sorted(times)))
+    widest = max(r.size for r in rows)
+    return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
 
 
 @dataclass(frozen=True)
@@ -143,7 +172,19 @@ def simulate(problem: Problem, machine: Machine) -> list[tuple[Array, Array]]:
     for k, w in enumerate(problem.record.windows):
         run, shaft = np.empty((w.count, 3)), np.empty((w.count, 2))
         x = machine.first[k].copy()
-        march(p, scales, x, w.voltage, w.speed, machine.knots, machine.knot_s, problem.period, machine.has_shaft, run, shaft)
+        march(
+            p,
+            scales,
+            x,
+            w.voltage,
+            w.speed,
+            machine.knots[k],
+            machine.places(k, w.count, problem.period),
+            problem.period,
+            machine.has_shaft,
+            run,
+            shaft,
+        )
         out.append((run, shaft))
     return out
 
@@ -177,8 +218,12 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     p, slope, scales = machine.physical(), machine.slope(), problem.record.scales.as_tuple()
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
-        own = [j for j, c in enumerate(columns) if c.kind != "x" or c.window == k]
-        dp, dx, dk = np.zeros((len(own), COUNT)), np.zeros((len(own), STATES)), np.zeros((len(own), machine.knots.size))
+        own = [j for j, c in enumerate(columns) if c.kind == "p" or c.window == k]
+        dp, dx, dk = (
+            np.zeros((len(own), COUNT)),
+            np.zeros((len(own), STATES)),
+            np.zeros((len(own), machine.knots.shape[1])),
+        )
         for row, j in enumerate(own):
             column = columns[j]
             if column.kind == "p":
@@ -189,8 +234,8 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
                 dk[row, column.index] = 1.0
         run, shaft = np.empty((len(own), u, 3)), np.empty((len(own), u))
         tangents(
-            p, scales, machine.first[k], dp, dx, dk, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1], machine.knots, machine.knot_s,
-            problem.period, machine.has_shaft, run, shaft,
+            p, scales, machine.first[k], dp, dx, dk, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1], machine.knots[k],
+            machine.places(k, u, problem.period), problem.period, machine.has_shaft, run, shaft,
         )  # fmt: skip
         white = np.zeros((len(columns), u, 3 if problem.record.has_zero else 2))
         white[own] = problem.noise.white(np.nan_to_num(run))
@@ -248,7 +293,8 @@ def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots:
         if machine.has_shaft and not w.is_from_rest:
             out.append(Column("x", 8, k))
     if knots:
-        out += [Column("k", j) for j in range(machine.knots.size)]
+        for k, w in enumerate(record.windows):
+            out += [Column("k", j, k) for j, t in enumerate(machine.knot_times_s[k]) if t < w.time_s[-1] + CALM_S]
     return tuple(out)
 
 
@@ -276,7 +322,7 @@ def refine(
             damping *= 0.1
             if gained < tolerance * max(chi2 / rest.size, 1.0):
                 break
-            if gained > SLOW * before or before == np.inf and not is_fresh:
+            if gained > SLOW * before or (before == np.inf and not is_fresh):
                 j = None
             is_fresh, before = False, gained
         elif not is_fresh:
@@ -306,7 +352,9 @@ def _step(j: Array, rest: Array, columns: Sequence[Column], damping: float) -> A
         step = np.linalg.solve(scaled, (j @ rest) / size) / size
     except np.linalg.LinAlgError:
         step = np.linalg.lstsq(scaled, (j @ rest) / size, rcond=None)[0] / size
-    largest = max((abs(s) for c, s in zip(columns, step, strict=True) if c.kind == "p" and c.index in LOGARITHMIC), default=0.0)
+    largest = max(
+        (abs(s) for c, s in zip(columns, step, strict=True) if c.kind == "p" and c.index in LOGARITHMIC), default=0.0
+    )
     return np.asarray(step * min(1.0, LARGEST_STEP / max(largest, 1e-30)))
 
 
@@ -319,7 +367,10 @@ def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
         shaken = np.stack([between(record.sigma_v * rng.standard_normal(w.count)) for _ in range(2)], axis=1)
         noisy.append(replace(w, voltage=w.voltage + shaken))
     clean = replace(machine, theta=machine.theta.copy())
-    plain, moved = simulate(problem, clean), simulate(replace(problem, record=replace(record, windows=tuple(noisy))), clean)
+    plain, moved = (
+        simulate(problem, clean),
+        simulate(replace(problem, record=replace(record, windows=tuple(noisy))), clean),
+    )
     shown = np.concatenate([(b[0] - a[0])[:, :2] for a, b in zip(plain, moved, strict=True)])
     if not np.isfinite(shown).all():
         raise DataRefused(

@@ -37,7 +37,9 @@ def plain_noise(sigma_a: tuple[float, float, float], has_zero: bool) -> Noise:
     return Noise(np.array([1.0]), sigma, sigma_a[2], has_zero, sigma)
 
 
-def through_machine(shown: Array, sigma_a: tuple[float, float, float], has_zero: bool, rng: np.random.Generator) -> Noise:
+def through_machine(
+    shown: Array, sigma_a: tuple[float, float, float], has_zero: bool, rng: np.random.Generator
+) -> Noise:
     """`shown` (n, 2): what the voltage's noise makes of the current. Autoregression of it with the current's own noise."""
     white = np.hypot(sigma_a[0], sigma_a[1]) / np.sqrt(2)
     x = shown + white * rng.standard_normal(shown.shape)
@@ -45,4 +47,10 @@ def through_machine(shown: Array, sigma_a: tuple[float, float, float], has_zero:
     lags = np.array([np.sum(x[: n - k] * x[k:]) / n for k in range(ORDER + 1)]) / 2.0
     lags[0] *= 1.0 + 1e-9
     taps = solve_toeplitz(lags[:-1], lags[1:])
-    return Noise(np.concatenate([[1.0], -taps]), float(np.sqrt(lags[0] - taps @ lags[1:])), sigma_a[2], has_zero, float(np.sqrt(lags[0])))
+    return Noise(
+        np.concatenate([[1.0], -taps]),
+        float(np.sqrt(lags[0] - taps @ lags[1:])),
+        sigma_a[2],
+        has_zero,
+        float(np.sqrt(lags[0])),
+    )

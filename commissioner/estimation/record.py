@@ -71,7 +71,11 @@ def scales_of(plate: Nameplate) -> Scales:
     """Rated peaks and torque of the plate."""
     torque = plate.rated_power_w / (2 * np.pi * plate.rated_speed_rpm / 60.0)
     return Scales(
-        plate.rated_current_peak_a, float(np.sqrt(2 / 3) * plate.rated_voltage_v), plate.rated_frequency_rad_per_s, torque, plate.pole_pairs
+        plate.rated_current_peak_a,
+        float(np.sqrt(2 / 3) * plate.rated_voltage_v),
+        plate.rated_frequency_rad_per_s,
+        torque,
+        plate.pole_pairs,
     )
 
 
@@ -86,20 +90,39 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     sigmas = []
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
-            raise _refused(f"{one.source}: sampled at another rate than the first file", one.sample_period_s, period, "diagnose them one by one")
+            raise _refused(
+                f"{one.source}: sampled at another rate than the first file",
+                one.sample_period_s,
+                period,
+                "diagnose them one by one",
+            )
         current, voltage = _currents(one), _voltages(one)
         _check(one, voltage, scales)
         sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
         if _is_crossed(current, voltage):
-            raise _refused(f"{one.source}: currents and voltages turn against each other", "opposite", "one phase order", "exchange two current channels, or two voltages, with --map")
+            raise _refused(
+                f"{one.source}: currents and voltages turn against each other",
+                "opposite",
+                "one phase order",
+                "exchange two current channels, or two voltages, with --map",
+            )
         if _turns_backwards(voltage):
             current, voltage = current * [1, -1, 1], voltage * [1, -1]
-            remarks.append(f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another.")
+            remarks.append(
+                f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another."
+            )
         windows += _windows(one, current, voltage, plate, has_speed, scales)
     if not windows:
-        raise _refused("no stretch with voltage is long enough", 0.0, f"{LEAST_S} s", "record a start, load steps, or a second of steady running")
+        raise _refused(
+            "no stretch with voltage is long enough",
+            0.0,
+            f"{LEAST_S} s",
+            "record a start, load steps, or a second of steady running",
+        )
     if not has_zero:
-        remarks.append("Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see.")
+        remarks.append(
+            "Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see."
+        )
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
     commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
@@ -146,7 +169,12 @@ def _vector(x: Array) -> Array:
 def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
     if per_period < LEAST_RATE:
-        raise _refused(f"{one.source}: {per_period:.0f} samples a period of the supply are too few", 1.0 / one.sample_period_s, f"{LEAST_RATE * scales.frequency_rad_per_s / 6.283:.0f} samples a second", "record faster: 5 kHz or more")
+        raise _refused(
+            f"{one.source}: {per_period:.0f} samples a period of the supply are too few",
+            1.0 / one.sample_period_s,
+            f"{LEAST_RATE * scales.frequency_rad_per_s / 6.283:.0f} samples a second",
+            "record faster: 5 kHz or more",
+        )
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
@@ -169,7 +197,9 @@ def _is_crossed(current: Array, voltage: Array) -> bool:
     return bool(both[0] * both[1] < 0 and abs(both[1]) > 0.3 * abs(both[0]))
 
 
-def _windows(one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales) -> Iterator[Window]:
+def _windows(
+    one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
+) -> Iterator[Window]:
     """Stretches without gap and with voltage; after a closing the window begins one sample later."""
     finite = np.isfinite(current).all(axis=1) & np.isfinite(voltage).all(axis=1)
     on = np.hypot(*voltage.T) > OFF_VOLTAGE * scales.voltage_v
@@ -185,23 +215,47 @@ def _windows(one: RunningRecording, current: Array, voltage: Array, plate: Namep
         last = first + (int(after[0]) if after.size else usable.size - first)
         closing = first > 0 and not on[first - 1] and not is_break[first]
         threshold = OFF_VOLTAGE * scales.voltage_v
+        begin = int(first)
         if closing:
-            first = int(first + np.argmax(np.hypot(*voltage[first:last].T) > threshold)) + 1
-        if (last - first) * one.sample_period_s < LEAST_S:
+            begin += int(np.argmax(np.hypot(*voltage[first:last].T) > threshold)) + 1
+        if (last - begin) * one.sample_period_s < LEAST_S:
             continue
-        yield _window(one, current, voltage, slice(first, last), plate, has_speed, closing, scales)
+        yield _window(one, current, voltage, slice(begin, int(last)), plate, has_speed, bool(closing), scales)
 
 
-def _window(one: RunningRecording, current: Array, voltage: Array, part: slice, plate: Nameplate, has_speed: bool, closing: bool, scales: Scales) -> Window:
+def _window(
+    one: RunningRecording,
+    current: Array,
+    voltage: Array,
+    part: slice,
+    plate: Nameplate,
+    has_speed: bool,
+    closing: bool,
+    scales: Scales,
+) -> Window:
     time = one.time_s[part] - one.time_s[part.start]
     u = voltage[part]
     if has_speed and one.speed_rad_per_s is not None:
         raw = one.speed_rad_per_s[part] * plate.pole_pairs
-        speed = np.stack([between(_smoothed(raw, SMOOTH_S, 0, one.sample_period_s)), between(_smoothed(raw, SLOPE_S, 1, one.sample_period_s))], axis=1)
+        speed = np.stack(
+            [
+                between(_smoothed(raw, SMOOTH_S, 0, one.sample_period_s)),
+                between(_smoothed(raw, SLOPE_S, 1, one.sample_period_s)),
+            ],
+            axis=1,
+        )
     else:
         speed = np.zeros((2 * time.size - 1, 2))
-    is_from_rest = closing and (not has_speed or abs(speed[: 20, 0].mean()) < 0.02 * scales.frequency_rad_per_s)
-    window = Window(time, current[part], np.stack([between(u[:, 0]), between(u[:, 1])], axis=1), speed, np.zeros(time.size, np.int64), is_from_rest, one.source)
+    is_from_rest = closing and (not has_speed or abs(speed[:20, 0].mean()) < 0.02 * scales.frequency_rad_per_s)
+    window = Window(
+        time,
+        current[part],
+        np.stack([between(u[:, 0]), between(u[:, 1])], axis=1),
+        speed,
+        np.zeros(time.size, np.int64),
+        is_from_rest,
+        one.source,
+    )
     return replace(window, state=_states(window, scales, one.sample_period_s))
 
 

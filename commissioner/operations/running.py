@@ -1,11 +1,11 @@
-"""Recordings of a running motor: which files are, their diagnosis, their identification, their model played."""
+"""Recordings of a running motor: which files are, their diagnosis, their identification, and a model of one played."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -59,13 +59,20 @@ def diagnosed(
     recordings, plate = readable(tables, motor, "diagnose")
 
     def say(step: Step) -> None:
-        words = {"accepted": "helps", "dropped": "is no longer needed", "exchanged": f"gives way to {step.why.replace('_', ' ')}"}
+        words = {
+            "accepted": "helps",
+            "dropped": "is no longer needed",
+            "exchanged": f"gives way to {step.why.replace('_', ' ')}",
+        }
         if step.what in words:
             observe(SearchSaid(f"{step.cause.replace('_', ' ')} {words[step.what]}"))
 
     seen = diagnose(recordings, plate, excluded=excluded, observe=say, go_on=go_on)
     document = as_document(seen)
-    document["remarks"] = [*(f"{Path(r.source).name}: {n.what}." for r in recordings for n in r.notes), *document["remarks"]]
+    document["remarks"] = [
+        *(f"{Path(r.source).name}: {n.what}." for r in recordings for n in r.notes),
+        *document["remarks"],
+    ]
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.page import page_of
@@ -80,6 +87,15 @@ def diagnosed(
             with whole_file(out / name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     return document, seen
+
+
+def identified(tables: Sequence[Table], motor: str | None) -> dict[str, Any]:
+    """The document of an identification from a start, load steps or several steady loads. DataRefused where they cannot carry it."""
+    from commissioner.running.identification import as_document, identify
+
+    recordings, plate = readable(tables, motor, "identify")
+    document = as_document(identify(recordings, plate))
+    return cast("dict[str, Any]", plain(document))
 
 
 def is_running_model(document: Mapping[str, Any]) -> bool:
@@ -100,12 +116,16 @@ def played(
     try:
         machine, scales, plate = machine_of(document, is_plain=is_plain)
     except (KeyError, ValueError, TypeError) as error:
-        raise ConfigurationError(file=source, key="document", value=str(error), expected="a model.json written by `commissioner diagnose`") from error
+        raise ConfigurationError(
+            file=source, key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
+        ) from error
     recording = to_running(read_table(like)) if like is not None else None
     period = recording.sample_period_s if recording is not None else float(document["sample_period_s"])
     columns = play(machine, scales, plate, period, recording, document.get("scenario", {}), noise_a, seed)
     if not all(np.isfinite(x).all() for x in columns.values()):
-        raise ConfigurationError(file=source, key="numbers", value="currents that run away", expected="numbers of a motor")
+        raise ConfigurationError(
+            file=source, key="numbers", value="currents that run away", expected="numbers of a motor"
+        )
     keys = {k: v for k, v in document["nameplate"].items() if isinstance(v, int | float | str)}
     write_table(out, columns, {**keys, "sample_period_s": period})
     return int(columns["time_s"].size), () if is_plain else tuple(document["effects"])

@@ -72,7 +72,9 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     running = _running_model(request.model)
     if running is not None:
         observe(Began("playing"))
-        samples, names = played(running, request.model, request.out, request.like, request.noise_a, request.seed, is_plain=request.plain)
+        samples, names = played(
+            running, request.model, request.out, request.like, request.noise_a, request.seed, is_plain=request.plain
+        )
         return Simulated(str(request.out), samples, 1, names)
     motor = _motor(request.model, request.plain)
     facts = _facts(motor.plate)

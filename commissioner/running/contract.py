@@ -68,9 +68,15 @@ def _excitation(seen: Diagnosis) -> dict[str, Any]:
     from commissioner.estimation.record import STATES
 
     seconds = {
-        name: float(sum((w.state == k).sum() for w in record.windows)) * record.period_s for k, name in enumerate(STATES)
+        name: float(sum((w.state == k).sum() for w in record.windows)) * record.period_s
+        for k, name in enumerate(STATES)
     }
-    return {"seconds": {k: v for k, v in seconds.items() if v}, "has_speed": record.has_speed, "has_three_currents": record.has_zero, "has_start": record.has_start}
+    return {
+        "seconds": {k: v for k, v in seconds.items() if v},
+        "has_speed": record.has_speed,
+        "has_three_currents": record.has_zero,
+        "has_start": record.has_start,
+    }
 
 
 def _cause(c: NamedCause) -> dict[str, Any]:

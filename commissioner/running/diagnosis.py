@@ -26,6 +26,10 @@ UNEXPLAINED_SIGMA, FAR_OFF_SIGMA, LEAST_SHARE = 0.3, 1.0, 0.97
 BURST_SIGMA, BURST_SHARE = 1.0, 0.97
 """The same of the worst 20 ms: a law of another form leaves something in the first cycles of a start."""
 MOST_SURE = 0.99
+HELD_OUT = 0.3
+"""Share of each window that is simulated on and not fitted. None where the load, and so the speed, must be fitted all along."""
+LEAST_ERROR = 0.1
+"""Power of the held-out error over the noise's, below which there is nothing to gain there."""
 
 
 class Verdict(Enum):
@@ -82,7 +86,9 @@ class Diagnosis:
 
     def numbers(self) -> dict[str, float]:
         """Of the final machine, by name; empty where the data were refused."""
-        return dict(zip(NAMES, (float(x) for x in self.found.fit.machine.physical()), strict=True)) if self.found else {}
+        return (
+            dict(zip(NAMES, (float(x) for x in self.found.fit.machine.physical()), strict=True)) if self.found else {}
+        )
 
 
 def diagnose(
@@ -101,7 +107,13 @@ def diagnose(
     """
     try:
         record = prepare(recordings, plate)
-        found = search(problem_of(record), excluded=excluded, rules=rules, observe=observe, go_on=go_on)
+        found = search(
+            problem_of(record, HELD_OUT if record.has_speed else 0.0),
+            excluded=excluded,
+            rules=rules,
+            observe=observe,
+            go_on=go_on,
+        )
     except DataRefused as refusal:
         return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", refusal=refusal)
     return _conclude(record, found, rules)
@@ -114,11 +126,17 @@ def _conclude(record: Record, found: Found, rules: Rules) -> Diagnosis:
     verdict, reason = _verdict(causes, left, gain)
     remarks = list(record.remarks)
     if not found.is_complete:
-        remarks.append("The time allowed was over before every cause was tried: diagnose the recording again without a limit.")
+        remarks.append(
+            "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
+        )
     if not record.has_start:
-        remarks.append("No start in these data: saturation, deep bars, leakage and gains are hard to tell apart without one.")
+        remarks.append(
+            "No start in these data: saturation, deep bars, leakage and gains are hard to tell apart without one."
+        )
     if not record.has_speed:
-        remarks.append("No speed column: the speed is that of a shaft with the fitted load; iron loss and heating of the rotor are hard to see.")
+        remarks.append(
+            "No speed column: the speed is that of a shaft with the fitted load, nothing is held out; iron loss and heating of the rotor are hard to see."
+        )
     return Diagnosis(
         verdict, reason, causes, gain, left, before, _parameters(found.nominal), _parameters(found.fit),
         next_experiment(verdict.value, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
@@ -132,7 +150,7 @@ def _gain(found: Found) -> Gain:
     chi2 = (found.nominal.chi2 - found.nominal.count, found.fit.chi2 - found.fit.count)
     share = 1.0 - max(chi2[1], 0.0) / max(chi2[0], 1e-9) if chi2[0] > 0 and found.accepted else 0.0
     held = None
-    if found.accepted and before > 1.02 * floor:
+    if found.accepted and before**2 > (1.0 + LEAST_ERROR) * floor**2:
         held = 1.0 - max(after**2 - floor**2, 0.0) / (before**2 - floor**2)
     return Gain(held, before or fitted_before, after or fitted_after, floor, float(np.clip(share, 0.0, 1.0)))
 
@@ -175,23 +193,40 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Verd
     is_off = left.sigma > UNEXPLAINED_SIGMA and (not causes or gain.explained_share < LEAST_SHARE)
     in_bursts = left.burst_sigma > BURST_SIGMA and (not causes or gain.explained_share < BURST_SHARE)
     if is_off or in_bursts or left.sigma > FAR_OFF_SIGMA:
-        names = f" The data are consistent with {', '.join(c.name for c in causes)}, but something else is in them too." if causes else ""
+        names = (
+            f" The data are consistent with {', '.join(c.name for c in causes)}, but something else is in them too."
+            if causes
+            else ""
+        )
         where = f" Most of it lies at {left.burst_at_s:.2f} s." if left.burst_sigma > 2.0 * max(left.sigma, 0.1) else ""
         size = max(left.sigma, left.burst_sigma if in_bursts else 0.0)
-        return Verdict.UNEXPLAINED, f"A structured error of {size:.2g} times the noise remains that no cause in the catalogue makes.{where}{names}"
+        return (
+            Verdict.UNEXPLAINED,
+            f"A structured error of {size:.2g} times the noise remains that no cause in the catalogue makes.{where}{names}",
+        )
     if not causes:
         return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
     tied = [c for c in causes if c.equivalent]
     if tied:
-        return Verdict.NOT_DISTINGUISHABLE, f"These data cannot tell apart: {'; '.join(' or '.join((c.name, *c.equivalent)) for c in tied)}."
+        return (
+            Verdict.NOT_DISTINGUISHABLE,
+            f"These data cannot tell apart: {'; '.join(' or '.join((c.name, *c.equivalent)) for c in tied)}.",
+        )
     if left.sigma > 0.0:
-        return Verdict.EXPLAINED, f"The named causes leave {left.sigma:.2g} times the noise, {1.0 - gain.explained_share:.1%} of the error power that there was to explain."
+        return (
+            Verdict.EXPLAINED,
+            f"The named causes leave {left.sigma:.2g} times the noise, {1.0 - gain.explained_share:.1%} of the error power that there was to explain.",
+        )
     return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
 
 
 def _parameters(fit: Fit) -> dict[str, Quantity]:
     out = {}
-    for name, key in zip(NAMES[:4], ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"), strict=True):
+    for name, key in zip(
+        NAMES[:4],
+        ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"),
+        strict=True,
+    ):
         out[key] = Quantity(fit.machine.value(name), fit.std(name))
     time_constant = fit.machine.value("magnetizing_inductance") / fit.machine.value("rotor_resistance")
     covariance = fit.covariance()

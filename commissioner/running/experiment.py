@@ -36,5 +36,9 @@ def next_experiment(verdict: str, causes: Sequence[tuple[str, Sequence[str]]], r
         return Experiment(SEPARATING, (START, STEPS), ("unknown",))
     if verdict == "unexplained":
         again = "repeat the recording with voltage probes exchanged (u for v) and, if it can be, at another voltage"
-        return Experiment(again, (START, "Exchange two voltage probes, tell it with --map, and record the same once more."), ("unknown",))
+        return Experiment(
+            again,
+            (START, "Exchange two voltage probes, tell it with --map, and record the same once more."),
+            ("unknown",),
+        )
     return None

@@ -42,8 +42,16 @@ def scenario(found: Found, record: Record) -> dict[str, Any]:
     machine, scales, plate = found.fit.machine, record.scales, record.plate
     values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
     gamma = Gamma.from_inverse_gamma(InverseGamma(*(values[n] for n in NAMES[:4])))
-    inertia = values["inertia"] if machine.has_shaft else plate.inertia_kg_m2 or 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s
-    effects = {one.cause: entry(values, scales) for one in found.accepted if (entry := CATALOGUE[one.cause].scenario) is not None}
+    inertia = (
+        values["inertia"]
+        if machine.has_shaft
+        else plate.inertia_kg_m2 or 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s
+    )
+    effects = {
+        one.cause: entry(values, scales)
+        for one in found.accepted
+        if (entry := CATALOGUE[one.cause].scenario) is not None
+    }
     return {
         "kind": "running",
         "nameplate": {k: v for k, v in asdict(plate).items() if v is not None and k != "inertia_kg_m2"},
@@ -71,7 +79,7 @@ def machine_of(document: Mapping[str, Any], *, is_plain: bool) -> tuple[Machine,
 
     left_out = {n for names in document["effect_numbers"].values() for n in names} if is_plain else set()
     theta = np.zeros(COUNT)
-    machine = Machine(theta, np.zeros((1, 10)), np.zeros(2), 1e9, bool(document["has_shaft"]))
+    machine = Machine(theta, np.zeros((1, 10)), np.zeros((1, 2)), np.zeros((1, 2)), bool(document["has_shaft"]))
     values = {**DEFAULTS, **{str(n): float(v) for n, v in document["numbers"].items() if n not in left_out}}
     unknown = [n for n in values if n not in AT]
     if unknown:

@@ -60,4 +60,4 @@ def rms_errors(problem: Problem, machine: Machine) -> tuple[float, float]:
         error = (w.current - run)[:, :2]
         fitted.append(error[:u])
         held.append(error[u:])
-    return tuple(float(np.sqrt(np.mean(np.concatenate(x) ** 2))) if sum(map(len, x)) else 0.0 for x in (fitted, held))  # type: ignore[return-value]
+    return tuple(float(np.sqrt(np.mean(np.concatenate(x) ** 2))) if any(map(len, x)) else 0.0 for x in (fitted, held))  # type: ignore[return-value]

@@ -15,8 +15,6 @@ PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
 FOUR = NAMES[:4]
-KNOT_S = 0.1
-"""Between knots of an unknown load torque."""
 LEAST_CHI2 = 1e4
 """Chi-square a sample beyond which nothing has been fitted."""
 
@@ -58,12 +56,12 @@ def _settled(part: Problem, machine: Machine, numbers: tuple[str, ...]) -> Machi
 def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
     """Speed from the shaft: inertia (from a start) and load are fitted too, first to little of the recording, then to more.
 
-    `smooth_load`: constant and fan only, as a start from rest has them. Else knots every tenth of a second.
+    `smooth_load`: constant and fan only, as a start from rest has them. Else knots, denser around load steps.
     """
     record = problem.record
     torque, w = record.scales.torque_nm, record.scales.frequency_rad_per_s / record.scales.pole_pairs
     inertia = record.plate.inertia_kg_m2 or RUN_UP_TORQUE * torque * _run_up_s(record) / w
-    machine = plain_machine(prior(record.plate).typical.as_tuple(), record, inertia=inertia, has_shaft=True, knot_s=KNOT_S)
+    machine = plain_machine(prior(record.plate).typical.as_tuple(), record, inertia=inertia, has_shaft=True)
     numbers: tuple[str, ...] = FOUR
     if record.has_start:
         numbers = (*FOUR, "inertia")
@@ -74,7 +72,12 @@ def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
     if smooth_load:
         numbers = (*numbers, "load_constant", "load_fan")
         return refine(problem, machine, columns_of(numbers, record, machine), most=25)
-    return refine(problem, machine, columns_of((*numbers, "load_ripple_cos", "load_ripple_sin"), record, machine, knots=True), most=25)
+    return refine(
+        problem,
+        machine,
+        columns_of((*numbers, "load_ripple_cos", "load_ripple_sin"), record, machine, knots=True),
+        most=25,
+    )
 
 
 def _run_up_s(record: Record) -> float:
@@ -83,5 +86,3 @@ def _run_up_s(record: Record) -> float:
         if w.is_from_rest:
             return max(float(np.sum(w.state == 1)) * record.period_s, 0.05)
     return 0.3
-
-

@@ -28,11 +28,20 @@ def play(
         machine, problem = _on_mains(machine, scales, plate, period_s, scenario)
     else:
         problem = problem_of(prepare([like], plate), 0.0)
-        first = np.zeros((len(problem.record.windows), machine.first.shape[1]))
-        machine = replace(machine, first=first, has_shaft=not problem.record.has_speed)
+        windows = len(problem.record.windows)
+        first, none = np.zeros((windows, machine.first.shape[1])), np.zeros((windows, 2))
+        machine = replace(
+            machine,
+            first=first,
+            knots=none,
+            knot_times_s=np.tile([0.0, 1e3], (windows, 1)),
+            has_shaft=not problem.record.has_speed,
+        )
     window = problem.record.windows[0]
     run, shaft = simulate(problem, machine)[0]
-    current = np.array([run[:, 0] + run[:, 2], *(run[:, 2] - 0.5 * run[:, 0] + s * np.sqrt(0.75) * run[:, 1] for s in (1.0, -1.0))])
+    current = np.array(
+        [run[:, 0] + run[:, 2], *(run[:, 2] - 0.5 * run[:, 0] + s * np.sqrt(0.75) * run[:, 1] for s in (1.0, -1.0))]
+    )
     current += noise_a * np.random.default_rng(seed).standard_normal(current.shape)
     a, b = window.voltage[::2].T
     volts = (a, -0.5 * a + np.sqrt(0.75) * b, -0.5 * a - np.sqrt(0.75) * b)
@@ -42,7 +51,9 @@ def play(
     return columns | {"speed_rad_per_s": shaft[:, 0] / plate.pole_pairs}
 
 
-def _on_mains(machine: Machine, scales: Scales, plate: Nameplate, period: float, scenario: Mapping[str, Any]) -> tuple[Machine, Problem]:
+def _on_mains(
+    machine: Machine, scales: Scales, plate: Nameplate, period: float, scenario: Mapping[str, Any]
+) -> tuple[Machine, Problem]:
     """A start and two load steps on symmetric mains of the plate, with the shaft of the scenario."""
     count = round(SECONDS / period)
     t = np.arange(count) * period
@@ -50,8 +61,14 @@ def _on_mains(machine: Machine, scales: Scales, plate: Nameplate, period: float,
     voltage = np.stack([between(u.real), between(u.imag)], axis=1)
     window = Window(t, np.zeros((count, 3)), voltage, np.zeros((2 * count - 1, 2)), np.zeros(count, np.int64), True)
     record = Record((window,), period, scales, plate, False, True, False, (1.0, 1.0, 1.0), 0.0)
-    inertia = float(scenario.get("machine", {}).get("inertia_kg_m2", 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s))
-    knots = 0.1 + 0.4 * (np.arange(round(SECONDS / 0.05) + 2) * 0.05 >= 1.0) + 0.4 * (np.arange(round(SECONDS / 0.05) + 2) * 0.05 >= 2.0)
-    knots[0:8] = 0.0
-    moved = replace(machine, has_shaft=True, knots=knots, knot_s=0.05, first=np.zeros((1, machine.first.shape[1])))
+    inertia = float(
+        scenario.get("machine", {}).get(
+            "inertia_kg_m2", 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s
+        )
+    )
+    times = np.array([[0.0, 0.3, 0.4, 1.0, 1.01, 2.0, 2.01, SECONDS]])
+    knots = np.array([[0.0, 0.0, 0.1, 0.1, 0.5, 0.5, 0.9, 0.9]])
+    moved = replace(
+        machine, has_shaft=True, knots=knots, knot_times_s=times, first=np.zeros((1, machine.first.shape[1]))
+    )
     return moved.with_values({"inertia": inertia}), problem_of(record, 0.0)

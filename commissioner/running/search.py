@@ -145,7 +145,15 @@ def search(
     fit, accepted = _backward(seeking, fit, accepted)
     gain, rivals = _judged(seeking, fit, accepted)
     return Found(
-        seeking.problem, seeking.base, fit, accepted, gain, rivals, _limits(seeking, fit, accepted), tuple(seeking.steps), is_complete
+        seeking.problem,
+        seeking.base,
+        fit,
+        accepted,
+        gain,
+        rivals,
+        _limits(seeking, fit, accepted),
+        tuple(seeking.steps),
+        is_complete,
     )
 
 
@@ -280,7 +288,9 @@ def _canonical(a: Array, b: Array) -> float:
     return float(np.linalg.svd(qa.T @ qb, compute_uv=False).max(initial=0.0))
 
 
-def _judged(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+def _judged(
+    seeking: Search, fit: Fit, accepted: Sequence[Named]
+) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Of each cause: chi-square that comes back without it, and what each rival in its place loses."""
     gain, rivals = {}, {}
     for k, one in enumerate(accepted):

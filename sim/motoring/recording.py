@@ -47,7 +47,10 @@ def _table(kind: Any, table: dict[str, Any], source: str, where: str) -> Any:
     for key in table:
         if key not in fields:
             raise ValueError(f"{source}: unknown key {where}.{key}; known: {', '.join(sorted(fields))}")
-    values = {k: tuple(tuple(x) if isinstance(x, list) else x for x in v) if isinstance(v, list) else v for k, v in table.items()}
+    values = {
+        k: tuple(tuple(x) if isinstance(x, list) else x for x in v) if isinstance(v, list) else v
+        for k, v in table.items()
+    }
     try:
         return kind(**values)
     except TypeError as error:
@@ -90,7 +93,12 @@ def answer_key(scenario: Scenario, played: Played, seed: int) -> dict[str, Any]:
         },
         "inertia_kg_m2": machine.inertia_kg_m2,
         "effects": [
-            {"name": e.name, "size": e.size, "phase": "uvw"[e.phase], "unit": CATALOGUE[e.name].unit if e.name in CATALOGUE else ""}
+            {
+                "name": e.name,
+                "size": e.size,
+                "phase": "uvw"[e.phase],
+                "unit": CATALOGUE[e.name].unit if e.name in CATALOGUE else "",
+            }
             for e in scenario.effects
         ],
         "final_speed_rad_per_s": float(played.speed_rad_per_s[tail].mean()),

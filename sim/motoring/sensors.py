@@ -29,7 +29,10 @@ def sensed(scenario: Scenario, played: Played, rng: np.random.Generator) -> Colu
         current = np.interp(late, played.time_s, current.real) + 1j * np.interp(late, played.time_s, current.imag)
     time = played.time_s[every]
     phases = np.real(np.conj(PHASES)[:, None] * current[every])
-    for name, change in (("sensor_gain_mismatch", lambda x, d: x * (1 + d)), ("sensor_offset", lambda x, d: x + d * peak)):
+    for name, change in (
+        ("sensor_gain_mismatch", lambda x, d: x * (1 + d)),
+        ("sensor_offset", lambda x, d: x + d * peak),
+    ):
         if name in effects:
             e = effects[name]
             phases[e.phase] = change(phases[e.phase], e.size)

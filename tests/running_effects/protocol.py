@@ -29,7 +29,9 @@ Row = dict[str, Any]
 
 def plan(nulls: int, others: int) -> list[Case]:
     """Nulls, then of five others: two singles, one pair, one absent or tied, one single elsewhere (ramp, no speed, steady)."""
-    cases = [Case(FIRST_SEED + k, "null", "ramp" if k % 8 == 7 else "start", has_speed=k % 8 != 6) for k in range(nulls)]
+    cases = [
+        Case(FIRST_SEED + k, "null", "ramp" if k % 8 == 7 else "start", has_speed=k % 8 != 6) for k in range(nulls)
+    ]
     for k in range(others):
         seed = FIRST_SEED + 1000 + k
         slot, turn = k % 5, k // 5
@@ -73,7 +75,12 @@ def _said(seen: Diagnosis) -> Row:
         "burst": seen.left.burst_sigma if seen.left else None,
         "held_out": seen.gain.held_out if seen.gain else None,
         "causes": [
-            {"name": c.name, "equivalent": list(c.equivalent), "size": next(iter(c.sizes.items())), "delta_chi2": c.delta_chi2}
+            {
+                "name": c.name,
+                "equivalent": list(c.equivalent),
+                "size": next(iter(c.sizes.items())),
+                "delta_chi2": c.delta_chi2,
+            }
             for c in seen.causes
         ],
     }
@@ -158,11 +165,17 @@ def failures(rows: list[Row]) -> list[str]:
         if "error" in r:
             out.append(f"{r['stratum']} {r['seed']}: raised {r['error'].strip().splitlines()[-1]}")
             continue
-        missed = [e["name"] for e in r["truth"] if r["stratum"] in ("one", "two") and not e["in_class"] and (e["strength"] or 0) >= MATERIAL]
+        missed = [
+            e["name"]
+            for e in r["truth"]
+            if r["stratum"] in ("one", "two") and not e["in_class"] and (e["strength"] or 0) >= MATERIAL
+        ]
         wrong = false_names(r) if r["stratum"] != "absent" else []
         if missed or wrong or (r["stratum"] == "null" and r["verdict"] != "nothing_significant"):
             true = ", ".join(f"{e['name']} {e['size']:.3g}" for e in r["truth"])
-            out.append(f"{r['stratum']} {r['seed']} ({r['course']}, {r['power_w']:.0f} W): true {true or 'none'}; said {r['verdict']} {[c['name'] for c in r['causes']]}, missed {missed}")
+            out.append(
+                f"{r['stratum']} {r['seed']} ({r['course']}, {r['power_w']:.0f} W): true {true or 'none'}; said {r['verdict']} {[c['name'] for c in r['causes']]}, missed {missed}"
+            )
     return out
 
 

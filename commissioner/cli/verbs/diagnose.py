@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from commissioner.cli.screens.diagnosis import show
-from commissioner.cli.screens.running import show as show_running
 from commissioner.cli.screens.diagnosis_progress import Progress
+from commissioner.cli.screens.running import show as show_running
 from commissioner.cli.screens.screen import emit
 from commissioner.errors import DataRefused
 from commissioner.operations.diagnose import DiagnoseRequest

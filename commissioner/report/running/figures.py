@@ -62,7 +62,9 @@ def over_time(found: Found) -> Figure:
     ):
         square = np.mean(residuals(found.problem, machine)[0] ** 2, axis=1)
         usable = square[: square.size // block * block].reshape(-1, block).mean(axis=1)
-        panel.step(window.time_s[: usable.size * block : block], np.sqrt(usable), where="post", color=colour, label=label)
+        panel.step(
+            window.time_s[: usable.size * block : block], np.sqrt(usable), where="post", color=colour, label=label
+        )
     shades = {"start": RED, "transient": GREEN}
     for name, colour in shades.items():
         chosen = (window.state == STATES.index(name)).astype(int)

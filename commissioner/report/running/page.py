@@ -34,9 +34,20 @@ NAMES = (
 def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
     """One self-contained page."""
     rows = actions(document)
-    parts = [Section("What it means", [*meaning(document), *([Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else [])])]
+    parts = [
+        Section(
+            "What it means",
+            [*meaning(document), *([Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else [])],
+        )
+    ]
     if seen.found is not None:
-        parts += [_causes(document), *_next(document), _where(seen, document), _not_found(document), _parameters(document)]
+        parts += [
+            _causes(document),
+            *_next(document),
+            _where(seen, document),
+            _not_found(document),
+            _parameters(document),
+        ]
     parts.append(Section("The data", [_excitation(document), *document["remarks"]]))
     return Page(f"Diagnosis of a running motor: {name}", headline(document), tone(document), _facts(document), parts,
                 "± holds the true value in 19 of 20 cases. Sizes are SI, per phase of the star equivalent.")  # fmt: skip
@@ -62,11 +73,31 @@ def _causes(document: Document) -> Section:
     for c in document["causes"]:
         sizes = "; ".join(f"{spoken(k)} {quantity(v)}" for k, v in c["parameters"].items())
         rivals = sorted(c["alternatives"].items(), key=lambda item: float(item[1]))
-        best = next((f"{spoken(n)}, {100 * (1 - lost / c['delta_chi2']):.0f} % of it" for n, lost in rivals if n not in c["equivalent"]), "none near")
-        rows.append((class_name(c), c["form"], sizes, f"{100 * c['gain_share']:.1f} %", f"{number(c['strength_over_noise'])} x noise", f"{100 * c['confidence']:.0f} %", best))
+        best = next(
+            (
+                f"{spoken(n)}, {100 * (1 - lost / c['delta_chi2']):.0f} % of it"
+                for n, lost in rivals
+                if n not in c["equivalent"]
+            ),
+            "none near",
+        )
+        rows.append(
+            (
+                class_name(c),
+                c["form"],
+                sizes,
+                f"{100 * c['gain_share']:.1f} %",
+                f"{number(c['strength_over_noise'])} x noise",
+                f"{100 * c['confidence']:.0f} %",
+                best,
+            )
+        )
         tones.append("warn" if c["equivalent"] or c["confidence"] < 0.8 else "good")
     header = ("cause", "form", "size", "part of the error", "strength", "sure of the name", "best rival explains")
-    notes = [f"{CATALOGUE[c['name']].title}: {CATALOGUE[c['name']].physics}. Source: {CATALOGUE[c['name']].source}." for c in document["causes"]]
+    notes = [
+        f"{CATALOGUE[c['name']].title}: {CATALOGUE[c['name']].physics}. Source: {CATALOGUE[c['name']].source}."
+        for c in document["causes"]
+    ]
     return Section("Causes", [Table(header, rows, tones), *notes])
 
 
@@ -74,7 +105,9 @@ def _next(document: Document) -> list[Section]:
     plan = document["next_experiment"]
     if not plan:
         return []
-    return [Section("What to measure next", [f"{k}. {step}" for k, step in enumerate(plan["steps"], 1)] + [plan["command"]])]
+    return [
+        Section("What to measure next", [f"{k}. {step}" for k, step in enumerate(plan["steps"], 1)] + [plan["command"]])
+    ]
 
 
 def _where(seen: Diagnosis, document: Document) -> Section:
@@ -84,9 +117,15 @@ def _where(seen: Diagnosis, document: Document) -> Section:
     return Section(
         "Where the simulation is wrong",
         [
-            picture(figures.over_each_other(found), "Measured and simulated current over each other, and what each simulation leaves."),
+            picture(
+                figures.over_each_other(found),
+                "Measured and simulated current over each other, and what each simulation leaves.",
+            ),
             picture(figures.over_time(found), "What is left over the noise, every 20 ms; 1 is chance."),
-            picture(figures.over_frequency(found), "What is left over frequency, 0 dB is chance. Left half: negative sequence."),
+            picture(
+                figures.over_frequency(found),
+                "What is left over frequency, 0 dB is chance. Left half: negative sequence.",
+            ),
             f"Left over the noise, by state: {states}." if states else "",
         ],
     )
@@ -98,7 +137,16 @@ def _not_found(document: Document) -> Section:
         (spoken(k), quantity({"value": v["value"], "std": None, "unit": v["unit"]}), CATALOGUE[k].signature)
         for k, v in document["detection_limits"].items() if k not in apart
     ]  # fmt: skip
-    return Section("Looked for and not found", [Table(("looked for", "smallest detectable", "where it would show"), rows, caption="Six standard deviations beside the named causes.")])
+    return Section(
+        "Looked for and not found",
+        [
+            Table(
+                ("looked for", "smallest detectable", "where it would show"),
+                rows,
+                caption="Six standard deviations beside the named causes.",
+            )
+        ],
+    )
 
 
 def _parameters(document: Document) -> Section:
@@ -106,9 +154,14 @@ def _parameters(document: Document) -> Section:
     for key, title, scale, unit in NAMES:
         before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
         if before and after:
-            values = [f"{number(x['value'] * scale, 4)} ± {number(1.96 * x['std'] * scale, 2)} {unit}" for x in (before, after)]
+            values = [
+                f"{number(x['value'] * scale, 4)} ± {number(1.96 * x['std'] * scale, 2)} {unit}"
+                for x in (before, after)
+            ]
             rows.append((title, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
-    return Section("The machine's numbers", [Table(("", "plain simulation", "with the causes", "plain one was off by"), rows)])
+    return Section(
+        "The machine's numbers", [Table(("", "plain simulation", "with the causes", "plain one was off by"), rows)]
+    )
 
 
 def _excitation(document: Document) -> str:

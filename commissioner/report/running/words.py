@@ -97,4 +97,11 @@ def actions(document: Document) -> list[tuple[str, str]]:
         for c in document["causes"]
     ]  # fmt: skip
     plan = document["next_experiment"]
-    return [*rows, *([("next test", f"To tell {' from '.join(spoken(n) for n in plan['splits'])}: {plan['do']}.")] if plan else [])]
+    return [
+        *rows,
+        *(
+            [("next test", f"To tell {' from '.join(spoken(n) for n in plan['splits'])}: {plan['do']}.")]
+            if plan
+            else []
+        ),
+    ]

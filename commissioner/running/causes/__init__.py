@@ -30,9 +30,7 @@ CATALOGUE: dict[str, Cause] = {
 def confounders_of(name: str) -> dict[str, str]:
     """Who may look the same, with what tells them apart; stated in one file, known both ways."""
     own = {c.name: c.told_apart_by for c in CATALOGUE[name].confounders}
-    for other in CATALOGUE.values():
-        own |= {other.name: c.told_apart_by for c in other.confounders if c.name == name}
-    return own
+    return own | {o.name: c.told_apart_by for o in CATALOGUE.values() for c in o.confounders if c.name == name}
 
 
 def always_tied(name: str) -> tuple[str, ...]:

@@ -24,8 +24,12 @@ CAUSE = Cause(
     sizes=_sizes,
     range=(0.0, 1e7),
     confounders=(
-        Confounder("speed_sensor_gain", "count an encoder's pulses over a known number of turns, or read the shaft's power"),
+        Confounder(
+            "speed_sensor_gain", "count an encoder's pulses over a known number of turns, or read the shaft's power"
+        ),
         Confounder("sampling_delay", "a second load, or a start"),
     ),
-    scenario=lambda v, s: {"size": _sizes(v, s)["loss_at_rated_voltage_w"][0] / (s.torque_nm * s.frequency_rad_per_s / s.pole_pairs)},
+    scenario=lambda v, s: {
+        "size": _sizes(v, s)["loss_at_rated_voltage_w"][0] / (s.torque_nm * s.frequency_rad_per_s / s.pole_pairs)
+    },
 )

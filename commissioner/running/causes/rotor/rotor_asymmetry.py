@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from commissioner.estimation.numbers import Scales
-from commissioner.running.causes.cause import Cause, Confounder, Form, Sizes, Values
+from commissioner.running.causes.cause import Cause, Form, Sizes, Values
 
 
 def _sizes(v: Values, _: Scales) -> Sizes:

@@ -16,7 +16,9 @@ CAUSE = Cause(
     forms=(Form("", ("delay",)),),
     sizes=lambda v, s: {"delay_us": (1e6 * v["delay"], "us")},
     range=(-2000.0, 2000.0),
-    confounders=(Confounder("sensor_lag", "a step of known current into the sensor on the bench", is_always_tied=True),),
+    confounders=(
+        Confounder("sensor_lag", "a step of known current into the sensor on the bench", is_always_tied=True),
+    ),
     scenario=lambda v, s: {"size": v["delay"]},
     is_of_measurement=True,
 )

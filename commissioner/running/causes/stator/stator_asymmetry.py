@@ -16,7 +16,7 @@ def _sizes(v: Values, _: Scales) -> Sizes:
 
 
 def _scenario(v: Values, s: Scales) -> dict[str, float]:
-    (name, (size, _)), = _sizes(v, s).items()
+    ((name, (size, _)),) = _sizes(v, s).items()
     return {"size": size, "phase": PHASES.index(name.split("_")[2])}
 
 
@@ -43,7 +43,10 @@ CAUSE = Cause(
     range=(0.0, 2.0),
     allows=_is_loop,
     confounders=(
-        Confounder("voltage_gain_mismatch", "a start; or exchange two voltage probes and record again: what follows the probe is the probe's"),
+        Confounder(
+            "voltage_gain_mismatch",
+            "a start; or exchange two voltage probes and record again: what follows the probe is the probe's",
+        ),
         Confounder("line_resistance", "a start, or two loads"),
     ),
     scenario=_scenario,

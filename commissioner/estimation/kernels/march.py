@@ -14,7 +14,7 @@ from numba import njit
 from commissioner.compiled import forget_stale_kernels
 from commissioner.estimation.numbers import AT
 
-forget_stale_kernels(__file__.rpartition("/")[0] or ".", "compiled.py")
+forget_stale_kernels(__file__.replace("\\", "/").rpartition("/")[0], "numbers.py")
 
 FAST = {"reassoc", "arcp", "contract", "nsz"}
 _kernel = njit(cache=True, error_model="numpy", fastmath=FAST, nogil=True)
@@ -22,10 +22,28 @@ _inlined = njit(inline="always", error_model="numpy", fastmath=FAST)
 
 STATES = 10
 """psi_s, psi_R, current of the bars' slow part, heat of stator and rotor, electrical speed and angle."""
-R_S, R_R, L_SIGMA, L_M = AT["stator_resistance"], AT["rotor_resistance"], AT["leakage_inductance"], AT["magnetizing_inductance"]
+R_S, R_R, L_SIGMA, L_M = (
+    AT["stator_resistance"],
+    AT["rotor_resistance"],
+    AT["leakage_inductance"],
+    AT["magnetizing_inductance"],
+)
 SAT_S, SAT_R = AT["stator_saturation_1"], AT["rotor_saturation_1"]
-SOFT, KNEE, BAR, CORNER, IRON = AT["leakage_softness"], AT["leakage_knee"], AT["bar_resistance"], AT["bar_corner"], AT["iron_conductance"]
-HEAT_S, HEAT_R, CAGE, LOOP, LINE = AT["stator_heat"], AT["rotor_heat"], AT["cage_asymmetry_re"], AT["loop_conductance_u"], AT["line_re"]
+SOFT, BOW, KNEE, BAR, CORNER, IRON = (
+    AT["leakage_softness"],
+    AT["leakage_bend"],
+    AT["leakage_knee"],
+    AT["bar_resistance"],
+    AT["bar_corner"],
+    AT["iron_conductance"],
+)
+HEAT_S, HEAT_R, CAGE, LOOP, LINE = (
+    AT["stator_heat"],
+    AT["rotor_heat"],
+    AT["cage_asymmetry_re"],
+    AT["loop_conductance_u"],
+    AT["line_re"],
+)
 DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["voltage_gain_re"], AT["voltage_offset_re"]
 W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
 GAIN, OFFSET = AT["current_gain_v"], AT["current_offset_u"]
@@ -36,11 +54,11 @@ HALF_3 = 0.5 * np.sqrt(3.0)
 
 
 @_kernel
-def march(p, scales, x, voltage, speed, knots, knot_s, period, is_free, out, shaft):
+def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, shaft):
     """Stator current (n, 3: alpha, beta, zero as the sensors show it) into `out`, speed and torque into `shaft` (n, 2).
 
     `voltage` (2n - 1, 2) and `speed` (2n - 1, 2: electrical speed, its derivative) at samples and between them; with
-    `is_free` the speed follows from the shaft and a load torque of `knots` (of rated torque), one every `knot_s`.
+    `is_free` the speed follows from the shaft and a load torque between `knots` (of rated torque), at `places` (2n - 1) among them.
     `x` is the state at the first sample and is overwritten. Types follow `p`.
     """
     current, volt, w_n, torque_n, pairs = scales
@@ -96,7 +114,8 @@ def march(p, scales, x, voltage, speed, knots, knot_s, period, is_free, out, sha
             la, lb = (y[0] - y[2]) * per_leak, (y[1] - y[3]) * per_leak
             if has_soft:
                 z = ((y[0] - y[2]) ** 2 + (y[1] - y[3]) ** 2) * per_knee2
-                grown = 1.0 + p[SOFT] * z / (1.0 + z)
+                z = z / (1.0 + z)
+                grown = 1.0 + p[SOFT] * z * (1.0 + p[BOW] * z)
                 la, lb = la * grown, lb * grown
             main_a, main_b = y[2] * per_main, y[3] * per_main
             if has_r:
@@ -117,7 +136,9 @@ def march(p, scales, x, voltage, speed, knots, knot_s, period, is_free, out, sha
                 for j in range(3):
                     ca = 1.0 if j == 0 else -0.5
                     cb = 0.0 if j == 0 else (HALF_3 if j == 1 else -HALF_3)
-                    one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (y[0] * ca + y[1] * cb)
+                    one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (
+                        y[0] * ca + y[1] * cb
+                    )
                     ia, ib = ia + loop_scale * one_loop * ca, ib + loop_scale * one_loop * cb
             r_s = p[R_S] * (1.0 + p[HEAT_S] * y[6])
             if iron != 0.0:
@@ -161,9 +182,8 @@ def march(p, scales, x, voltage, speed, knots, knot_s, period, is_free, out, sha
             if is_free:
                 torque = 1.5 * pairs * (y[2] * lb - y[3] * la)
                 share = w / w_n
-                place = 0.5 * m * period / knot_s
-                low = min(int(place), knots.shape[0] - 2)
-                part = place - low
+                low = min(int(places[m]), knots.shape[0] - 2)
+                part = places[m] - low
                 load = knots[low] * (1.0 - part) + knots[low + 1] * part
                 load += p[CONSTANT] * share / np.sqrt(share * share + 1e-4) + p[FAN] * share * share
                 load += p[RIPPLE] * np.cos(y[9] / pairs) + p[RIPPLE + 1] * np.sin(y[9] / pairs)
@@ -206,14 +226,14 @@ def _chain(p, current, period, out):
 
 
 @_kernel
-def tangents(p, scales, x0, dp, dx, dk, voltage, speed, knots, knot_s, period, is_free, out, dshaft):
+def tangents(p, scales, x0, dp, dx, dk, voltage, speed, knots, places, period, is_free, out, dshaft):
     """Derivatives along directions (C, ...) of parameters, first state and knots; `out` (C, n, 3) and `dshaft` (C, n)."""
     step = 1e-30
     n = out.shape[1]
     run, shaft = np.empty((n, 3), dtype=np.complex128), np.empty((n, 2), dtype=np.complex128)
     for c in range(out.shape[0]):
         march(
-            p + 1j * step * dp[c], scales, x0 + 1j * step * dx[c], voltage, speed, knots + 1j * step * dk[c], knot_s, period,
+            p + 1j * step * dp[c], scales, x0 + 1j * step * dx[c], voltage, speed, knots + 1j * step * dk[c], places, period,
             is_free, run, shaft,
         )  # fmt: skip
         for q in range(n):
