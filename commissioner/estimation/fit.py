@@ -13,7 +13,7 @@ from commissioner.estimation.kernels.march import STATES, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
 from commissioner.estimation.record import STATES as RECORD_STATES
-from commissioner.estimation.record import Record, Window, between
+from commissioner.estimation.record import Record, between, first_part
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
@@ -148,15 +148,8 @@ class Problem:
     def cut(self, seconds: float) -> Problem:
         """Only so much of each window, for a fit that begins with little."""
         shorter = tuple(min(u, max(round(seconds / self.period), 60)) for u in self.until)
-        windows = tuple(_head(w, u) for w, u in zip(self.record.windows, shorter, strict=True))
+        windows = tuple(first_part(w, u) for w, u in zip(self.record.windows, shorter, strict=True))
         return replace(self, record=replace(self.record, windows=windows), until=shorter)
-
-
-def _head(w: Window, count: int) -> Window:
-    return replace(
-        w, time_s=w.time_s[:count], current=w.current[:count], voltage=w.voltage[: 2 * count - 1], speed=w.speed[: 2 * count - 1],
-        state=w.state[:count],
-    )  # fmt: skip
 
 
 def problem_of(record: Record, held_out: float = 0.3) -> Problem:

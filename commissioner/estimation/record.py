@@ -24,6 +24,8 @@ SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
 """Shortest window; fewest samples a period of the supply."""
+MOST_SAMPLES = 60_000
+"""Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
 NOISY_VOLTAGE = 0.15
 """Sample-to-sample noise over rated peak beyond which a voltage is pulses, not a waveform."""
 
@@ -119,6 +121,10 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             f"{LEAST_S} s",
             "record a start, load steps, or a second of steady running",
         )
+    if sum(w.count for w in windows) > MOST_SAMPLES:
+        most = MOST_SAMPLES // len(windows)
+        windows = [first_part(w, min(most, w.count)) for w in windows]
+        remarks.append(f"Of each stretch the first {most * period:.3g} s are used.")
     if not has_zero:
         remarks.append(
             "Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see."
@@ -257,6 +263,14 @@ def _window(
         one.source,
     )
     return replace(window, state=_states(window, scales, one.sample_period_s))
+
+
+def first_part(w: Window, count: int) -> Window:
+    """The window's first samples."""
+    return replace(
+        w, time_s=w.time_s[:count], current=w.current[:count], voltage=w.voltage[: 2 * count - 1], speed=w.speed[: 2 * count - 1],
+        state=w.state[:count],
+    )  # fmt: skip
 
 
 def _smoothed(x: Array, span_s: float, order: int, period: float) -> Array:

@@ -28,6 +28,8 @@ BURST_SIGMA, BURST_SHARE = 1.0, 0.97
 MOST_SURE = 0.99
 HELD_OUT = 0.3
 """Share of each window that is simulated on and not fitted. None where the load, and so the speed, must be fitted all along."""
+MOSTLY_GUESSES = 0.8
+"""Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
 LEAST_ERROR = 0.1
 """Power of the held-out error over the noise's, below which there is nothing to gain there."""
 
@@ -125,6 +127,11 @@ def _conclude(record: Record, found: Found, rules: Rules) -> Diagnosis:
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain)
     remarks = list(record.remarks)
+    if verdict is Verdict.UNEXPLAINED and causes and gain.explained_share < MOSTLY_GUESSES:
+        guesses = ", ".join(c.name.replace("_", " ") for c in causes)
+        remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
+        causes = ()
+        verdict, reason = _verdict(causes, left, gain)
     if not found.is_complete:
         remarks.append(
             "The time allowed was over before every cause was tried: diagnose the recording again without a limit."

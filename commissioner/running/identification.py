@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
-from commissioner.estimation.record import STATES, Record, Window, prepare
+from commissioner.estimation.record import STATES, Record, first_part, prepare
 from commissioner.motor.circuit import InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -90,15 +90,8 @@ def _until_first_step(record: Record) -> Record:
             after_start > np.flatnonzero(w.state == STATES.index("steady")).min(initial=w.count) + quiet
         ]
         end = int(later[0]) - round(0.04 / record.period_s) if later.size else w.count
-        windows.append(_first(w, max(end, round(0.2 / record.period_s))) if w.is_from_rest else w)
+        windows.append(first_part(w, max(end, round(0.2 / record.period_s))) if w.is_from_rest else w)
     return replace(record, windows=tuple(windows))
-
-
-def _first(w: Window, count: int) -> Window:
-    return replace(
-        w, time_s=w.time_s[:count], current=w.current[:count], voltage=w.voltage[: 2 * count - 1], speed=w.speed[: 2 * count - 1],
-        state=w.state[:count],
-    )  # fmt: skip
 
 
 def _of_four(fit: Fit) -> Array:
