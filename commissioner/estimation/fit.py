@@ -12,8 +12,8 @@ from commissioner.errors import DataRefused
 from commissioner.estimation.kernels.march import STATES, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
+from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
 from commissioner.estimation.record import STATES as RECORD_STATES
-from commissioner.estimation.record import Record, between, first_part
 
 Array = NDArray[np.float64]
 BUSY = RECORD_STATES.index("transient")
@@ -352,13 +352,16 @@ def _step(j: Array, rest: Array, columns: Sequence[Column], damping: float) -> A
 
 
 def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
-    """The same problem, weighted by what noise of voltage and current leaves in this machine's residual."""
+    """The same problem, weighted by what noise of voltage, speed and current leaves in this machine's residual."""
     record = problem.record
     rng = np.random.default_rng(seed)
     noisy = []
     for w in record.windows:
         shaken = np.stack([between(record.sigma_v * rng.standard_normal(w.count)) for _ in range(2)], axis=1)
-        noisy.append(replace(w, voltage=w.voltage + shaken))
+        speed = w.speed.copy()
+        if record.sigma_w:
+            speed[:, 0] += between(smoothed(record.sigma_w * rng.standard_normal(w.count), SMOOTH_S, 0, problem.period))
+        noisy.append(replace(w, voltage=w.voltage + shaken, speed=speed))
     clean = replace(machine, theta=machine.theta.copy())
     plain, moved = (
         simulate(problem, clean),

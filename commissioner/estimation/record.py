@@ -50,7 +50,8 @@ class Window:
 
 @dataclass(frozen=True)
 class Record:
-    """Windows of one motor. `has_zero`: three currents were measured; `sigma`: white noise of alpha, beta, zero, of u alpha, beta."""
+    """Windows of one motor. `has_zero`: three currents were measured; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
+    of the electrical speed before smoothing."""
 
     windows: tuple[Window, ...]
     period_s: float
@@ -61,6 +62,7 @@ class Record:
     is_commanded: bool
     sigma_a: tuple[float, float, float]
     sigma_v: float
+    sigma_w: float = 0.0
     remarks: tuple[str, ...] = ()
 
     @property
@@ -134,8 +136,16 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
     return Record(
         tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
-        float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)), tuple(remarks),
+        float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
+        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks),
     )  # fmt: skip
+
+
+def _speed_noise(recordings: Sequence[RunningRecording], plate: Nameplate) -> float:
+    """Of the electrical speed, rad/s."""
+    return float(
+        np.median([noise_of(r.speed_rad_per_s) * plate.pole_pairs for r in recordings if r.speed_rad_per_s is not None])
+    )
 
 
 def _refused(what: str, value: object, limit: object, remedy: str) -> DataRefused:
@@ -245,8 +255,8 @@ def _window(
         raw = one.speed_rad_per_s[part] * plate.pole_pairs
         speed = np.stack(
             [
-                between(_smoothed(raw, SMOOTH_S, 0, one.sample_period_s)),
-                between(_smoothed(raw, SLOPE_S, 1, one.sample_period_s)),
+                between(smoothed(raw, SMOOTH_S, 0, one.sample_period_s)),
+                between(smoothed(raw, SLOPE_S, 1, one.sample_period_s)),
             ],
             axis=1,
         )
@@ -273,7 +283,8 @@ def first_part(w: Window, count: int) -> Window:
     )  # fmt: skip
 
 
-def _smoothed(x: Array, span_s: float, order: int, period: float) -> Array:
+def smoothed(x: Array, span_s: float, order: int, period: float) -> Array:
+    """The signal, or its derivative of an order, by quadratics over a span: no phase shift."""
     length = max(2 * round(0.5 * span_s / period) + 1, 5)
     return np.asarray(savgol_filter(x, length, 2, deriv=order, delta=period, mode="interp"))
 

@@ -12,6 +12,8 @@ from commissioner.motor.nameplate import prior
 
 PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
 """A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
+FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
+"""What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
 RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
 FOUR = NAMES[:4]
@@ -67,10 +69,12 @@ def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
         numbers = (*FOUR, "inertia")
         for seconds in PREFIXES_S:
             if seconds < record.windows[0].time_s[-1]:
-                own = (*numbers, "load_constant", "load_fan") if seconds > 0.09 else FOUR if seconds < 0.05 else numbers
+                own = (
+                    FOUR if seconds < 0.05 else (*numbers, *(name for name, least in FREED_FROM_S if seconds >= least))
+                )
                 machine = _settled(problem.cut(seconds), machine, own)
     if smooth_load:
-        numbers = (*numbers, "load_constant", "load_fan")
+        numbers = (*numbers, "load_constant", "load_fan", "load_ripple_cos", "load_ripple_sin")
         return refine(problem, machine, columns_of(numbers, record, machine), most=25)
     return refine(
         problem,
