@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-FAST: Any = {"cache": True, "fastmath": True, "error_model": "numpy", "nogil": True}
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """numba's `njit`, cached where a folder may be written; else compiled anew by every process, as in a sealed container.
+
+    numba itself ends the import there (RuntimeError: no locator available).
+    """
+
+    def compile_later(function: Callable[..., Any]) -> Callable[..., Any]:
+        compiled: Callable[..., Any]
+        try:
+            compiled = numba.njit(cache=True, **options)(function)
+        except RuntimeError:
+            compiled = numba.njit(**options)(function)
+        return compiled
+
+    return compile_later
+
+
+FAST: Any = {"fastmath": True, "error_model": "numpy", "nogil": True}
 kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
 inlined: Any = njit(inline="always", **FAST)
 """A part of a kernel too small to be called."""
+
+
+def writable(signal: ArrayLike) -> NDArray[np.float64]:
+    """As compiled code takes it: contiguous, and writable, for another signature (columns of a file are read-only) is
+    compiled anew."""
+    return np.require(signal, np.float64, ["C", "W"])
 
 
 def forget_stale_kernels(folder: str, beside: str) -> None:

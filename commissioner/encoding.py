@@ -1,4 +1,4 @@
-"""The one encoder: records as JSON types."""
+"""The one encoder: records as JSON types. Light: a list of runs needs it, and no numpy."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from enum import Enum
 from types import MappingProxyType
 from typing import Any
-
-import numpy as np
 
 HIDDEN = MappingProxyType({"is_hidden": True})
 """Metadata of a field that is no part of the JSON."""
@@ -26,12 +24,10 @@ def plain(value: Any) -> Any:
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "_asdict"):
         return plain(value._asdict())
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # arrays and scalars of numpy
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if isinstance(value, str | int | bool | None) else str(value)

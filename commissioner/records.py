@@ -8,16 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+
+def drive_words(drive_type: str, serial_number: int | None) -> str:
+    """`SIM-INV-7A #4711`; a number that is not known is said to be so, never shown as 0."""
+    return f"{drive_type}, serial number unknown" if serial_number is None else f"{drive_type} #{serial_number}"
+
+
 Signal = NDArray[np.float64]
 POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
 POINT_RESISTANCES = (
     "winding_resistance_uv_ohm",
-    "winding_resistance_ohm",
-    "resistance_ohm",
     "winding_resistance_line_ohm",
+    "terminal_resistance_ohm",
+    "winding_resistance_ohm",
+    "phase_resistance_ohm",
+    "stator_resistance_ohm",
+    "resistance_ohm",
 )
-"""Names under which it may have the winding's resistance between two terminals, at every point."""
+"""Names under which it may have the windings' resistance, at every point; what each holds: `diagnose.points.resistance`."""
 
 
 @dataclass(frozen=True)
@@ -95,24 +104,33 @@ class RunningRecording:
 
 @dataclass(frozen=True)
 class DriveIdentity:
-    """Who answers at the other end of the wire."""
+    """Who answers at the other end of the wire. None, empty or NaN: the drive file knows no register for it.
+
+    `drive_type` is then the drive file's name: what was assumed, not what answered.
+    """
 
     drive_type: str
-    serial_number: int
+    serial_number: int | None
     firmware_version: str
-    map_version: int
+    map_version: int | None
     rated_drive_current_a: float
     control_period_s: float
     switching_frequency_hz: float
 
+    @property
+    def words(self) -> str:
+        """`SIM-INV-7A #4711`, or the type alone with what is not known of it."""
+        return drive_words(self.drive_type, self.serial_number)
+
 
 @dataclass(frozen=True)
 class DriveStatus:
-    """One reading of the drive's status. `state` is the decoded CiA 402 state, `interlocks` the named bits."""
+    """One reading of the drive's status. `state` is the decoded CiA 402 state, `interlocks` the named bits.
+    `fault_code` None: the drive file knows no register for it."""
 
     state: str
     is_energised: bool
-    fault_code: int
+    fault_code: int | None
     fault_text: str
     trip_value: float
     trip_limit: float
@@ -137,17 +155,19 @@ class DriveStatus:
 
 @dataclass(frozen=True)
 class ParameterSnapshot:
-    """The drive's motor parameters as a run found them: in use and in non-volatile memory, SI, by profile name."""
+    """The drive's motor parameters as a run found them: in use and in non-volatile memory, by profile name; the plate that
+    stood in the drive with them, and what else tuning changes. `store_count` None: the drive does not count."""
 
     identity: DriveIdentity
     in_use: Mapping[str, float]
     stored: Mapping[str, float]
-    store_count: int
+    store_count: int | None
+    plate: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class WrittenParameter:
-    """One row of the contract's `written` list."""
+    """One row of the contract's `written` list. `after`: what was written, rounded to the drive's own words."""
 
     name: str
     register: int

@@ -6,11 +6,12 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.motor.nameplate import Nameplate, check
+from commissioner.motor.nameplate import Nameplate, check, connection_of
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
+from commissioner.validation import first_problem
 
 CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
 MAX_BYTES, MAX_DOTS = 250_000, 500
@@ -35,7 +36,11 @@ class MotorFile(_File):
     rated_speed_rpm: Annotated[float, Field(ge=50, le=60e3, description="revolutions per minute, 50 ... 60000")]
     power_factor: Annotated[float, Field(gt=0.2, le=1, description="cos phi at rated load, 0.2 ... 1")]
     pole_pairs: Annotated[int, Field(ge=1, le=24, description="pole pairs (half the pole number), 1 ... 24")]
-    connection: Literal["star", "delta"] = "star"
+    connection: Annotated[
+        Literal["star", "delta"],
+        BeforeValidator(connection_of),
+        Field(description="as it is wired: star (Y, wye) or delta (D, triangle)"),
+    ] = "star"
     inertia_kg_m2: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
 
@@ -164,31 +169,7 @@ def _load(path: Path, model: type[Model]) -> Model:
     try:
         return model.model_validate(read_toml(path))
     except ValidationError as error:
-        first = min(
-            error.errors(), key=lambda problem: problem["type"] != "extra_forbidden"
-        )  # a misspelt key explains a missing one
-        key = ".".join(str(part) for part in first["loc"])
+        problem = first_problem(error, model)
         raise ConfigurationError(
-            file=str(path), key=key, value=_shown(first), expected=_expected(model, first)
+            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
         ) from error
-
-
-def _shown(problem: Any) -> object:
-    return None if problem["type"] == "missing" else problem["input"]
-
-
-def _expected(model: type[BaseModel], problem: Any) -> str:
-    """What would be right, in the words of the field."""
-    if problem["type"] == "extra_forbidden":
-        return "no such key; known keys: " + ", ".join(_section(model, problem["loc"][:-1]))
-    field = model.model_fields.get(str(problem["loc"][-1]))
-    described = f" ({field.description})" if field is not None and field.description else ""
-    return str(problem["msg"]).removeprefix("Value error, ") + described
-
-
-def _section(model: type[BaseModel], location: tuple[object, ...]) -> list[str]:
-    for part in location:
-        annotation = model.model_fields[str(part)].annotation
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            model = annotation
-    return sorted(model.model_fields)

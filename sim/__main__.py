@@ -113,6 +113,15 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
 
 
 async def _serve_until_signal(scenario, serving, serve) -> None:
+    from sim.wire.station import ready_url
+
+    def announce(text: str) -> None:
+        """`listening KIND ADDRESS` for programs; what a person copies goes to stderr."""
+        _announce(text)
+        _, kind, address = text.split(" ", 2)
+        sys.stderr.write(f'ready: --drive "{ready_url(kind, address, serving)}"\n')
+        sys.stderr.flush()
+
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for name in (
@@ -122,7 +131,7 @@ async def _serve_until_signal(scenario, serving, serve) -> None:
     ):  # the last is Windows' Ctrl-Break; its loop has no handlers of its own
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda *_: loop.call_soon_threadsafe(stop.set))
-    await serve(scenario, serving, _announce, stop)
+    await serve(scenario, serving, announce, stop)
 
 
 def _announce(text: str) -> None:

@@ -1,5 +1,8 @@
-"""Every run draws the same examples; `pytest --hypothesis-profile=fresh` draws new ones."""
+"""Every run draws the same examples; `pytest --hypothesis-profile=fresh` draws new ones. What is said here of workers holds
+under xdist only: which tests stay together on one, and that the costliest begin."""
 
+import json
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,7 @@ settings.load_profile("same")
 TESTS = Path(__file__).parent
 REALTIME = (
     "campaigns",
-    "conformance",
+    "conformance/test_conformance.py",
     "integration/service",
     "integration/link",
     "integration/test_kill.py",
@@ -20,10 +23,69 @@ REALTIME = (
     "sim/test_server.py",
 )
 """Judged by answers, time-outs and watchdogs of 10 to 250 ms of wall time: nothing heavy may run beside them. Whole runs
-of the service against `sim --speed max` are not: the reader paces them, and they allow 250 ms for what takes one."""
+of the service against `sim --speed max` are not: the reader paces them, and they allow 250 ms for what takes one. Nor are
+defects that a rule must catch: what comes late fails it all the more. `NOT_REALTIME` are the tests of these files that
+no clock judges."""
+NOT_REALTIME = (
+    "test_the_firmwares_own_tests_pass_and_its_fuzzer_finds_nothing_with_the_sanitizers_on",
+    "test_the_firmwares_item_table_is_the_drive_files",
+    "test_every_rule_that_was_tried_shows_requests_replies_and_times",
+    "test_an_open_interlock_keeps_every_energising_rule_untried",
+    "test_nobody_there_is_exit_code_5_and_a_commercial_drive_file_is_2",
+    "test_the_mutator_changes_one_thing_at_a_time",
+    "test_every_explained_survivor_is_still_in_the_code",
+    "test_the_same_session_is_the_same_samples_over_every_wire",
+    "test_parameters_are_written_stored_and_restored_over_the_wire",
+    "test_a_drive_that_must_not_be_energised_is_not",
+    "test_an_unusable_tls_file_is_a_usage_error_and_never_asks_for_a_password",
+    "test_debts_are_paid_by_their_shape_alone",
+    "test_the_list_of_pymodbus_errors_is_complete",
+    "test_at_max_the_same_seed_gives_the_same_words",
+    "test_command_line_serves_and_prints_where",
+)
+TOGETHER = ("integration/service",)
+"""Folders whose tests share a costly fixture of a whole session: one worker has them all."""
+COSTS = TESTS.parent / ".ci" / "costs.json"
+"""CPU seconds of the tests that take one or more, as `tests/support/durations.py` writes them."""
+USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
+"""What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
-        if any(item.path.is_relative_to(TESTS / name) for name in REALTIME):
+        is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
+        if is_listed and item.name.split("[")[0] not in NOT_REALTIME:
             item.add_marker(pytest.mark.realtime)
+    if hasattr(config, "workerinput"):
+        _costliest_first(items)
+
+
+def _costliest_first(items: list[pytest.Item]) -> None:
+    """Groups that share what one made, and single tests, by their cost; in a group as they stand in their file."""
+    costs = json.loads(COSTS.read_text("utf-8")) if COSTS.exists() else {}
+    groups, cost = defaultdict(list), defaultdict(float)
+    for item in items:
+        shared = _shared(item)
+        if shared and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(shared))
+        mark = item.get_closest_marker("xdist_group")
+        group = str(mark.args[0]) if mark else item.nodeid
+        groups[group].append(item)
+        is_whole = item.path.is_relative_to(TESTS / "hidden_effects")
+        cost[group] += costs.get(item.nodeid, WHOLE_DIAGNOSIS_S if is_whole else USUAL_S)
+    items[:] = [item for group in sorted(groups, key=cost.__getitem__, reverse=True) for item in groups[group]]
+
+
+def _shared(item: pytest.Item) -> str | None:
+    """What the tests that belong together are called: their folder, or their file where they share a fixture of the module
+    or what a function keeps."""
+    for folder in TOGETHER:
+        if item.path.is_relative_to(TESTS / folder):
+            return folder
+    file = item.path.relative_to(TESTS).as_posix()
+    fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
+    if any(fixture.scope == "module" and fixture.baseid.endswith(file) for made in fixtures for fixture in made):
+        return file
+    kept = (value for value in vars(getattr(item, "module", None) or object).values() if hasattr(value, "cache_info"))
+    return file if any(True for _ in kept) else None

@@ -21,7 +21,9 @@ app = typer.Typer(
     rich_markup_mode="rich",
     help="Commission an induction motor at standstill: identify it through its drive, judge the result, write it back.",
 )
-runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
+runs_app = typer.Typer(
+    no_args_is_help=True, help="The archive of runs: list, find, show, compare, motors, trend, report, export."
+)
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
 app.add_typer(recordings_app, name="recordings")
@@ -55,8 +57,41 @@ Seal = Annotated[
 Salvage = Annotated[
     bool, typer.Option("--salvage", help="Go on with what is whole of a damaged run; the loss is still named.")
 ]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        "--archive",
+        envvar="COMMISSIONER_ARCHIVE",
+        help="Index that several computers share: postgresql+psycopg://USER@HOST/DATABASE; the password from ~/.pgpass.",
+    ),
+]
+WhichMotor = Annotated[str, typer.Option("--motor", help="Part of the motor's tag, serial number or plate.")]
+WhichDrive = Annotated[str, typer.Option("--drive", help="Part of the drive's type and number.")]
+WhichSerial = Annotated[str, typer.Option("--serial", help="Serial number of the drive or the motor.")]
+WhichPerson = Annotated[str, typer.Option("--person", help="Part of the name of who asked for the run.")]
+WhichOutcome = Annotated[str, typer.Option("--outcome", help="commissioned, rejected, aborted, faulted, cut off ...")]
+Since = Annotated[str, typer.Option("--since", help="UTC date, as 2026-11-25 or the start of one.")]
+Until = Annotated[str, typer.Option("--until", help="UTC date, included.")]
+Limit = Annotated[int | None, typer.Option("--limit", min=0, help="So many of the newest; 0: all.")]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"commissioner {version('commissioner')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every_verb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Which version this is.")
+    ] = False,
+) -> None:
+    """Commission an induction motor at standstill: identify it through its drive, judge the result, write it back."""
 
 
 @app.command()
@@ -93,13 +128,15 @@ def check(
     profile: Profile = "simulated",
     motor: Motor = "motor_2kw2",
     procedure: Procedure = None,
+    axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     json: Json = False,
 ) -> None:
     """Connect, identify the drive, read nameplate, interlocks and watchdog. Energises nothing, writes nothing."""
+    from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.check import check as verb
     from commissioner.operations.check import CheckRequest
 
-    verb(CheckRequest(drive, profile, motor, procedure), as_json=json)
+    verb(CheckRequest(drive, profile, motor, procedure, parse_axes(axes)), as_json=json)
 
 
 @app.command()
@@ -114,6 +151,10 @@ def run(
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
     seal: Seal = None,
+    tag: Annotated[str, typer.Option("--tag", help="Which motor this is: its tag, kept with the run.")] = "",
+    motor_serial: Annotated[
+        str, typer.Option("--motor-serial", help="The motor's serial number, kept with the run.")
+    ] = "",
     dead_man: Annotated[
         bool,
         typer.Option(
@@ -129,9 +170,43 @@ def run(
     from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
 
     request = CommissionRequest(
-        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal
-    )
+        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal,
+        tag, motor_serial,
+    )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
+
+
+@app.command()
+def tune(
+    drive: Drive,
+    profile: Profile,
+    motor: Motor,
+    repeat: Annotated[int, typer.Option(help="How often the drive tunes itself.")] = 3,
+    pause: Annotated[
+        float | None, typer.Option(help="Seconds between two tunings; the drive file's if not given.")
+    ] = None,
+    write_back: Annotated[
+        bool, typer.Option("--write-back", help="Leave the tuning nearest to the medians in the drive, stored.")
+    ] = False,
+    hardwired_stop: Annotated[
+        bool, typer.Option("--hardwired-stop", help="A tested stop circuit or disconnect is in the operator's reach.")
+    ] = False,
+    power_cycle: Annotated[
+        bool, typer.Option("--power-cycle", help="Ask for the drive to be switched off and on, then read it again.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    procedure: Procedure = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """An ordinary drive's own standstill autotune, repeated, watched and judged; then its best set, or what was there before."""
+    from commissioner.cli.verbs.tune import tune as verb
+    from commissioner.operations.tune import TuneRequest
+
+    request = TuneRequest(
+        drive, profile, motor, runs, repeat, pause, write_back, hardwired_stop, power_cycle, procedure
+    )
+    verb(request, yes=yes, as_json=json)
 
 
 @app.command()
@@ -207,13 +282,16 @@ def diagnose(
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
     mapping: Map = None,
+    why: Annotated[
+        bool, typer.Option("--why", help="Show every step of the search, with what was gained and wanted.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
     from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json, why=why)
 
 
 @app.command()
@@ -238,11 +316,62 @@ def simulate(
 
 
 @runs_app.command("list")
-def runs_list(runs: Runs = RUNS, json: Json = False) -> None:
+def runs_list(
+    motor: WhichMotor = "",
+    drive: WhichDrive = "",
+    serial: WhichSerial = "",
+    person: WhichPerson = "",
+    outcome: WhichOutcome = "",
+    since: Since = "",
+    until: Until = "",
+    limit: Limit = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    from commissioner.cli.verbs.archived.runs import list_runs
+    runs_find([], motor, drive, serial, person, outcome, since, until, limit, archive, runs, json)
 
-    list_runs(runs, as_json=json)
+
+@runs_app.command("find")
+def runs_find(
+    text: Annotated[
+        list[str], typer.Argument(help="Words, each anywhere in run, motor, drive, person, outcome or reason.")
+    ],
+    motor: WhichMotor = "",
+    drive: WhichDrive = "",
+    serial: WhichSerial = "",
+    person: WhichPerson = "",
+    outcome: WhichOutcome = "",
+    since: Since = "",
+    until: Until = "",
+    limit: Limit = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The runs that hold all of these words."""
+    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs
+    from commissioner.operations.history.runs import Wanted
+
+    most = limit if limit is not None else 0 if json else SHOWN
+    wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
+    list_runs(runs, as_json=json, wanted=wanted, database=archive)
+
+
+@runs_app.command("index")
+def runs_index(
+    rebuild: Annotated[
+        bool, typer.Option("--rebuild", help="From the folders alone, whatever the index held.")
+    ] = False,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The archive's index in step with the folders, which are the truth: it can be deleted at any time."""
+    from commissioner.cli.verbs.archived.runs import index
+
+    index(runs, rebuild=rebuild, database=archive, as_json=json)
 
 
 @runs_app.command("show")
@@ -268,23 +397,107 @@ def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> Non
 @runs_app.command("export")
 def runs_export(
     run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz or .parquet, in the contract's format.")],
+    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
+    form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
     salvage: Salvage = False,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
-    """The samples of a run as one recording; works for runs that were cut off, too."""
+    """The samples of a run as one recording, or its parameters in the form of another program (--form)."""
     from commissioner.cli.verbs.archived.runs import export_run
 
-    export_run(runs, run, out, as_json=json, salvage=salvage)
+    export_run(runs, run, out, form, as_json=json, salvage=salvage)
 
 
 @runs_app.command("compare")
-def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
-    """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.archived.runs import compare_runs
+def runs_compare(
+    before: Run,
+    after: Run = "last",
+    recording: Annotated[
+        list[Path] | None, typer.Option("--recording", help="Instead of a second run: a recording; repeatable.")
+    ] = None,
+    motor: Annotated[str | None, typer.Option("--motor", help="Nameplate of the recordings.")] = None,
+    held: Annotated[
+        bool, typer.Option("--held", help="Instead of a second run: what the run's drive holds now.")
+    ] = False,
+    drive: Annotated[
+        str | None, typer.Option("--drive", help="Drive URL for --held; the run's own if not given.")
+    ] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Two runs, or a run and recordings, or a run and its drive: which parameter moved, how surely, what explains it."""
+    from commissioner.cli.verbs.archived.comparing import compare_drive, compare_runs
 
-    compare_runs(runs, before, after, as_json=json)
+    if held:
+        compare_drive(runs, before, drive, as_json=json)
+    else:
+        compare_runs(runs, before, after, as_json=json, recordings=tuple(recording or ()), motor=motor)
+
+
+@runs_app.command("motors")
+def runs_motors(
+    run: Annotated[
+        str | None, typer.Argument(help="Run id: on which of the known motors can it have been made?")
+    ] = None,
+    tag: Annotated[str, typer.Option("--tag", help="The run was made on the motor with this tag.")] = "",
+    motor_serial: Annotated[str, typer.Option("--motor-serial", help="The motor's serial number.")] = "",
+    confirm: Annotated[
+        bool, typer.Option("--confirm", help="It is the same motor, though its parameters say another.")
+    ] = False,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The motors of the archive; which of them a run was made on, by its parameters; or saying so."""
+    from commissioner.cli.verbs.archived.motors import motors
+    from commissioner.operations.history.runs import Archive
+
+    motors(Archive(runs, archive), run, tag=tag, serial=motor_serial, confirm=confirm, as_json=json)
+
+
+@runs_app.command("trend")
+def runs_trend(
+    motor: Annotated[str | None, typer.Argument(help="The motor's tag or serial number.")] = None,
+    baseline: Annotated[
+        Path | None, typer.Option("--baseline", help="Indicators of this baseline of `monitor`.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .svg or .png.")] = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """A motor over the years at one flux and temperature: intervals, drift, steps, alarms at a stated false-alarm rate."""
+    from commissioner.cli.verbs.archived.motors import show_trend
+    from commissioner.operations.history.runs import Archive
+
+    show_trend(Archive(runs, archive), motor, baseline, out, as_json=json)
+
+
+@runs_app.command("push")
+def runs_push(
+    target: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Run folders to another archive, proved by their chain; goes on where it broke off."""
+    from commissioner.cli.verbs.archived.moving import move
+
+    move(runs, target, run or (), to_it=True, as_json=json)
+
+
+@runs_app.command("pull")
+def runs_pull(
+    source: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Run folders from another archive, proved by their chain; goes on where it broke off."""
+    from commissioner.cli.verbs.archived.moving import move
+
+    move(runs, source, run or (), to_it=False, as_json=json)
 
 
 @runs_app.command("verify")

@@ -17,7 +17,7 @@ drives_app = typer.Typer(
 @drives_app.command("list")
 def drives_list(json: Json = False) -> None:
     """Every drive file that comes along, its kind, and what works with it."""
-    from commissioner.cli.verbs.drives import list_drives
+    from commissioner.cli.verbs.drives.files import list_drives
 
     list_drives(as_json=json)
 
@@ -27,7 +27,7 @@ def drives_show(
     name: Annotated[str, typer.Argument(help="A name in config/drives, or a .toml file.")], json: Json = False
 ) -> None:
     """What a drive file says and which verbs work with it, before anything is connected."""
-    from commissioner.cli.verbs.drives import show_drive
+    from commissioner.cli.verbs.drives.files import show_drive
 
     show_drive(name, as_json=json)
 
@@ -35,9 +35,23 @@ def drives_show(
 @drives_app.command("validate")
 def drives_validate(file: Annotated[Path, typer.Argument(help="A drive file.")], json: Json = False) -> None:
     """Whether a drive file can be used; the first mistake by file, key, value and what would be right."""
-    from commissioner.cli.verbs.drives import validate_drive
+    from commissioner.cli.verbs.drives.files import validate_drive
 
     validate_drive(file, as_json=json)
+
+
+@drives_app.command("new")
+def drives_new(
+    url: Annotated[str, typer.Argument(help="tcp://host:port?device=1, rtu:///dev/ttyUSB0?baud=9600&parity=E")],
+    out: Annotated[Path, typer.Option("--out", help="The drive file to write.")],
+    probe_writes: Annotated[
+        bool, typer.Option("--probe-writes", help="Also write one register's own value back, after asking.")
+    ] = False,
+) -> None:
+    """Asks for registers and label values, proves them at the drive, and writes a drive file; the rest is [unknown] in it."""
+    from commissioner.cli.verbs.drives.new import new_drive
+
+    new_drive(url, out, may_write=probe_writes)
 
 
 @drives_app.command("conformance")
@@ -58,7 +72,7 @@ def drives_conformance(
 
     Parameters are changed by 1 per cent for a moment and put back; two stores are spent. 0: nothing failed, 3: some rule did.
     """
-    from commissioner.cli.verbs.conformance import conformance
+    from commissioner.cli.verbs.drives.conformance import conformance
 
     conformance(
         url=url,

@@ -18,6 +18,8 @@ from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageEr
 from commissioner.link.wire.secrets import Secrets, shown_call
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
+NO_ARGUMENTS = "NoArgsIsHelpError"
+"""How the command line's library leaves a call without arguments, once it has printed the help."""
 INTERRUPTED = 130
 """What typer makes of a KeyboardInterrupt."""
 
@@ -37,6 +39,8 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     except typer.Exit as stop:
         sys.exit(stop.exit_code)
     except TyperException as usage:
+        if type(usage).__name__ == NO_ARGUMENTS:
+            sys.exit(0)
         error = _usage(usage, arguments)
         if not as_json and hasattr(usage, "show") and hide(error.what) == error.what:
             usage.show()

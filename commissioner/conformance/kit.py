@@ -67,7 +67,7 @@ def run_conformance(
             limit="kind = commissioning_map",
             remedy="give --profile a drive file of that kind: conformance is about the map, not about commercial drives",
         )
-    device = url.device or profile.link.device_id
+    device = profile.link.device_id if url.device is None else url.device
     line = Line(url, device, reply_timeout_s)
     drive = Drive(profile, device, is_serial=isinstance(url, RtuUrl))
     try:

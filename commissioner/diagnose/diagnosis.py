@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE
-from commissioner.diagnose.catalogue.inverter import tail_of_legs
+from commissioner.diagnose.causes import CATALOGUE, LINEAR
+from commissioner.diagnose.causes.inverter.legs import tail_of_legs
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
 from commissioner.diagnose.fit.gauss_newton import Fit, inverse
@@ -17,10 +18,10 @@ from commissioner.diagnose.intake.audit import Audit, prepare
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.plant.model import Layout
+from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.journal import Said, Step, followed
 from commissioner.diagnose.search.search import Found, search
 from commissioner.diagnose.verdict.causes import (
-    LEAST_SHARE,
-    MOSTLY_EXPLAINED_SIGMA,
     Cause,
     causes_of,
     confidence_factor,
@@ -34,14 +35,6 @@ from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 from commissioner.records import StandstillRecording
 
-UNEXPLAINED_SIGMA = 0.3
-WORSE_THAN_NONE, WEAK_SIGMA = -0.5, 0.1
-"""Share of the error of left-out segments, and of the noise: causes that make less, and these so much worse, are none."""
-UNEXPLAINED_STATE_SIGMA = 0.03
-"""Of what goes with the state or comes and goes, where nothing is named and no cause that is too small to matter makes it: means over states show
-
-about a third of what is there.
-"""
 NEVER_NAMEABLE = (
     "common gain of the current sensors | DC-link scale | all impedances",
     "slope resistance of the devices | cable resistance | R_s",
@@ -82,13 +75,15 @@ class Diagnosis:
     unsure: tuple[Cause, ...] = ()
     """Fitted, and more likely wrong than right as names: what they explain counts as left."""
     refusal: DataRefused | None = None
+    steps: tuple[Step, ...] = ()
+    """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
 
 
 def diagnose(
     recordings: Sequence[StandstillRecording],
     *,
     excluded: Sequence[str] = (),
-    report: Callable[[str], None] = lambda _: None,
+    report: Callable[[Step], None] = lambda _: None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about the recordings of one motor.
@@ -103,21 +98,16 @@ def diagnose(
     if audit.step_a:
         noise = noise.with_converter_step(np.array(audit.step_a), resting_share(record))
     rms_a = noise.rms_a(max(s.count for s in record.segments), record.facts.sample_period_s)
-    report(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
+    measured = Said(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
+    report(measured)
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
-        found = search(
-            record,
-            noise,
-            excluded=excluded,
-            report=report,
-            check=lambda f, r: check_before_search(f, r, noise),
-            go_on=go_on,
-        )
+        check = partial(check_before_search, noise=noise)
+        found, steps = followed(search(record, noise, excluded=excluded, check=check, go_on=go_on), report)
         check_one_state(found.fit, found.record)
     except DataRefused as refusal:
         return _refused(refusal, audit, noise)
-    return _conclude(found, audit, noise, excluded)
+    return replace(_conclude(found, audit, noise, excluded), steps=(measured, *steps))
 
 
 def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> Diagnosis:
@@ -132,7 +122,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     held = hold_out(found.nominal, found.fit, record, layout, noise)
     trust = confidence_factor(lack, explained_share(found, lack, lack.sigma)) if found.accepted else 1.0
     gained = float(np.sqrt(max(found.nominal.chi2 - found.fit.chi2, 0.0) / found.fit.normal.count.sum()))
-    if held.is_measured and held.share < WORSE_THAN_NONE and gained < WEAK_SIGMA:
+    if held.is_measured and held.share < RULES.worse_than_none and gained < RULES.weak_sigma:
         trust = 0.0
     causes, unsure = causes_of(found, lack, trust, audit, noise, excluded)
     if all(c.from_audit for c in causes):
@@ -145,7 +135,7 @@ def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str])
     share, lack = explained_share(found, lack, total.sigma), total
     trifles = {name: gain for name, gain in found.below_materiality.items() if name not in found.accepted}
     trifle = max(trifles.values(), default=0.0) / float(found.fit.normal.count.sum())
-    is_seen = max(lack.from_states_sigma, lack.from_bursts_sigma) ** 2 > max(UNEXPLAINED_STATE_SIGMA**2, trifle)
+    is_seen = max(lack.from_states_sigma, lack.from_bursts_sigma) ** 2 > max(RULES.unexplained_state_sigma**2, trifle)
     verdict, reason = _verdict(
         causes, lack, share, leaves_a_trace=0.0 < trust < 1.0 or (is_seen and not causes), found=found
     )
@@ -176,9 +166,9 @@ def _verdict(
 ) -> tuple[Verdict, str]:
     fitted = any(not c.from_audit for c in causes)
     if (
-        lack.sigma > UNEXPLAINED_SIGMA
-        or (causes and lack.sigma > MOSTLY_EXPLAINED_SIGMA and share < LEAST_SHARE)
-        or (not fitted and lack.sigma > MOSTLY_EXPLAINED_SIGMA)
+        lack.sigma > RULES.unexplained_sigma
+        or (causes and lack.sigma > RULES.mostly_explained_sigma and share < RULES.explained_share)
+        or (not fitted and lack.sigma > RULES.mostly_explained_sigma)
         or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
@@ -229,8 +219,8 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
     """Two lines fit the four parameters exactly: what only shifts them, or jumps in delay, cannot be named then. (A sweep has none.)"""
     if lines not in (1, 2):
         return ()
-    linear = tuple(name for name, entry in CATALOGUE.items() if entry.family == "linear")
-    return linear if lines == 2 else (*linear, "clock_drift", "lost_samples")
+    late = [name for name, cause in CATALOGUE.items() if cause.moves_the_clock]
+    return LINEAR if lines == 2 else (*LINEAR, *late)
 
 
 def _remarks(noise: Noise, found: Found, unsure: Sequence[Cause]) -> tuple[str, ...]:

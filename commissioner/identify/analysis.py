@@ -66,6 +66,8 @@ class Identification:
     duration_s: float
     stator_resistance_20degc_ohm: tuple[float, float] | None
     remarks: tuple[str, ...]
+    fits: tuple[AxisFit, ...] = ()
+    """Of the tests, each by itself."""
 
     @property
     def std(self) -> tuple[float, float, float, float]:
@@ -88,12 +90,14 @@ def identify(
     winding_temperature_degc: float | None = None,
     assumption: str = EQUAL_LEAKAGE,
     is_final: bool = True,
+    earlier: Identification | None = None,
 ) -> Identification:
     """Everything a standstill recording says about the motor.
 
     `nameplate` defaults to the recording's metadata. `inverter` (from an earlier staircase) and `start` only give the
     search a start. `is_final` is False for a look that only designs the next test: the inverter's law is not fitted to the
-    samples then. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
+    samples then. `earlier`: an identification of a part of these samples, begun without a start; its fits of tests that
+    have the same samples are not made again. Raises DataRefused where the data cannot carry an answer, UsageError for an unknown estimator.
     """
     if estimator not in ("pao", "lyapunov", "nls"):
         raise UsageError(
@@ -112,16 +116,17 @@ def identify(
     fits: list[AxisFit] = []
     for stretches in _by_test(examined):
         like = fits[0] if fits else None
-        fits.append(fit_axis(stretches, plate, period_s, start, inverter, like))
+        done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier and not like else None
+        fits.append(done or fit_axis(stretches, plate, period_s, start, inverter, like))
+    as_fitted = tuple(fits)
     free = [f.batch for f in fits]
     legs = one_inverter(free)
     if is_final:
         legs = with_known_law(free, [segments(f.stretches) for f in fits], legs)
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
-    return _summary(
-        results, examined, plate, estimator, winding_temperature_degc or _temperature(recording), assumption
-    )
+    temperature = winding_temperature_degc or _temperature(recording)
+    return replace(_summary(results, examined, plate, estimator, temperature, assumption), fits=as_fitted)
 
 
 def _temperature(recording: StandstillRecording) -> float | None:

@@ -21,7 +21,7 @@ class Nameplate:
     rated_speed_rpm: float
     power_factor: float
     pole_pairs: int
-    connection: str  # "star" | "delta"
+    connection: str  # "star" | "delta"; `connection_of` reads what plates and drives write
     inertia_kg_m2: float | None = None
 
     @property
@@ -47,6 +47,21 @@ RATED_VALUES = (
     "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
 )  # fmt: skip
 """The numbers that every plate states, by their names here and in a recording; pole pairs follow from them."""
+
+
+CONNECTIONS = {
+    "star": ("star", "y", "wye", "stern", "\N{GREEK CAPITAL LETTER LAMDA}"),
+    "delta": ("delta", "d", "triangle", "mesh", "dreieck", "\N{GREEK CAPITAL LETTER DELTA}", "\N{WHITE UP-POINTING TRIANGLE}",
+              "\N{BLACK UP-POINTING TRIANGLE}", "\N{INCREMENT}"),
+}  # fmt: skip
+"""How plates, drives and recordings write the two connections, in any case."""
+
+
+def connection_of(written: object) -> object:
+    """`star` or `delta` for one of their spellings; anything else as it is, for `check` to refuse."""
+    word = str(written).strip().casefold()
+    known = {spelling.casefold(): name for name, spellings in CONNECTIONS.items() for spelling in spellings}
+    return known.get(word, written)
 
 
 @dataclass(frozen=True)
@@ -136,7 +151,7 @@ def _problems(plate: Nameplate) -> Iterator[PlateProblem]:
     for key in broken:
         yield PlateProblem(key, getattr(plate, key), "a finite number above 0")
     if plate.connection not in ("star", "delta"):
-        yield PlateProblem("connection", plate.connection, '"star" or "delta"')
+        yield PlateProblem("connection", plate.connection, "star (Y, wye) or delta (D, triangle)")
     if plate.pole_pairs < 1:
         yield PlateProblem("pole_pairs", plate.pole_pairs, "1, 2, 3, ... (half the number of poles)")
         return

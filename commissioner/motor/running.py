@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from commissioner.compiled import njit
 from commissioner.motor.circuit import InverseGamma, from_t_model, to_t_model
 from commissioner.motor.nameplate import Nameplate
 
@@ -129,7 +129,7 @@ def from_nameplate(plate: Nameplate) -> TCircuit:
     return TCircuit(float(resistance), float(rotor), float(leakage), float(leakage), float(main))
 
 
-@njit(cache=True)
+@njit()
 def resimulate(
     circuit: tuple[float, float, float, float, float],
     voltage_dq_v: Vector,

@@ -1,4 +1,4 @@
-"""The archive of runs: list, show, compare, report, export, verify, replay."""
+"""What is made of archived runs: report, export, verify, replay."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from commissioner.errors import CommissionerError, DataRefused
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive.blocks import read_blocks
-from commissioner.run.archive.catalogue import RunSummary, find_folder, find_run, read_runs, run_folders
+from commissioner.run.archive.catalogue import find_folder, find_run, run_folders
 from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.replay import Difference, replay
 from commissioner.run.archive.verify import DAMAGED, Loss, Verified, refuse_damage, verify
@@ -43,16 +43,6 @@ class ReplayedRun:
     difference: Difference | None
     state: str
     losses: tuple[Loss, ...]
-
-
-def list_runs(runs: Path, *, with_results: bool = True) -> tuple[RunSummary, ...]:
-    """Newest first; a folder that cannot be read is a row that says so."""
-    return tuple(read_runs(runs, with_results=with_results))
-
-
-def show_run(runs: Path, run: str) -> RunSummary:
-    """The run of which the id starts so, or the newest for `last`. UsageError: none or several."""
-    return find_run(runs, run)
 
 
 def report_run(runs: Path, run: str) -> Reported:

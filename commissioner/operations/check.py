@@ -10,7 +10,7 @@ from pathlib import Path
 from commissioner.encoding import HIDDEN
 from commissioner.errors import CheckFailed
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import CheckResult, check_failed
+from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import BELOW_TRIP, Job
 from commissioner.records import DriveIdentity
@@ -58,6 +58,7 @@ class Checked:
     parameters_in_drive: Mapping[str, float]
     watchdog: Mapping[str, int | float | str | bool | None]
     checks: tuple[CheckResult, ...]
+    not_checked: tuple[NotChecked, ...]
     limits: RunLimits | None
     nameplate: Nameplate = field(metadata=HIDDEN)
     plan: ProcedurePlan = field(metadata=HIDDEN)
@@ -77,17 +78,23 @@ def check(request: CheckRequest) -> Checked:
     failure = check_failed(seen.checks)
     return Checked(
         outcome="rejected" if failure else "passed",
-        reason=failure.what if failure else "every check passed; nothing was energised or written",
+        reason=failure.what if failure else _passed(len(seen.not_checked)),
         drive=seen.identity,
         nameplate_in_drive=seen.nameplate,
         parameters_in_drive=seen.parameters,
         watchdog=seen.watchdog,
         checks=seen.checks,
+        not_checked=seen.not_checked,
         limits=None if seen.job is None else limits_of(seen.job, seen.identity.rated_drive_current_a),
         nameplate=nameplate,
         plan=plan,
         job=seen.job,
     )
+
+
+def _passed(not_checked: int) -> str:
+    left = f"every check that this drive file allows passed, {not_checked} could not be made"
+    return f"{left if not_checked else 'every check passed'}; nothing was energised or written"
 
 
 def limits_of(job: Job, rated_drive_current_a: float) -> RunLimits:

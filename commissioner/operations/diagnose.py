@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,10 +14,11 @@ from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
 from commissioner.diagnose.points.table import Points, is_points_table, read_points
+from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
-from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
-from commissioner.operations.intake import require_one_motor, standstill, without_copies
+from commissioner.operations.events import GoOn, Observe, always, nobody
+from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.running import diagnosed, is_running
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
@@ -26,8 +26,6 @@ from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
-KEPT = re.compile(r"^accepted (\w+):")
-"""How the search says that it takes a cause in."""
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
@@ -61,21 +59,10 @@ class Diagnosed:
         return "refused" in {self.document["verdict"], *(one["verdict"] for one in tables.values())}
 
 
-@dataclass
-class _Search:
-    """Hears the search: passes every line on, and remembers what was taken in."""
-
-    observe: Observe
-    kept: list[str] = field(default_factory=list)
-
-    def __call__(self, sentence: str) -> None:
-        if found := KEPT.match(sentence):
-            self.kept.append(found[1])
-        self.observe(SearchSaid(sentence))
-
-    def withdrawn(self, left: Collection[str]) -> list[str]:
-        """Named on the way and not among those that are `left`."""
-        return [name for name in dict.fromkeys(self.kept) if name not in left]
+def withdrawn(steps: Iterable[Step], left: Collection[str]) -> list[str]:
+    """Named on the way and not among those that are `left`."""
+    kept = (step.name for step in steps if isinstance(step, Accepted))
+    return [name for name in dict.fromkeys(kept) if name not in left]
 
 
 def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = always) -> Diagnosed:
@@ -89,7 +76,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     if request.out is not None:
         folder_to_write(request.out)
     if all(is_points_table(list(t.columns)) for t in tables):
-        return _points(tables, request.out)
+        return _points(tables, request.motor, request.out)
     if any(is_running(t) for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
@@ -102,11 +89,10 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     recordings, remarks = standstill(tables, request.motor)
     require_one_motor(recordings)
     recordings, copies = without_copies(recordings)
-    search = _Search(observe)
-    seen = analyse(recordings, excluded=request.excluded, report=search, go_on=go_on)
+    seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     document = as_document(seen, None)
     document["audit"] = [*remarks, *copies, *document["audit"]]
-    document["uncertain"] = uncertain(seen, search.withdrawn({c.name for c in (*seen.causes, *seen.unsure)}))
+    document["uncertain"] = uncertain(seen, withdrawn(seen.steps, {c.name for c in (*seen.causes, *seen.unsure)}))
     document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if request.out is not None:
         _write_recordings(request.out, seen, document, tables)
@@ -122,9 +108,10 @@ def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, t
     _write(out, document, seen.model, page, "report.html")
 
 
-def _points(tables: Sequence[Table], out: Path | None) -> Diagnosed:
+def _points(tables: Sequence[Table], motor: str | None, out: Path | None) -> Diagnosed:
     """The stator resistance of a locked-rotor table serves the others."""
-    read = [read_points(t.columns, Path(t.source).stem) for t in tables]
+    plate = plate_metadata(motor)
+    read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
     resistance_ohm = float(known[0]) if known else None
     documents = [

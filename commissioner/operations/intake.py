@@ -27,11 +27,12 @@ def standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Standst
             remarks.append(f"{Path(table.source).name}: unknown columns left out: {', '.join(unknown)}.")
         recording = to_standstill(table)
         remarks += [f"{Path(table.source).name}: {note.what}." for note in recording.notes]
-        recordings.append(replace(recording, metadata={**recording.metadata, **_plate(motor)}))
+        recordings.append(replace(recording, metadata={**recording.metadata, **plate_metadata(motor)}))
     return recordings, remarks
 
 
-def _plate(motor: str | None) -> dict[str, float | str]:
+def plate_metadata(motor: str | None) -> dict[str, float | str]:
+    """A named motor's plate as a recording's metadata; nothing where none is named."""
     if motor is None:
         return {}
     return {k: v for k, v in asdict(load_motor(motor)).items() if v is not None}

@@ -9,10 +9,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from commissioner.diagnose.search.journal import Said
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.motor.nameplate import Nameplate
-from commissioner.operations.events import GoOn, Observe, SearchSaid
+from commissioner.operations.events import GoOn, Observe
 from commissioner.recordings.plate import plate_of
 from commissioner.recordings.table import Table, read_table, to_running, write_table
 from commissioner.recordings.whole import whole_file
@@ -65,7 +66,7 @@ def diagnosed(
             "exchanged": f"gives way to {step.why.replace('_', ' ')}",
         }
         if step.what in words:
-            observe(SearchSaid(f"{step.cause.replace('_', ' ')} {words[step.what]}"))
+            observe(Said(f"{step.cause.replace('_', ' ')} {words[step.what]}"))
 
     seen = diagnose(recordings, plate, excluded=excluded, observe=say, go_on=go_on)
     document = as_document(seen)

@@ -28,6 +28,14 @@ class CheckResult:
 
 
 @dataclass(frozen=True)
+class NotChecked:
+    """What could not be judged, and why: a drive file that does not know it, never a pass."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True)
 class DriveLimits:
     """What the drive's profile says about its own operating range."""
 
@@ -88,7 +96,7 @@ def judge_idle(
 
 
 def _stopped(status: DriveStatus) -> Iterator[CheckResult]:
-    has_fault = status.fault_code != 0 or status.state == DriveState.FAULT.value
+    has_fault = bool(status.fault_code) or status.state == DriveState.FAULT.value
     seen = status.fault_text if status.fault_code else status.state if has_fault else "none"
     yield CheckResult("no fault", not has_fault, seen, "none", "remove the cause, then reset the fault at the drive")
     remedy = "stop the drive: another master has enabled it"

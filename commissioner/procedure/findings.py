@@ -170,7 +170,7 @@ class ParametersWritten:
     """Written, read back and, where the drive file knows how, stored."""
 
     written: tuple[WrittenParameter, ...]
-    store_count: int
+    store_count: int | None
     wear_fraction: float | None
     is_stored: bool
 

@@ -56,6 +56,8 @@ class Job:
     """The drive's name of each written parameter -> the inverse-Gamma field it takes."""
     write_back: bool
     link_latency_s: float
+    parameter_factors: dict[str, float] = field(default_factory=dict)
+    """By what the drive multiplies a contract's SI value, where that is not 1: 2 for a line-to-line resistance."""
 
     @property
     def scale_ramp_per_s(self) -> float:
@@ -208,7 +210,9 @@ def judge(job: Job, findings: Findings) -> Step:
     """All segments together, by the same code as `identify` uses offline; then the verdict."""
     recording = assemble(findings.blocks, {}, "live run")
     assert recording is not None
-    identification = identify(recording, job.nameplate, winding_temperature_degc=findings.winding_degc)
+    identification = identify(
+        recording, job.nameplate, winding_temperature_degc=findings.winding_degc, earlier=findings.look
+    )
     findings.identification = identification
     verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict

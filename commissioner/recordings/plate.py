@@ -11,7 +11,7 @@ import numpy as np
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.machine.fit import PRIOR_FROM_COMMISSIONING, Start
 from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check
+from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check, connection_of
 from commissioner.motor.running import equal_leakages
 
 MAX_RESULT_BYTES = 10_000_000
@@ -38,7 +38,7 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
     plate = Nameplate(
         **values,
         pole_pairs=int(pairs) if isinstance(pairs, float) else max(estimate, 1),
-        connection=str(metadata.get("connection", "star")),
+        connection=str(connection_of(metadata.get("connection", "star"))),
         inertia_kg_m2=float(inertia) if isinstance(inertia, float) and inertia > 0 else None,
     )
     for problem in check(plate):

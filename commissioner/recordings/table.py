@@ -40,7 +40,9 @@ KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
 STEP_TOLERANCE, MOST_ROUNDED = 0.02, 0.1
 """Of a period, by which time steps may differ; and by how much more at most where the time stamps are rounded."""
 
-TEXT_KEYS = frozenset({"connection", "name", "drive", "source", "note", "motor", "scenario", "run", "kind"})
+TEXT_KEYS = frozenset(
+    {"connection", "name", "drive", "source", "note", "motor", "scenario", "run", "kind", "resistance_measured"}
+)
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,16 @@ The T circuit has one number more than terminals can tell: equal leakages are as
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from commissioner.errors import UsageError
-from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.circuit import Gamma as GammaCircuit
+from commissioner.motor.circuit import InverseGamma, from_t_model
+from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.registers.codec import Value, crc16_modbus, encode_item
 from commissioner.registers.profile import DriveProfile, Item
 
@@ -45,6 +47,22 @@ CONVENTIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
     | {"time_constant": ("inverse_gamma", "per_phase")}
 )
 """Name in a drive file -> (circuit, representation). Without a circuit in the name it is the inverse-Gamma one."""
+
+UNITS = frozenset(
+    ("V", "A", "W", "ohm", "H", "Wb", "s", "ms", "Hz", "rad/s", "1/min", "1/s", "V/s", "deg", "degC", "%", "Nm", "raw")
+)
+"""What an item's `unit` may say. `raw`: as the drive counts, where no source tells the unit; it can be compared and restored,
+never converted."""
+
+
+@dataclass(frozen=True)
+class Ours:
+    """A drive's value in the service's own terms: the contract's field, the SI value, how it was converted."""
+
+    field: str
+    value: float
+    conversion: str
+    is_of_a_set: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,10 +98,82 @@ def drive_value(item: Item, circuit: InverseGamma, nameplate: Nameplate | None =
     return known[quantity] * factor
 
 
-def is_our_own(item: Item) -> bool:
-    """Whether the item holds the quantity as the service itself states it: R_s of any circuit, inverse-Gamma else."""
-    model, form = CONVENTIONS.get(item.convention, ("", ""))
-    return form == "per_phase" and (model == "inverse_gamma" or (item.quantity or item.name) == "stator_resistance")
+def parameter_limits(profile: DriveProfile, plate: Nameplate) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value of each of the drive's parameters over the corners of the plate's box, in the items' units.
+
+    An item without a convention has none: what it stands for is not known.
+    """
+    box = prior(plate)
+    sides = zip(box.lower.as_tuple(), box.upper.as_tuple(), strict=True)
+    corners = [InverseGamma(*corner) for corner in itertools.product(*sides)]
+    order = profile.parameters.order if profile.parameters else ()
+    items = [profile.item(name) for name in order]
+    values = {i.name: [drive_value(i, corner, plate) for corner in corners] for i in items if i.convention}
+    return {name: (min(found), max(found)) for name, found in values.items()}
+
+
+def unit_of(quantity: str, convention: str) -> str | None:
+    """The unit in which an item of this quantity and convention must stand; None where it has no convention."""
+    if convention not in CONVENTIONS or quantity not in QUANTITIES:
+        return None
+    form = CONVENTIONS[convention][1]
+    if quantity == "rotor_time_constant":
+        return "s"
+    if form == "percent_of_base_impedance":
+        return "%"
+    return "H" if quantity in INDUCTANCES and form != "reactance_at_rated_frequency" else "ohm"
+
+
+def our_values(profile: DriveProfile, held: Mapping[str, float], nameplate: Nameplate | None) -> dict[str, Ours]:
+    """Each held value that can be said in the service's own terms (inverse-Gamma, per phase, SI), by item name.
+
+    Values of a T or Gamma circuit need the whole of it; R_s and T_r stand alone in every circuit. What has no convention,
+    or needs a nameplate where there is none, is left out.
+    """
+    per_phase: dict[str, dict[str, tuple[str, float]]] = {}
+    out: dict[str, Ours] = {}
+    for name, value in held.items():
+        item = profile.item(name)
+        model, form = CONVENTIONS.get(item.convention, ("", ""))
+        if not model:
+            continue
+        quantity = item.quantity or item.name
+        try:
+            factor = 1.0 if quantity == "rotor_time_constant" else representation_factor(quantity, form, nameplate)
+        except UsageError:
+            continue
+        per_phase.setdefault(model, {})[quantity] = (name, value / factor)
+        if quantity in _ALONE or (model == "inverse_gamma" and quantity in _FIELDS):
+            words = "as it stands" if factor == 1.0 else f"{form.replace('_', ' ')}: divided by {factor:.6g}"
+            out[name] = Ours(_FIELDS[quantity], value / factor, words)
+    for model in ("t", "gamma"):
+        out |= _whole_circuit(model, per_phase.get(model, {}))
+    return out
+
+
+def _whole_circuit(model: str, found: Mapping[str, tuple[str, float]]) -> dict[str, Ours]:
+    """The inverse-Gamma values of a complete T or Gamma set; empty where a part is missing."""
+    needed = _SETS[model]
+    if not all(quantity in found for quantity in needed):
+        return {}
+    values = [found[quantity][1] for quantity in needed]
+    if not all(value > 0 for value in values):
+        return {}
+    circuit = from_t_model(*values) if model == "t" else GammaCircuit(*values).as_inverse_gamma()
+    ours = {
+        "rotor_resistance": circuit.rotor_resistance_ohm,
+        "magnetizing_inductance": circuit.magnetizing_inductance_h,
+    }
+    ours |= {
+        ("stator_leakage_inductance" if model == "t" else "leakage_inductance"): circuit.leakage_inductance_h,
+        "stator_inductance": circuit.magnetizing_inductance_h,
+    }
+    words = f"{'T' if model == 't' else 'Gamma'} circuit to inverse-Gamma, whole set"
+    return {
+        found[quantity][0]: Ours(_FIELDS[_LIKE.get(quantity, quantity)], ours[quantity], words, is_of_a_set=True)
+        for quantity in needed
+        if quantity in ours
+    }
 
 
 def representation_factor(quantity: str, form: str, nameplate: Nameplate | None) -> float:
@@ -134,6 +224,30 @@ def _named(r_s: float, r_r: float, l_m: float, l_s: float, circuit: InverseGamma
         "stator_inductance": l_s,
         "rotor_time_constant": circuit.rotor_time_constant_s,
     }
+
+
+_FIELDS: Mapping[str, str] = MappingProxyType(
+    {
+        "stator_resistance": "stator_resistance_ohm",
+        "rotor_resistance": "rotor_resistance_ohm",
+        "leakage_inductance": "leakage_inductance_h",
+        "magnetizing_inductance": "magnetizing_inductance_h",
+        "rotor_time_constant": "rotor_time_constant_s",
+    }
+)
+_ALONE = ("stator_resistance", "rotor_time_constant")
+_LIKE: Mapping[str, str] = MappingProxyType(
+    {"stator_leakage_inductance": "leakage_inductance", "stator_inductance": "magnetizing_inductance"}
+)
+_SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "t": (
+            "stator_resistance", "rotor_resistance", "stator_leakage_inductance", "rotor_leakage_inductance",
+            "magnetizing_inductance",
+        ),
+        "gamma": ("stator_resistance", "rotor_resistance", "leakage_inductance", "stator_inductance"),
+    }
+)  # fmt: skip
 
 
 _CIRCUITS: Mapping[str, Callable[[InverseGamma], dict[str, float]]] = MappingProxyType(

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from commissioner.errors import ConfigurationError, UsageError
+
+if TYPE_CHECKING:
+    from commissioner.registers.tuning import Tuning
 
 WORDS_PER_ELEMENT = MappingProxyType({"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1})
 """Registers one element of a type takes; an ascii element is a register with two characters."""
@@ -94,6 +99,7 @@ class Item:
     minimum: float | None = None
     maximum: float | None = None
     word_order: str = "big"
+    source: str = ""
 
     @property
     def words(self) -> int:
@@ -115,6 +121,15 @@ class LinkLimits:
     turnaround_s: float
     device_id: int
     write_pause_s: float = 0.0
+    write_functions: tuple[int, ...] = (16,)
+    """Modbus functions by which the drive takes registers: 6 one, 16 several."""
+    reply_s: float | None = None
+    """How long this drive may take to answer; None: the caller's own time."""
+
+    @property
+    def longest_write(self) -> int:
+        """Registers that one request can write."""
+        return self.max_write_registers if 16 in self.write_functions else 1
 
 
 @dataclass(frozen=True)
@@ -165,6 +180,8 @@ class ParameterGroup:
     order: tuple[str, ...]
     staged_crc: str | None
     settle_s: float
+    enter: tuple[tuple[int, int], ...] = ()
+    """Raw (address, value) writes by which values written before come into use; only then can they be read back."""
 
     @property
     def is_staged(self) -> bool:
@@ -173,11 +190,28 @@ class ParameterGroup:
 
 @dataclass(frozen=True)
 class Store:
-    """How values become non-volatile: raw (address, value) writes after, or one coil before the values are written."""
+    """How values become non-volatile: raw (address, value) writes after, or one coil before the values are written.
+
+    `done`: the register that holds this value once the memory is written; looked at for `within_s`.
+    """
 
     endurance_writes: int | None
     writes: tuple[tuple[int, int], ...] = ()
     coil: int | None = None
+    done: tuple[int, int] | None = None
+    within_s: float = 5.0
+
+
+@dataclass(frozen=True)
+class Worked:
+    """An example from the cited document: these words on the wire are this value, which is so much per phase in SI."""
+
+    item: str
+    source: str
+    wire: int | None = None
+    words: tuple[int, ...] = ()
+    value: float | None = None
+    per_phase: float | None = None
 
 
 @dataclass(frozen=True)
@@ -213,6 +247,8 @@ class DriveProfile:
     exceptions: Mapping[int, str] = field(default_factory=dict)
     limits: DriveLimits = field(default_factory=DriveLimits)
     unknown: Mapping[str, str] = field(default_factory=dict)
+    worked: tuple[Worked, ...] = ()
+    tuning: Tuning | None = None
 
     def item(self, name: str) -> Item:
         """The item; UsageError says why where the file does not know it."""
@@ -273,6 +309,8 @@ def check_consistency(profile: DriveProfile) -> DriveProfile:
     _check_overlaps(profile)
     _check_sizes(profile)
     _check_references(profile)
+    if profile.kind == "commercial":
+        _check_sources(profile)
     if profile.kind == "commissioning_map":
         _check_commissioning_map(profile)
     return profile
@@ -299,12 +337,26 @@ def _check_sizes(profile: DriveProfile) -> None:
         room = profile.link.max_read_registers
         if item.words > room:
             raise _refuse(profile, f"items.{item.name}.length", item.length, f"at most {room} registers per read")
-        if item.access != "r" and item.words > profile.link.max_write_registers:
-            limit = profile.link.max_write_registers
+        if item.access != "r" and item.words > profile.link.longest_write:
+            limit = profile.link.longest_write
             raise _refuse(profile, f"items.{item.name}.length", item.length, f"at most {limit} registers per write")
     if profile.window is not None and profile.window.words > profile.link.max_read_registers:
         room = profile.link.max_read_registers - profile.window.header_words
         raise _refuse(profile, "window.data_registers", profile.window.data_registers, f"at most {room}")
+
+
+def is_a_lead(source: str) -> bool:
+    """Whether a text says of itself that it is no vendor source."""
+    return re.search(r"\b(lead|unknown)\b", source, re.IGNORECASE) is not None
+
+
+def _check_sources(profile: DriveProfile) -> None:
+    """What no source told is no address: it stands in [unknown]. A commissioning map is its own source."""
+    for item in profile.items.values():
+        if not item.source.strip():
+            raise _refuse(profile, f"items.{item.name}.source", None, "the manual, page or code the register is from")
+        if is_a_lead(item.source):
+            raise _refuse(profile, f"items.{item.name}.source", item.source, "a source; a lead goes into [unknown]")
 
 
 def _check_references(profile: DriveProfile) -> None:

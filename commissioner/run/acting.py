@@ -80,6 +80,9 @@ class _Memory:
     def write_coil(self, address: int, value: bool) -> None:
         pass
 
+    def read_coil(self, address: int) -> bool:
+        return False
+
     def doubt(self) -> None:
         pass
 

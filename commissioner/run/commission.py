@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
@@ -26,13 +27,14 @@ from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import diagnosis_sentences, summarise
 from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
+from commissioner.run.archive.summary import read_file
 from commissioner.run.diagnosed import diagnose_run
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
-from commissioner.run.job import bounds, make_job, open_drive, parameter_names, watch_limits
+from commissioner.run.job import bounds, make_job, names_of, open_drive, watch_limits
 from commissioner.run.runner import Course, Present, Runner, kind_of
-from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
 from commissioner.run.stopping.stop_file import stopped_by_file
 
 BUSY = 3.0
@@ -104,8 +106,10 @@ def commission(
         with closing(folder), asked, stopped_by_file(folder.path, asked):
             begun(folder.path)
             _tell(folder, present, WarmingUp())
-            warm_up(nameplate)
+            with suppress(Abandoned), asked.computing():
+                warm_up(nameplate)
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
+            lock.release()  # the drive is let go: what follows is the archive's
             result = close_run(order, folder, findings, ended)
             if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
                 _tell(folder, present, Diagnosing(diagnosis_s))
@@ -185,10 +189,8 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
     if findings.winding_degc is not None:
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
-    result: RunDocument = plain(summarise(findings, ended, folder.path.name, parameter_names(order.profile)))
-    folder.save("result.json", result)
-    journal = read_journal(folder.path / "journal.jsonl")
-    folder.save_text("report.html", run_page(result, journal, findings))
+    result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
+    write_report(folder, result, findings)
     folder.cover()
     return result
 
@@ -206,6 +208,12 @@ def _with_diagnosis(
     diagnosis = diagnose_run(folder, go_on)
     remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
     completed: RunDocument = {**result, "diagnosis": diagnosis, "remarks": remarks}
-    folder.save("result.json", completed)
-    folder.save_text("report.html", run_page(completed, read_journal(folder.path / "journal.jsonl"), findings))
+    write_report(folder, completed, findings)
     return completed
+
+
+def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
+    """`result.json`, and the page that names its digest."""
+    digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
+    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
+    folder.save_text("report.html", run_page(result, journal, findings, request, digest))

@@ -14,6 +14,12 @@ from commissioner.recordings.table import read_table, to_standstill
 from commissioner.run.archive.folder import RunFolder
 
 FILE, RECORDING = "diagnosis.json", "recording.parquet"
+_OF_A_CAUSE = ("name", "title", "parameters", "confidence", "equivalent", "strength_over_noise")
+_KEPT = (
+    "gain", "parameters_before", "parameters_after", "detection_limits", "below_materiality", "cannot_tell",
+    "next_experiment", "remarks", "is_complete",
+)  # fmt: skip
+"""Of the whole document: what the run's report shows."""
 
 
 def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]:
@@ -38,14 +44,10 @@ def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]
     return {
         "verdict": document["verdict"],
         "reason": document["reason"],
-        "causes": [
-            {key: c[key] for key in ("name", "parameters", "confidence", "equivalent")} for c in document["causes"]
-        ],
+        "causes": [{key: cause[key] for key in _OF_A_CAUSE} for cause in document["causes"]],
         "moved": _moved(seen),
-        "remarks": document["remarks"],
-        "is_complete": document["is_complete"],
         "file": FILE,
-    }
+    } | {key: document[key] for key in _KEPT if key in document}
 
 
 def _moved(seen: Diagnosis) -> list[dict[str, Any]]:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import ModbusPort
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import CheckResult, judge_drive, judge_idle
+from commissioner.procedure.checks import CheckResult, NotChecked, judge_drive, judge_idle
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.records import DriveIdentity, DriveStatus
+from commissioner.registers.convention import parameter_limits
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -32,6 +34,7 @@ class Inspection:
     watchdog: Mapping[str, Any]
     checks: tuple[CheckResult, ...]
     job: Job | None = None
+    not_checked: tuple[NotChecked, ...] = ()
 
 
 def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: ProcedurePlan) -> Inspection:
@@ -52,9 +55,65 @@ def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: Proce
         else:
             checks = judge_idle(_shown(profile, statuses[-1]), plate, nameplate)
         parameters = inverter.snapshot().in_use
+        checks += (*_found(inverter, parameters, nameplate), _answered(port))
     watchdog = profile.watchdog
     known = dataclasses.asdict(watchdog) if watchdog else {"none": "the drive file describes none"}
-    return Inspection(identity, plate, parameters, known, checks, job)
+    return Inspection(identity, plate, parameters, known, checks, job, tuple(_not_checked(profile)))
+
+
+def _answered(port: ModbusPort) -> CheckResult:
+    """Nothing is known of a drive that was not asked, or did not answer."""
+    answers = len(port.stats.latencies_s) - port.stats.refusals
+    return CheckResult(
+        "a drive answers", answers > 0, f"{answers} answered requests", "at least 1",
+        "the drive file knows no register to read: take one that does, or look registers up in the manual",
+    )  # fmt: skip
+
+
+def _found(inverter: Inverter, held: Mapping[str, float], nameplate: Nameplate) -> Iterator[CheckResult]:
+    """What the drive holds must be a motor's values, or its file reads another register or width than it says."""
+    if inverter.profile.kind == "commissioning_map":
+        return
+    doubtful = {d.name: d.as_error() for d in inverter.implausible(held, nameplate)}
+    for name, (low, high) in parameter_limits(inverter.profile, nameplate).items():
+        error = doubtful.get(name)
+        seen = f"{held[name]:.6g} {inverter.profile.item(name).unit}"
+        if error is None:
+            yield CheckResult(f"{name} in the drive", True, seen, f"near {low:.4g} ... {high:.4g}", "")
+        else:
+            yield CheckResult(error.what, False, error.value, error.limit, error.remedy)
+
+
+TELLING = ("serial_number", "drive_type", "magic")
+PLATE = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
+
+
+def _not_checked(profile: DriveProfile) -> Iterator[NotChecked]:
+    """What this drive file leaves open."""
+    if profile.kind == "commissioning_map":
+        return
+    if not any(name in profile.items for name in TELLING):
+        why = profile.unknown.get("identity", "the drive file knows no register for type, firmware or serial number")
+        yield NotChecked("which drive this is: nothing in its registers tells two of this type apart", why)
+    if "status_word" not in profile.items or profile.status_decoder == "none":
+        why = profile.unknown.get("status_word", "the drive file knows no status word")
+        yield NotChecked("no fault, output off", why)
+    for name in PLATE:
+        if name not in profile.items:
+            yield NotChecked(
+                f"{name} in the drive", profile.unknown.get(name, "the drive file knows no register for it")
+            )
+    for name in profile.parameters.order if profile.parameters else ():
+        if not profile.item(name).convention:
+            yield NotChecked(
+                f"{name} in the drive", "its unit or convention has no source: it is shown as the drive counts"
+            )
+    if profile.parameters is None:
+        yield NotChecked(
+            "motor parameters in the drive", profile.unknown.get("parameters", "no register is known for them")
+        )
+    if profile.watchdog is None:
+        yield NotChecked("watchdog", profile.unknown.get("watchdog", "the drive file describes none"))
 
 
 def _shown(profile: DriveProfile, status: DriveStatus) -> DriveStatus | None:

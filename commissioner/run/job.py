@@ -14,7 +14,7 @@ from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.procedure.verdict import PARAMETERS
-from commissioner.registers.convention import INDUCTANCES, RESISTANCES, is_our_own
+from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
@@ -44,22 +44,30 @@ def make_job(
     inverter = Inverter(port, profile)
     for _ in range(LATENCY_PROBES):
         inverter.read_status()
+    names, factors = names_of(profile)
     return Job(
         plan=plan,
         nameplate=nameplate,
         drive_limits=drive_limits(profile),
-        parameter_names=parameter_names(profile),
+        parameter_names=names,
+        parameter_factors=factors,
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
     )
 
 
-def parameter_names(profile: DriveProfile) -> dict[str, str]:
-    """The drive's name of each parameter that is one of the contract's, not another circuit's or in another form."""
-    by_quantity = dict(zip((*RESISTANCES, *INDUCTANCES[:2]), PARAMETERS, strict=True))
-    items = [profile.item(name) for name in profile.parameters.order] if profile.parameters else []
-    known = {item.name: by_quantity.get(item.quantity or item.name) for item in items if is_our_own(item)}
-    return {name: field for name, field in known.items() if field is not None}
+def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:
+    """Of each parameter that says one of the contract's by itself: the drive's name -> that field, and the factor by
+    which the drive multiplies its SI value where that is not 1."""
+    order = profile.parameters.order if profile.parameters else ()
+    names: dict[str, str] = {}
+    factors: dict[str, float] = {}
+    for name, ours in our_values(profile, dict.fromkeys(order, 1.0), None).items():
+        if ours.field in PARAMETERS and not ours.is_of_a_set:
+            names[name] = ours.field
+            if ours.value != 1.0:
+                factors[name] = 1.0 / ours.value
+    return names, factors
 
 
 def drive_limits(profile: DriveProfile) -> DriveLimits:

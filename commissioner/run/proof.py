@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from commissioner.errors import CommissionerError, DataRefused
-from commissioner.motor.circuit import InverseGamma
-from commissioner.motor.nameplate import Nameplate, prior
+from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ParameterSnapshot
-from commissioner.registers.convention import drive_values
+from commissioner.registers.convention import parameter_limits
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive.documents import damaged, read_saved
 from commissioner.run.archive.journal import Record, read_journal
@@ -66,14 +64,6 @@ def check_plausible(folder: Path, profile: DriveProfile, snapshot: ParameterSnap
                     value=f"{which}.{name} = {value:.6g} {profile.item(name).unit}", limit=f"{low:.4g} ... {high:.4g}",
                     remedy="if the drive did hold it before the run, enter it at the drive by hand",
                 )  # fmt: skip
-
-
-def parameter_limits(profile: DriveProfile, plate: Nameplate) -> dict[str, tuple[float, float]]:
-    """Lowest and highest value of each of the drive's parameters over the corners of the plate's box, in the items' units."""
-    box = prior(plate)
-    sides = zip(box.lower.as_tuple(), box.upper.as_tuple(), strict=True)
-    corners = [drive_values(profile, InverseGamma(*corner), plate).values for corner in itertools.product(*sides)]
-    return {name: (min(c[name] for c in corners), max(c[name] for c in corners)) for name in corners[0]}
 
 
 def read_plate(folder: Path) -> Nameplate:

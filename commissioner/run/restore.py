@@ -36,9 +36,11 @@ class Restored:
 
     run: str
     written: tuple[WrittenParameter, ...]
-    store_count: int
+    store_count: int | None
     wear_fraction: float | None
     is_stored: bool
+    fault: str = ""
+    """What the drive reports after it; empty: nothing."""
 
 
 def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key: bytes | None = None) -> Restored:
@@ -80,7 +82,9 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
                 mastery.take(inverter.identify())
                 report = _bring_back(inverter, snapshot, lines, journal)
         note(journal, "snapshot_restored", report)  # the drive holds it, whether the disk takes the record or not
-    return Restored(run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored)
+    return Restored(
+        run.run, report.written, report.store_count_after, report.wear_fraction, report.is_stored, report.fault
+    )
 
 
 def _bring_back(
@@ -111,6 +115,8 @@ def _check_known(
     present: Mapping[str, float], snapshot: ParameterSnapshot, profile: DriveProfile, lines: list[dict[str, Any]]
 ) -> None:
     """IdentityMismatch where a value in use was neither found by this run nor announced by it."""
+    if any(line["kind"] == "tuning_began" for line in lines):
+        return  # what the drive found by itself nobody announced
     announced = list(_announced(lines))
     if (
         profile.parameters

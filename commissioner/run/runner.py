@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Generator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,7 +20,7 @@ from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParamete
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
-from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
+from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
 from commissioner.run.stream import Stream, stop_if
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
@@ -109,21 +110,24 @@ class Runner:
         reply: object = None
         while True:
             if self._stop.wish is not None and not self._progress.has_written:  # what is written ends as written
-                self._progress.granted = self._stop.wish
-                raise Aborted(
-                    "stopped by the operator",
-                    step="run",
-                    value=self._stop.asked,
-                    limit="no stop",
-                    remedy="start again when ready",
-                )
+                raise self._granted(self._stop.wish)
             try:
-                command = course.send(reply)
+                with nullcontext() if self._progress.has_written else self._stop.computing():
+                    command = course.send(reply)
+            except Abandoned:
+                assert self._stop.wish is not None
+                raise self._granted(self._stop.wish) from None
             except StopIteration as stop:
                 ended = stop.value
                 assert isinstance(ended, RunEnded)
                 return replace(ended, energised_s=self.energised_s)
             reply = self._carry_out(command)
+
+    def _granted(self, wish: StopAsked) -> Aborted:
+        self._progress.granted = wish
+        return Aborted(
+            "stopped by the operator", step="run", value=str(wish), limit="no stop", remedy="start again when ready"
+        )
 
     def _carry_out(self, command: ask.Command) -> object:
         refusal = permit(command, self._progress.facts, self._bounds)

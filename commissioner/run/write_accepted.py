@@ -28,6 +28,7 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
+from commissioner.run.job import parameter_names
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -56,7 +57,7 @@ class Plan:
     run: str
     what: str
     drive_type: str
-    serial_number: int
+    serial_number: int | None
     rows: tuple[PlannedRow, ...]
 
     @property
@@ -88,6 +89,16 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
     ready = _ready(run, url)
     with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
+
+
+def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    ready = _ready(run, url)
+    with _drive(ready) as inverter:
+        snapshot = inverter.snapshot()
+    names = parameter_names(ready.profile)
+    held = {names[name]: value for name, value in snapshot.in_use.items() if name in names}
+    return f"{snapshot.identity.drive_type} #{snapshot.identity.serial_number}", held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:
@@ -199,15 +210,12 @@ def _drive(ready: _Ready) -> Iterator[Inverter]:
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
     identity = inverter.identify()
-    if (identity.drive_type, identity.serial_number) != (
-        ready.snapshot.identity.drive_type,
-        ready.snapshot.identity.serial_number,
-    ):
+    if identity.words != ready.snapshot.identity.words:
         raise IdentityMismatch(
             "this is not the drive of the run",
             step=what,
-            value=f"{identity.drive_type} #{identity.serial_number}",
-            limit=f"{ready.snapshot.identity.drive_type} #{ready.snapshot.identity.serial_number}",
+            value=identity.words,
+            limit=ready.snapshot.identity.words,
             remedy="connect the drive that was measured, or measure this one",
         )
     present = inverter.snapshot().in_use

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.settings import read_toml
+from commissioner.validation import first_problem
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,39}$")]
 Name = Annotated[str, Field(min_length=1, max_length=80)]
@@ -50,6 +51,8 @@ class ServiceTable(_Table):
     hand_over_s: Annotated[float, Field(ge=1, le=600)] = 15.0
     session_idle_s: Annotated[float, Field(ge=1, le=86400)] = 1800.0
     diagnosis: bool = True
+    axes_deg: list[Annotated[float, Field(ge=0, lt=360)]] = []
+    """Of runs from the page, in electrical degrees; none: the procedure's own."""
 
 
 class ServiceFile(_Table):
@@ -133,7 +136,7 @@ def _read(config: Path) -> ServiceFile:
     try:
         return ServiceFile.model_validate(read_toml(config))
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        seen = None if first["type"] == "missing" else first["input"]
-        raise ConfigurationError(file=str(config), key=key, value=seen, expected=str(first["msg"])) from error
+        problem = first_problem(error, ServiceFile)
+        raise ConfigurationError(
+            file=str(config), key=problem.key, value=problem.value, expected=problem.expected
+        ) from error

@@ -118,10 +118,10 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
             name = str(problem["loc"][0])
             described = MotorFile.model_fields[name].description if name in MotorFile.model_fields else None
             missing = problem["type"] == "missing" or values.get(name) in (None, "")
-            what = "is missing" if missing else str(problem["msg"])
+            what = "is missing" if missing else _wrong(str(problem["type"]))
             if name in fields:
                 fields[name] = {"ok": False, "what": what, "remedy": described or "read the plate again"}
-        return {"ok": False, "fields": fields, "efficiency": None, "questions": []}
+        return {"ok": False, "fields": fields, "efficiency": None, "usual_efficiency": None, "questions": []}
     plate = Nameplate(**table.model_dump(exclude={"name"}))
     for contradiction in check(plate):
         fields[contradiction.key] = {
@@ -132,8 +132,19 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
     efficiency = efficiency_of(plate)
     return {
         "ok": all(field["ok"] for field in fields.values()), "fields": fields, "efficiency": round(efficiency, 4),
-        "slip": round(plate.rated_slip, 5), "questions": questions(plate),
+        "usual_efficiency": usual_efficiency(plate), "slip": round(plate.rated_slip, 5), "questions": questions(plate),
     }  # fmt: skip
+
+
+def _wrong(kind: str) -> str:
+    """What pydantic found, as a technician says it."""
+    if kind.startswith("int"):
+        return "is no whole number"
+    if kind.startswith(("float", "finite")):
+        return "is no number"
+    if kind.startswith(("greater", "less")):
+        return "is outside what motors have"
+    return "is neither star nor delta" if kind == "literal_error" else "cannot be used"
 
 
 def efficiency_of(plate: Nameplate) -> float:

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from commissioner.errors import Aborted, CommissionerError, DataRefused, DriveError, UsageError
+from commissioner.validation import wanted
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -44,6 +45,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (429, "Too often."),
         (502, "The drive or the link failed."),
         (503, "Not ready yet."),
+        (507, "The disk takes no more."),
     )
 }
 """For OpenAPI: what any route may answer beside its success."""
@@ -67,6 +69,14 @@ def refusal_of(error: CommissionerError) -> Refusal:
     )  # fmt: skip
 
 
+def disk_refuses(failure: OSError) -> Refusal:
+    """What needs an entry on the disk is not done without one."""
+    return Refusal(
+        507, "the disk takes no more", detail=str(failure)[:200], step="write down", value=failure.strerror or str(failure)[:200],
+        limit="room for an entry before anything is done", remedy="make room on the service's disk, then repeat; STOP works without",
+    )  # fmt: skip
+
+
 _STATUS: Sequence[tuple[type[CommissionerError], int]] = (
     (UsageError, 422), (DataRefused, 422), (Aborted, 409), (DriveError, 502), (CommissionerError, 409),
 )  # fmt: skip
@@ -86,16 +96,16 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
     async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
-        unreadable = first["type"] == "json_invalid"
+        unreadable, expected = first["type"] == "json_invalid", wanted(first)
         return answer(
             request,
             Refusal(
                 400 if unreadable else 422,
                 f"{where or 'the body'} cannot be used",
-                detail=str(first["msg"]),
+                detail=expected,
                 step="read the request",
                 value=_shown(first.get("input")),
-                limit=str(first["msg"]),
+                limit=expected,
                 remedy=f"correct {where or 'the body'}; /openapi.json describes it",
             ),
         )

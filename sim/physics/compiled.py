@@ -21,6 +21,20 @@ def _forget_stale_kernels(folder: Path) -> None:
 
 _forget_stale_kernels(Path(__file__).parents[1])
 FAST = {"reassoc", "arcp", "contract", "nsz"}
-kernel = njit(cache=True, error_model="numpy", fastmath=FAST)
+
+
+def cached(**options):
+    """numba's `njit`, cached; compiled anew by every process where no folder may be written."""
+
+    def compile_later(function):
+        try:
+            return njit(cache=True, **options)(function)
+        except RuntimeError:
+            return njit(**options)(function)
+
+    return compile_later
+
+
+kernel = cached(error_model="numpy", fastmath=FAST)
 piece = njit(forceinline=True, error_model="numpy", fastmath=FAST)
 """A part of a kernel too small to be called: it is written into its callers by the compiler."""

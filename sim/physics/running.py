@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.physics.compiled import cached
 from sim.physics.loads import PeriodicLoad
 
 
@@ -144,7 +144,7 @@ def _to_phases(alpha: NDArray[np.float64], beta: NDArray[np.float64]) -> NDArray
     return np.stack([alpha, -0.5 * alpha + half, -0.5 * alpha - half])
 
 
-@njit(cache=True, fastmath=True)
+@cached(fastmath=True)
 def _voltage(mains, t):
     amplitude, w0, unbalance, tilt, fifth, seventh, ramp, wave, wave_rate, wave_start, sag, sag_rate = mains
     angle = w0 * t + 0.5 * ramp * t * t - wave / wave_rate * (np.cos(wave_rate * t + wave_start) - np.cos(wave_start))
@@ -156,7 +156,7 @@ def _voltage(mains, t):
     return size * alpha, size * beta
 
 
-@njit(cache=True, fastmath=True)
+@cached(fastmath=True)
 def _load_torque(tables, turning, steady, t, speed, angle):
     total = steady[0] + steady[1] * speed + steady[2] * speed * speed
     for k in range(turning.shape[0]):
@@ -170,7 +170,7 @@ def _load_torque(tables, turning, steady, t, speed, angle):
     return total
 
 
-@njit(cache=True, fastmath=True)
+@cached(fastmath=True)
 def _slope(circuit, mains, tables, turning, steady, t, x, out):
     pairs, r_s, r_r, l_s, l_r, l_m, inertia, slots, slot_part, bend = circuit
     speed, angle = x[4], x[5]
@@ -199,7 +199,7 @@ def _slope(circuit, mains, tables, turning, steady, t, x, out):
     return va, vb, is_a, is_b, torque, load
 
 
-@njit(cache=True, fastmath=True)
+@cached(fastmath=True)
 def _march(circuit, mains, tables, turning, steady, start, first, count, period, substeps):
     x = start.copy()
     y = np.empty(6)

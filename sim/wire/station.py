@@ -44,6 +44,14 @@ class Options:
     parity: str = "N"
 
 
+def ready_url(kind: str, address: str, options: Options) -> str:
+    """The drive URL of a line of ours, for a command line; to be quoted there, since shells read ? and &."""
+    if kind == "rtu":
+        return f"rtu://{address}?baud={options.baud}&parity={options.parity}&device={load_map().device_id}"
+    files = "ca=FILE&cert=FILE&key=FILE&" if kind == "tls" else ""
+    return f"{kind}://{address}?{files}device={load_map().device_id}"
+
+
 class Drive:
     """The firmware with its pace and its faults; answers register requests."""
 

@@ -619,4 +619,59 @@ WINDOW = (
     ),
 )
 
-DEFECTS: tuple[Defect, ...] = (*LINK, *WHO, *SUPERVISION, *COMMANDS, *WRITE_BACK, *SIGNAL, *WINDOW)
+LATER = (
+    _defect(
+        "check sum over what is in use instead of what is staged",
+        PARAMETERS,
+        "cm_crc16(0xFFFF, staged, 2 * CM_PARAMETERS)",
+        "cm_crc16(0xFFFF, &drive->image[CM_IN_USE], 2 * CM_PARAMETERS)",
+        "the-check-sum-covers-every-value",
+    ),
+    _defect(
+        "quick stop is heard at rest only",
+        STATES,
+        " || !(word & QUICK_STOP_OFF))",
+        " || (!(word & QUICK_STOP_OFF) && drive->state != CM_ENABLED))",
+        "quick-stop-blocks-at-once",
+    ),
+    _defect(
+        "the bias is never applied",
+        EXCITATION,
+        "*volts = (float)e->bias / BILLION +",
+        "*volts = 0.0f * (float)e->bias +",
+        "a-bias-drives-a-current",
+    ),
+    _defect(
+        "phase w shows phase v",
+        STATES,
+        "cm_port_currents(currents);",
+        "cm_port_currents(currents); currents[2] = currents[1];",
+        "phase-currents-sum-to-nothing",
+    ),
+    _defect(
+        "the first window is called an overrun",
+        RING,
+        "flags |= wanted < oldest ?",
+        "flags |= wanted <= oldest ?",
+        "windows-join-without-gap",
+    ),
+    _defect(
+        "the window's index moves by function 23 only",
+        SERVER,
+        "return write_half(drive, address, count, &pdu[6]);",
+        "return address == CM_WINDOW_INDEX ? CM_OK : write_half(drive, address, count, &pdu[6]);",
+        "write-and-read-apart-give-the-same-window",
+    ),
+)
+
+ON_A_SERIAL_LINE = _defect(
+    "answers for every device number",
+    SERVER,
+    "    if (length <= 0) /*",
+    "    if (length == 0) {\n        carry_out(drive, table, &request[1]);\n        modbus_set_slave(line, request[0]);\n"
+    "        modbus_reply(line, request, 8, table);\n        modbus_set_slave(line, 1);\n    }\n    if (length <= 0) /*",
+    "other-devices-numbers-are-left-alone",
+)
+"""To be tried over a serial line, where there are several devices."""
+
+DEFECTS: tuple[Defect, ...] = (*LATER, *LINK, *WHO, *SUPERVISION, *COMMANDS, *WRITE_BACK, *SIGNAL, *WINDOW)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.export import playback as player
 from commissioner.diagnose.fit.gauss_newton import fit
@@ -23,6 +23,7 @@ BOUND_TO_THE_RECORDING = frozenset(
         "mains_pickup",
         "dc_link_ripple",
         "sensor_drift",
+        "sensor_switch_on",
         "remanence",
         "shaft_motion",
         "lost_samples",

@@ -6,7 +6,7 @@ from tests.support.command_line import call
 from tests.support.raw_servers import Bank, TcpDevice
 
 STATUS_WORD, STATOR_RESISTANCE = 50199, 1299
-READY, RUNNING, TRIPPED = 0x0002, 0x0802, 0x000A
+READY, RUNNING, TRIPPED = 0x0202, 0x0A02, 0x020A
 
 
 def fc302() -> Bank:

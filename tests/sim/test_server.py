@@ -217,12 +217,17 @@ def test_command_line_serves_and_prints_where(tmp_path):
         "--nvm",
         str(tmp_path / "nvm"),
     ]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             lines = [process.stdout.readline().split() for _ in range(2)]
             assert [line[:2] for line in lines] == [["listening", "tcp"], ["listening", "rtu"]]
             with TcpClient(lines[0][2]) as client:
                 assert client.read(0, 2) == [0x434D, 0x5352]
+            ready = [process.stderr.readline().strip() for _ in range(2)]
+            assert ready == [
+                f'ready: --drive "tcp://{lines[0][2]}?device=1"',
+                f'ready: --drive "rtu://{lines[1][2]}?baud=115200&parity=N&device=1"',
+            ]
         finally:
             process.terminate()
         assert process.wait(10) == 0

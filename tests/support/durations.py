@@ -1,37 +1,45 @@
-"""What each test costs: `pytest -p tests.support.durations --costs FILE` writes CPU and wall seconds, children's included.
+"""What each test costs: `pytest -p tests.support.durations --costs FILE` writes CPU seconds, children's included.
 
-CPU seconds also hold on a busy host. `tests/conftest.py` begins the costliest first, from the table kept under `.ci/`.
+CPU seconds also hold on a busy host. `tests/conftest.py` begins the costliest first, from the table kept under `.ci/`; of
+several workers each adds what it ran. `python -m tests.support.durations` makes that table anew, from a whole run.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import time
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
+
+KEPT_FROM_S = 1.0
+TABLE = Path(__file__).parents[2] / ".ci" / "costs.json"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--costs", type=Path, default=None, help="Write CPU and wall seconds of each test to this file.")
+    parser.addoption("--costs", type=Path, default=None, help="Add the CPU seconds of each test to this file.")
 
 
 class Costs:
     def __init__(self, file: Path) -> None:
         self.file = file
-        self.rows: dict[str, tuple[float, float]] = {}
+        self.rows: dict[str, float] = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item):
-        cpu, wall = _cpu_s(), time.monotonic()
+        before = _cpu_s()
         result = yield
-        self.rows[item.nodeid] = (round(_cpu_s() - cpu, 2), round(time.monotonic() - wall, 2))
+        self.rows[item.nodeid.split("@")[0]] = round(_cpu_s() - before, 1)
         return result
 
     def pytest_sessionfinish(self) -> None:
-        table = json.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
-        self.file.write_text(json.dumps(table | self.rows, indent=0, sort_keys=True) + "\n", "utf-8")
+        with FileLock(self.file.with_suffix(".lock")):
+            table = json.loads(self.file.read_text("utf-8")) if self.file.exists() else {}
+            kept = {name: cost for name, cost in (table | self.rows).items() if cost >= KEPT_FROM_S}
+            self.file.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n", "utf-8")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -41,3 +49,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def _cpu_s() -> float:
     return sum(os.times()[:4])
+
+
+if __name__ == "__main__":
+    TABLE.unlink(missing_ok=True)
+    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.durations", "--costs", TABLE]))

@@ -98,6 +98,10 @@ class ScriptedDrive:
         self._fail()
         self.log.append((f"coil {address}", str(value)))
 
+    def read_coil(self, address: int) -> bool:
+        self._fail()
+        return False
+
     def doubt(self) -> None:
         self.doubts += 1
 

@@ -1,6 +1,8 @@
 """A cached kernel goes when a source it may have been made of is younger; the others stay."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -40,3 +42,37 @@ def test_a_folder_without_a_cache_is_left_alone(tmp_path):
     (tmp_path / "kernels").mkdir()
     (tmp_path / "numbers.py").touch()
     forget_stale_kernels(str(tmp_path / "kernels"), "numbers.py")
+
+
+@pytest.mark.parametrize(
+    "modules", ["commissioner.identify.batch.output_error, commissioner.motor.running", "sim.physics.running"]
+)
+def test_without_a_folder_to_write_kernels_are_compiled_anew_and_no_import_fails(modules):
+    """As in a container whose root is read-only: numba finds no place for its cache."""
+    script = (
+        "import tempfile\n"
+        "def refuse(*a, **k): raise OSError(30, 'Read-only file system')\n"
+        "tempfile.TemporaryFile = refuse\n"
+        f"import {modules}\n"
+        "from numba import njit\n"
+        "try:\n    njit(cache=True)(refuse)\nexcept RuntimeError:\n    print('no cache, imported')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "no cache, imported", done.stderr
+
+
+def test_a_kernel_without_a_cache_computes_the_same(monkeypatch):
+    import tempfile
+
+    from commissioner.compiled import njit
+
+    def refuse(*_args, **_more):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+
+    @njit()
+    def twice(x):
+        return 2.0 * x
+
+    assert twice(3.0) == 6.0 and twice.stats.cache_path is None

@@ -1,8 +1,12 @@
 """A configuration file that cannot be right is refused with file, key, value and what would be right."""
 
+import tomllib
+
 import pytest
 
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError, DataRefused, UsageError
+from commissioner.identify.intake.plate import nameplate_from
+from commissioner.recordings.plate import plate_of
 from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
 
 PLATE = (CONFIG_FOLDER / "motors" / "motor_2kw2.toml").read_text()
@@ -25,10 +29,12 @@ def test_every_shipped_motor_and_the_procedure_load():
     [
         ("rated_power_w = 2200.0", "rated_power_w = 2.2", "rated_power_w", "watts"),
         ("rated_power_w = 2200.0", "rated_power_kw = 2.2", "rated_power_kw", "rated_power_w"),
-        ("pole_pairs = 2", "pole_pairs = 2.5", "pole_pairs", "integer"),
+        ("pole_pairs = 2", "pole_pairs = 2.5", "pole_pairs", "whole number"),
         ("pole_pairs = 2", "pole_pairs = 4", "rated_speed_rpm", "synchronous"),
         ("power_factor = 0.80", "power_factor = 80", "power_factor", "cos phi"),
-        ('connection = "star"', 'connection = "wye"', "connection", "star"),
+        ('connection = "star"', 'connection = "ring"', "connection", "star (Y, wye) or delta"),
+        ('connection = "star"', "connection = 3", "connection", "star (Y, wye) or delta"),
+        ("rated_current_a = 5.0", "rated_current_a = [5.0]", "rated_current_a", "rated current: a number in A"),
         ("rated_current_a = 5.0", 'rated_current_a = "5 A"', "rated_current_a", "number"),
         ("rated_current_a = 5.0", "rated_current_a = nan", "rated_current_a", "0.05"),
         ("rated_voltage_v = 400.0", "", "rated_voltage_v", "volts"),
@@ -46,6 +52,32 @@ def test_an_impossible_plate_names_file_key_value_and_what_would_be_right(tmp_pa
     assert error.key == key
     assert hint in str(error.limit)
     assert key in error.remedy
+    assert "Input should" not in str(error.limit)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("Y", "star"), ("y", "star"), ("WYE", "star"), (" Star ", "star"), ("D", "delta"), ("\u0394", "delta"),
+     ("\u25b3", "delta"), ("triangle", "delta"), ("Delta", "delta")],
+)  # fmt: skip
+def test_star_and_delta_are_read_as_plates_and_drives_write_them(tmp_path, written, meant):
+    path = _motor(tmp_path, PLATE.replace('connection = "star"', f'connection = "{written}"'))
+    assert load_motor(path).connection == meant
+    numbers = {key: value for key, value in tomllib.loads(PLATE).items() if isinstance(value, float | int)}
+    assert nameplate_from(numbers | {"connection": written}).connection == meant
+    assert (
+        plate_of(
+            {key: float(value) for key, value in numbers.items()} | {"connection": written}, "x.csv", None
+        ).connection
+        == meant
+    )
+
+
+def test_a_ring_is_no_connection_in_a_recording_either():
+    numbers = {key: value for key, value in tomllib.loads(PLATE).items() if isinstance(value, float | int)}
+    with pytest.raises(DataRefused) as caught:
+        nameplate_from(numbers | {"connection": "ring"})
+    assert "star (Y, wye) or delta" in str(caught.value.limit)
 
 
 def test_broken_toml_and_missing_files_are_named(tmp_path):

@@ -10,7 +10,16 @@ from rich.markup import escape
 
 from commissioner.cli.screens.screen import out as screen
 from commissioner.cli.screens.screen import table
-from commissioner.report.diagnosis.names import TOGETHER, class_name, main_quantity, members, said, spoken, sure_words
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.report.diagnosis.names import (
+    class_name,
+    is_together,
+    main_quantity,
+    members,
+    said,
+    spoken,
+    sure_words,
+)
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, limit_words, number, part_word, sure
 from commissioner.report.diagnosis.words import (
     actions,
@@ -23,14 +32,7 @@ from commissioner.report.diagnosis.words import (
 )
 
 COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}
-COMMON = (
-    "dead_time",
-    "leakage_saturation",
-    "magnetizing_saturation",
-    "rotor_skin_effect",
-    "sampling_delay",
-    "sensor_offset",
-)
+COMMON = tuple(sorted(name for name, cause in CATALOGUE.items() if cause.is_common))
 MOST_LIMITS = 6
 
 
@@ -54,6 +56,8 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
     else:
         _error(document)
     _uncertain(document)
+    if document["kind"] == "points":
+        _parameters(document)
     if document["verdict"] == "nothing_significant" and (limits := _limits(document)):
         screen.print(f"[dim]would have been seen: {limits}[/]")
     for who, what in actions(document):
@@ -67,7 +71,7 @@ def _one(document: Mapping[str, Any], *, is_on_page: bool) -> None:
 def _is_only_together(document: Mapping[str, Any]) -> bool:
     """The next test would only part what every inverter has anyway; its steps are on the page."""
     plan = document["next_experiment"]
-    return bool(plan) and frozenset(plan["splits"]) == TOGETHER
+    return bool(plan) and is_together(plan["splits"])
 
 
 def _error(document: Mapping[str, Any]) -> None:
@@ -75,6 +79,17 @@ def _error(document: Mapping[str, Any]) -> None:
     if gain["rmse_before_a"] is not None:
         noise = f", noise {number(gain['noise_floor_a'] * 1e3)} mA" if gain["noise_floor_a"] else ""
         screen.print(f"error of the plain simulation {number(gain['rmse_before_a'] * 1e3)} mA rms{noise}")
+
+
+def _parameters(document: Mapping[str, Any]) -> None:
+    """R and L of test points, per phase of the star equivalent."""
+    rows = [
+        (name, f"{q['value']:.5g}", "not known" if q["std"] is None else f"± {2.0 * q['std']:.2g}")
+        for name, q in document["parameters_after"].items()
+    ]
+    if rows:
+        screen.print(table("per star phase", ("parameter", "value", "±"), rows))
+        screen.print(f"[dim]{PLUS_MINUS}[/]")
 
 
 def _causes(document: Mapping[str, Any]) -> None:

@@ -89,7 +89,7 @@ class LiveView:
                 self._line(f"    verdict: [bold]{record.decision}[/], {escape(record.reason)}")
             case told.ParametersWritten():
                 self._line(f"    {len(record.written)} parameters written, {screen.kept(record.is_stored)}")
-                if record.wear_fraction is not None:
+                if record.wear_fraction is not None and record.store_count is not None:
                     self._line(f"    {screen.wear(record.store_count, record.wear_fraction)}")
             case told.StepProgress():
                 self._show(f"axis {record.axis_deg:g}°", record.fraction, record.numbers)

@@ -11,13 +11,11 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
-from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, standing
-from commissioner.report.run.summary import finding_sentences
+from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
 from commissioner.text import LONGEST
 from commissioner.text import shown as visible
 
@@ -30,6 +28,13 @@ err = Console(stderr=True, highlight=False)
 def emit(document: object) -> None:
     """The one JSON document of `--json`."""
     sys.stdout.write(json.dumps(plain(document), indent=2, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def emit_texts(name: str, documents: Sequence[str], **more: object) -> None:
+    """As `emit`, of documents that are JSON texts already: ten thousand of them are not decoded to be encoded again."""
+    facts = "".join(f', "{key}": {json.dumps(plain(value))}' for key, value in more.items())
+    sys.stdout.write(f'{{"{name}": [\n' + ",\n".join(documents) + f"\n]{facts}}}\n")
     sys.stdout.flush()
 
 
@@ -53,6 +58,8 @@ def confirm(question: str, *, otherwise: str) -> None:
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
     """A moving bar and the time gone by on stderr, while something takes longer than a person likes to wait."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     columns = (TextColumn("    {task.description}"), BarColumn(bar_width=24), TimeElapsedColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
         progress.add_task(doing, total=None)
@@ -128,11 +135,12 @@ ROWS = (
 
 def outcome_mark(standing: str) -> str:
     """The outcome in its colour; a run that was cut off is red."""
-    return _MARKS.get(standing, f"[red]? {standing}[/]")
+    return _MARKS.get(standing, f"[red]? {text(standing)}[/]")
 
 
 def result(document: Mapping[str, Any], standing_now: str = "") -> None:
     """A run's result as the technician reads it; `standing_now` where something has happened since."""
+
     out.print()
     out.print(f"[bold]{outcome_mark(standing_now or standing(document))}[/]  {escape(str(document['reason']))}")
     error = document.get("error")

@@ -24,7 +24,8 @@ def check(request: CheckRequest, *, as_json: bool) -> None:
 
 def _show(done: Checked) -> None:
     drive = done.drive
-    screen.out.print(f"[bold]{drive.drive_type}[/] #{drive.serial_number}, firmware {drive.firmware_version}")
+    firmware = f"firmware {drive.firmware_version}" if drive.firmware_version else "firmware unknown"
+    screen.out.print(f"[bold]{screen.text(drive.words)}[/], {firmware}")
     rows = [
         (
             "[green]✓[/]" if r.has_passed else "[red]✗[/]",
@@ -35,4 +36,5 @@ def _show(done: Checked) -> None:
         )
         for r in done.checks
     ]
+    rows += [("[yellow]–[/]", r.name, "not checked", "", screen.text(r.why)) for r in done.not_checked]
     screen.out.print(screen.table("", ("", "check", "seen", "wanted", "remedy"), rows))

@@ -56,11 +56,11 @@ def _ask(request: CommissionRequest) -> None:
     drive, job, plan, plate = seen.drive, seen.job, seen.plan, seen.nameplate
     assert job is not None, "a drive with excitation has a job"
     if failure := seen.failure:
-        failure.what = f"{drive.drive_type} #{drive.serial_number}: {failure.what}; nothing was energised"
+        failure.what = f"{drive.words}: {failure.what}; nothing was energised"
         raise failure
     stretched = f", stretched {job.stretch:.1f} times for a slow rotor" if job.stretch > 1.0 else ""
     screen.out.print(
-        f"[bold]{escape(drive.drive_type)} #{drive.serial_number}[/], motor of {1e-3 * plate.rated_power_w:g} kW, "
+        f"[bold]{escape(drive.words)}[/], motor of {1e-3 * plate.rated_power_w:g} kW, "
         f"{plate.rated_voltage_v:g} V, {plate.rated_current_a:g} A; {len(seen.checks)} of "
         f"{len(seen.checks)} checks passed.\n"
         f"[bold yellow]The motor will be energised[/] at standstill, one axis at a time: {len(plan.tests_deg)} tests, about "

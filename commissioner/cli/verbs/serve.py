@@ -10,7 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
@@ -51,6 +50,8 @@ def add(name: str, *, role: str, password_file: Path | None, config: Path | None
 
 def list_accounts(*, config: Path | None, runs: Path, as_json: bool) -> None:
     """Names and roles."""
+    from commissioner.cli.screens import screen
+
     known = [{"account": a.name, "role": a.role.name.lower()} for a in _accounts(config, runs).all()]
     if as_json:
         screen.emit({"accounts": known})
@@ -111,6 +112,8 @@ def _password(file: Path | None) -> str:
 
 
 def _said(document: dict[str, str], words: str, as_json: bool) -> None:
+    from commissioner.cli.screens import screen
+
     if as_json:
         screen.emit(document)
     else:

@@ -215,6 +215,7 @@ def write_and_read_apart_give_the_same_window(drive: Drive) -> Steps[None]:
     yield from drive.stop()
     for index in (0, 31):
         together: RawWindow = yield from drive.window(index)
+        yield from drive.window(index + 50)  # elsewhere, so that the next index is the one written apart
         yield from drive.put({"window_index": index})
         words = yield from pdu.read(drive.layout.address, drive.layout.words)
         apart = drive.decoded(words)

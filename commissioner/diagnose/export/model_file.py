@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.catalogue.inverter import without_the_recorded_link
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.export.scenario import scenario
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, Term
@@ -27,7 +27,9 @@ KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstanc
 
 def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
     """A JSON/TOML-ready document of the fitted model."""
-    model = without_the_recorded_link(found.fit.model, found.record)
+    model = found.fit.model
+    for cause in CATALOGUE.values():
+        model = cause.without_recorded(model, found.record)
     r_s, r_r, l_sigma, l_m = model.nominal
     kept = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if v]
     return {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.catalogue.regressors import FINE_SPEED_SPLINE, with_fine_speed_splines, with_known
+from commissioner.diagnose.causes.regressors import FINE_SPEED_SPLINE, with_fine_speed_splines, with_known
 from commissioner.diagnose.intake.record import Facts, Record, Segment
 from commissioner.diagnose.plant.model import NO_DICTIONARY, Layout, Model, impedance
 from commissioner.diagnose.plant.prediction import predict

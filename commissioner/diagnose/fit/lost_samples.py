@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from commissioner.compiled import njit
 from commissioner.diagnose.fit.normal_equations import whiten
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment, each_segment
@@ -190,7 +190,7 @@ class _Mending:
         return float((((a - b) / self.noise.sigma_a) ** 2).sum()) < 2.0 * MOST_BETWEEN_ALIKE
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _staircase(seen, predicted, price, begins_anywhere):  # type: ignore[no-untyped-def]
     """(n,) samples by which each one seen is early: the least sum of squares plus `price` per step up (Viterbi).
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 SHORT_LAG = 0.05
@@ -78,7 +79,7 @@ def by_shape(current: Between, lag: float, shape: float, late: Array) -> Array:
     return np.asarray((more - less) / (shape + SHAPE_STEP - low))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def unforced(u, lag, shape, out):
     """The filter without input, `u` samples on: values from a value and from a slope of 1, then the slopes of both."""
     if shape == 0.0:
@@ -102,7 +103,7 @@ def unforced(u, lag, shape, out):
     out[3] = out[0] - out[1] / (shape * lag)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _forced(y0, y1, m0, m1, u, lag, shape, out):
     """Value and slope, `u` samples after y0, of the filter's polynomial answer to the cubic from y0 to y1 with slopes m0, m1."""
     a, b = 2.0 * (y0 - y1) + m0 + m1, 3.0 * (y1 - y0) - 2.0 * m0 - m1
@@ -112,7 +113,7 @@ def _forced(y0, y1, m0, m1, u, lag, shape, out):
     out[1] = rise - lag * bend + second * twist
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _behind(values, after, before, held, late, lag, shape, value, slope):
     rows, n = values.shape
     lagged, rate = np.zeros((rows, n)), np.zeros((rows, n))

@@ -36,6 +36,8 @@ class Term:
     """Position of the only segment it acts in; -1: everywhere."""
     channel: str = ""
     """Known function of time that it multiplies, to which `index` points in one record: in another it may lie elsewhere."""
+    is_beside_rotor: bool = False
+    """A path beside R_R: at rest it is a part of it."""
 
 
 LEG_TAIL = 0.15
@@ -131,7 +133,6 @@ def impedance(nominal: tuple[float, float, float, float], hertz: Array) -> NDArr
 
 MOST_TAKEN = 0.9
 """Of the conductance of R_R in one step."""
-SKIN_EFFECT = "rotor_skin_effect"
 
 NO_DICTIONARY = Layout(
     1.0, 1.0, odd_vectors(4), 1.0, even_vectors(2), 1.0, even_vectors(2), np.array([[1.0, 0.0]]), np.array([1.0]), 1.0
@@ -178,9 +179,10 @@ class Model:
 
         The bars' branches g / (1 + s T) lie beside R_R: their conductance counts in full, and R^2 g T to L_sigma.
         """
-        rows = [4 + k for k, t in enumerate(self.terms) if t.effect == SKIN_EFFECT]
+        times_s = layout.branch_time_s
+        rows = [4 + k for k, t in enumerate(self.terms) if t.kind == kinds.BRANCH and times_s[t.index] > 0.0]
         branches = np.array([self.values[k - 4] for k in rows])
-        times = layout.branch_time_s[[self.terms[k - 4].index for k in rows]]
+        times = times_s[[self.terms[k - 4].index for k in rows]]
         steps = np.array([self.terms[k - 4].step for k in rows])
         own = 1.0 / self.nominal[1]
         low = 1.0 / (own + branches.sum())
@@ -198,8 +200,10 @@ class Model:
     def without(self, effect: str) -> Model:
         """The model without an effect; R_R gets back what rotor branches had of its conductance."""
         r_s, r_r, l_sigma, l_m = self.nominal
-        if effect == SKIN_EFFECT:
-            r_r = 1.0 / (1.0 / r_r + sum(self.of(effect).values()))
+        if beside := [
+            v for t, v in zip(self.terms, self.values, strict=True) if t.effect == effect and t.is_beside_rotor
+        ]:
+            r_r = 1.0 / (1.0 / r_r + sum(beside))
         return replace(self._where(lambda t: t.effect != effect), nominal=(r_s, r_r, l_sigma, l_m))
 
     def only(self, effects: Sequence[str]) -> Model:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 GRAZING = 2e-3
 """Of a sample: what comes no further over the edge of a held step does not cross it (0.4 us at 5 kHz; samplers jitter by as much)."""
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _hermite(values, after, before, late, period, out, slope):
     rows, n = values.shape
     for k in range(n):
@@ -49,7 +50,7 @@ def resample_hermite(values: Array, after: Array, before: Array, late: Array, pe
     return out, slope
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _lagrange(values, late, out):
     rows, n = values.shape
     for k in range(n):

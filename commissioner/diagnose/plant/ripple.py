@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from commissioner.compiled import njit
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.low_pass import SHAPE_STEP, STEP, unforced
 
@@ -65,7 +65,7 @@ def _carriers_of(facts: Facts) -> int:
     return max(round((facts.switching_frequency_hz or 0.0) * facts.sample_period_s), 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _behind(legs_v, link_v, carriers, lag, shape, out):
     n, length = legs_v.shape[1], 1.0 / carriers
     whole, rise, fall = np.zeros(4), np.zeros(4), np.zeros(4)

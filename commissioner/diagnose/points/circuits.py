@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from commissioner.diagnose.points.table import LEAST_SPREAD, Array, Points
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.causes.in_points import InPoints
+from commissioner.diagnose.points.table import Array, Points
 
+Factor = Callable[[str, Array], Array]
 LEAST_SCATTER = 0.002
 """No instrument of such a test is trusted beyond two parts in a thousand."""
 
@@ -23,19 +26,16 @@ FARTHEST = 50.0
 
 @dataclass(frozen=True)
 class Extension:
-    """A candidate: how many numbers, and whether the points can show it."""
+    """A candidate: a cause by name, and what it does in a table of points."""
 
     name: str
-    numbers: int
+    does: InPoints
 
 
 def candidates_for(points: Points) -> list[Extension]:
-    if not points.is_locked:
-        return [Extension("magnetizing_saturation", 2), Extension("iron_loss", 2)]
-    several = np.unique(points.frequency_hz).size > 1
-    spread = float(points.current_line_a.max() / points.current_line_a.min())
-    out = [Extension("leakage_saturation", 1)] if spread >= LEAST_SPREAD else []
-    return out + ([Extension("rotor_skin_effect", 1)] if several else [])
+    """Causes that act in such a table and that these points can show, in the order of their circuit."""
+    some = [Extension(n, c.in_points) for n, c in CATALOGUE.items() if c.in_points]
+    return [e for e in some if e.does.is_locked == points.is_locked and e.does.is_shown(points)]
 
 
 def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Array, Array]:
@@ -50,18 +50,9 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
     start = [float(np.log(first)), float(np.log(np.median(reactance / points.omega)))]
     low, high = [x - FARTHEST for x in start], [x + FARTHEST for x in start]
     for extension in extensions:
-        if extension.name == "magnetizing_saturation":
-            start += [0.3, 5.0]
-            low += [0.0, 1.0]
-            high += [50.0, 14.0]
-        elif extension.name == "iron_loss":
-            start += [0.6, 2.0]
-            low += [0.0, 1.0]
-            high += [1.0, 6.0]
-        else:
-            start += [0.1]
-            low += [-0.5]
-            high += [5.0]
+        start += extension.does.start
+        low += extension.does.lower
+        high += extension.does.upper
     return np.array(start), np.array(low), np.array(high)
 
 
@@ -69,55 +60,55 @@ def _predicted(
     x: Array, points: Points, extensions: Sequence[Extension], scale: Mapping[str, float]
 ) -> tuple[Array, Array]:
     """Current (A rms) and power (W) at the points' voltage and frequency."""
-    numbers: dict[str, Array] = {}
+    acting: dict[str, tuple[Extension, Array]] = {}
     at = 2
     for extension in extensions:
-        numbers[extension.name] = x[at : at + extension.numbers]
-        at += extension.numbers
-    if points.is_locked:
-        return _locked(x, points, numbers, scale)
-    return _no_load(x, points, numbers, scale)
+        acting[extension.does.acts_on] = extension, x[at : at + extension.does.numbers]
+        at += extension.does.numbers
+
+    def factor(of: str, size: Array) -> Array:
+        """What acts there makes of it, at this current or flux over the reference."""
+        if of not in acting:
+            return np.ones(points.count)
+        extension, numbers = acting[of]
+        return extension.does.factor(numbers, size, points.frequency_hz / scale["frequency_hz"])
+
+    return (_locked if points.is_locked else _no_load)(x, points, factor, scale)
 
 
-def _locked(x: Array, points: Points, numbers: Mapping[str, Array], scale: Mapping[str, float]) -> tuple[Array, Array]:
+def _locked(x: Array, points: Points, factor: Factor, scale: Mapping[str, float]) -> tuple[Array, Array]:
     """Z = R_s + R_R (1 + c ((f/f_0)^2 - 1)) + j w L_0 / (1 + s I / I_0): skin effect c, leakage saturation s.
 
     The iteration on I converges because L falls slowly (Lipo & Consoli, IEEE Trans. Ind. Appl. IA-20(1), 1984).
     """
     stator = np.zeros(points.count) if points.resistance_ohm is None else points.resistance_ohm
-    skin = numbers.get("rotor_skin_effect", np.zeros(1))[0]
-    saturation = numbers.get("leakage_saturation", np.zeros(1))[0]
-    ratio = (points.frequency_hz / scale["frequency_hz"]) ** 2
-    resistance = stator + np.exp(x[0]) * np.maximum(1.0 + skin * (ratio - 1.0), 1e-3)
     current = points.current_line_a.copy()
+    resistance = stator + np.exp(x[0]) * factor("resistance", current)
     for _ in range(ROUNDS):
-        reactance = points.omega * np.exp(x[1]) / np.maximum(1.0 + saturation * current / scale["current_a"], 0.1)
+        reactance = points.omega * np.exp(x[1]) / factor("leakage", current / scale["current_a"])
         current = points.phase_voltage_v / np.hypot(resistance, reactance)
     return current, 3.0 * resistance * current**2
 
 
-def _no_load(x: Array, points: Points, numbers: Mapping[str, Array], scale: Mapping[str, float]) -> tuple[Array, Array]:
-    """i_m = psi/L (1 + b (psi/psi_0)^S) and P = P_loss + 3 R_s I^2."""
+def _no_load(x: Array, points: Points, factor: Factor, scale: Mapping[str, float]) -> tuple[Array, Array]:
+    """i_m = psi/L (1 + b (psi/psi_0)^S) and P = P_loss + 3 R_s I^2; P_loss = P_0 (1 - g) (f/f_0)^2 of friction and
+
+    P_0 g (f/f_0)^1.5 (V f_0 / V_0 f)^n of iron.
+    """
     stator = np.zeros(points.count) if points.resistance_ohm is None else points.resistance_ohm
-    b, power = numbers.get("magnetizing_saturation", np.array([0.0, 2.0]))
-    loss = numbers.get("iron_loss", np.array([0.0, 2.0]))
+    applied = points.phase_voltage_v / points.omega / scale["flux_wb"]
+    friction = (points.frequency_hz / scale["frequency_hz"]) ** 2
+    loss = np.exp(x[0]) * factor("loss", applied) * friction
     current = points.current_line_a.copy()
     for _ in range(ROUNDS):
-        active = np.minimum(_loss(x, points, loss, scale) / (3.0 * points.phase_voltage_v), 0.9 * current)
+        active = np.minimum(loss / (3.0 * points.phase_voltage_v), 0.9 * current)
         induced = np.hypot(
             points.phase_voltage_v - stator * active, stator * np.sqrt(np.maximum(current**2 - active**2, 0.0))
         )
         flux = induced / points.omega
-        reactive = flux / np.exp(x[1]) * (1.0 + b * (flux / scale["flux_wb"]) ** power)
+        reactive = flux / np.exp(x[1]) * factor("magnetizing", flux / scale["flux_wb"])
         current = np.hypot(reactive, active)
-    return current, _loss(x, points, loss, scale) + 3.0 * stator * current**2
-
-
-def _loss(x: Array, points: Points, loss: Array, scale: Mapping[str, float]) -> Array:
-    """P_0 (1 - g) (f/f_0)^2 of friction and P_0 g (f/f_0)^1.5 (V f_0 / V_0 f)^n of iron."""
-    speed = points.frequency_hz / scale["frequency_hz"]
-    flux = points.phase_voltage_v / points.omega / scale["flux_wb"]
-    return np.asarray(np.exp(x[0]) * ((1.0 - loss[0]) * speed**2 + loss[0] * speed**1.5 * flux ** loss[1]))
+    return current, loss + 3.0 * stator * current**2
 
 
 def scales(points: Points) -> dict[str, float]:

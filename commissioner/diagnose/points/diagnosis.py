@@ -89,12 +89,12 @@ def _compare(
     before = float((fit_points(points, accepted, scale)[2] ** 2).sum())
     x, _, left = fit_points(points, [*accepted, candidate], scale)
     after = float((left**2).sum())
-    numbers = 2 + sum(e.numbers for e in accepted) + candidate.numbers
+    numbers = 2 + sum(e.does.numbers for e in accepted) + candidate.does.numbers
     freedom = 2 * points.count - numbers
     if freedom < 2 or not _has_right_sign(x, candidate):
         return 1.0, 0.0
-    ratio = (before - after) / candidate.numbers / max(after / freedom, 1e-300)
-    p_value = float(fisher.sf(ratio, candidate.numbers, freedom))
+    ratio = (before - after) / candidate.does.numbers / max(after / freedom, 1e-300)
+    p_value = float(fisher.sf(ratio, candidate.does.numbers, freedom))
     if p_value > SIGNIFICANCE:
         return p_value, 0.0
     held_before = float((held_out(points, accepted, scale) ** 2).sum())
@@ -103,7 +103,7 @@ def _compare(
 
 
 def _has_right_sign(x: Array, candidate: Extension) -> bool:
-    return bool(x[-candidate.numbers] > 1e-6)
+    return bool(x[-candidate.does.numbers] > 1e-6)
 
 
 def _conclude(
@@ -126,10 +126,10 @@ def _conclude(
     for extension in accepted:
         others = [e for e in accepted if e.name != extension.name]
         share = float((held_out(points, others, scale) ** 2).sum() - (held_after**2).sum()) / max(total, 1e-300)
-        mine = slice(at, at + extension.numbers)
-        sizes = _sizes(extension.name, x[mine], covariance[mine, mine], points, scale)
+        mine = slice(at, at + extension.does.numbers)
+        sizes = _sizes(extension, x[mine], covariance[mine, mine], points, scale)
         causes.append(PointCause(extension.name, sizes, p_values[extension.name], float(np.clip(share, 0.0, 1.0))))
-        at += extension.numbers
+        at += extension.does.numbers
     verdict, reason = _verdict(points, causes, tested, missed)
     plain = fit_points(points, [], scale)
     before, after = (
@@ -182,35 +182,19 @@ def _verdict(
 
 
 def _sizes(
-    name: str, x: Array, covariance: Array, points: Points, scale: Mapping[str, float]
+    extension: Extension, x: Array, covariance: Array, points: Points, scale: Mapping[str, float]
 ) -> dict[str, tuple[float, float, str]]:
     """What an extension does over the table's own range, which the points fix better than its numbers."""
-    value = _values(name, x, points, scale)
+    value = extension.does.sizes(x, points, scale)
     spread = np.sqrt(np.diag(covariance))
     slopes = {key: np.zeros(x.size) for key in value}
     for k in np.flatnonzero(spread > 0.0):
         step = np.zeros(x.size)
         step[k] = 1e-3 * min(float(spread[k]), abs(float(x[k])) + 1e-6)
-        above, below = (_values(name, x + sign * step, points, scale) for sign in (1.0, -1.0))
+        above, below = (extension.does.sizes(x + sign * step, points, scale) for sign in (1.0, -1.0))
         for key, slope in slopes.items():
             slope[k] = (above[key] - below[key]) / (2.0 * step[k])
     return {key: (value[key], max(float(slope @ covariance @ slope), 0.0) ** 0.5, "1") for key, slope in slopes.items()}
-
-
-def _values(name: str, x: Array, points: Points, scale: Mapping[str, float]) -> dict[str, float]:
-    if name == "leakage_saturation":
-        low, high = (float(end) / scale["current_a"] for end in np.quantile(points.current_line_a, (0.0, 1.0)))
-        return {"inductance_drop_over_range": float(1.0 - (1.0 + x[0] * low) / (1.0 + x[0] * high))}
-    if name == "rotor_skin_effect":
-        return {
-            "resistance_rise_over_range": float(x[0])
-            * ((float(points.frequency_hz.max()) / scale["frequency_hz"]) ** 2 - 1.0)
-        }
-    if name == "magnetizing_saturation":
-        lowest = float(np.min(points.phase_voltage_v / points.omega)) / scale["flux_wb"]
-        extra = (1.0 + x[0]) / (1.0 + x[0] * lowest ** x[1]) - 1.0
-        return {"extra_current_at_highest_flux": float(extra), "exponent": float(x[1])}
-    return {"share_of_loss_growing_with_flux": float(x[0]), "exponent": float(x[1])}
 
 
 def _parameters(points: Points, x: Array, covariance: Array) -> dict[str, Quantity]:

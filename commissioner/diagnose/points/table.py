@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.diagnose.intake.refusal import refused
+from commissioner.diagnose.points.resistance import column_of, star_resistance
 from commissioner.errors import DataRefused
-from commissioner.records import POINT_COLUMNS, POINT_RESISTANCES
+from commissioner.records import POINT_COLUMNS
 
 Array = NDArray[np.float64]
 LEAST_POINTS, MOST_POINTS = 5, 300
@@ -73,8 +74,14 @@ def is_points_table(columns: Sequence[str]) -> bool:
     return "time_s" not in columns and sum(name in columns for name in POINT_COLUMNS) >= 2
 
 
-def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused:
-    """The points of a table, rows that are copies taken once, or why they cannot be used."""
+def read_points(
+    columns: Mapping[str, Array], name: str, metadata: Mapping[str, float | str] | None = None
+) -> Points | DataRefused:
+    """The points of a table, rows that are copies taken once, or why they cannot be used.
+
+    `metadata`: the plate as far as it is known, and `resistance_measured`.
+    """
+    said = metadata or {}
     if missing := [c for c in POINT_COLUMNS if c not in columns]:
         return refused(
             f"a table of test points needs the column {missing[0]}",
@@ -82,10 +89,11 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
             ", ".join(POINT_COLUMNS),
             f"add or rename: {', '.join(missing)}",
         )
-    between = next((c for c in POINT_RESISTANCES if c in columns), None)
-    names = (*POINT_COLUMNS, *([between] if between else []))
+    resistance = column_of(columns, said)
+    names = (*POINT_COLUMNS, *([resistance[0]] if resistance else []))
+    everything = {**columns, resistance[0]: resistance[1]} if resistance else columns
     for column in names:
-        values = np.asarray(columns[column], dtype=float)
+        values = np.asarray(everything[column], dtype=float)
         wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
         if wrong.size:
             return refused(
@@ -94,7 +102,7 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
                 "positive numbers in every row",
                 "correct the cell or leave the row out",
             )
-    rows = np.stack([np.asarray(columns[c], dtype=float) for c in names], axis=1)
+    rows = np.stack([np.asarray(everything[c], dtype=float) for c in names], axis=1)
     _, first = np.unique(rows, axis=0, return_index=True)
     copies, rows = rows.shape[0] - first.size, rows[np.sort(first)]
     f, v, i, p = rows[:, :4].T
@@ -102,12 +110,16 @@ def read_points(columns: Mapping[str, Array], name: str) -> Points | DataRefused
     if (refusal := _not_usable(f, v, i, p, is_locked=is_locked)) is not None:
         return refusal
     remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
-    if between is None:
+    if resistance is None:
         remarks.append(
             "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point): windings that "
             "warm up or cool down during the test count as the rotor's resistance or as loss."
         )
-    return Points(name, f, v, i, p, 0.5 * rows[:, 4] if between else None, is_locked, tuple(remarks))
+        return Points(name, f, v, i, p, None, is_locked, tuple(remarks))
+    ohm = star_resistance(resistance[0], rows[:, 4], p / (3.0 * i**2), said, is_locked=is_locked)
+    if isinstance(ohm, DataRefused):
+        return ohm
+    return Points(name, f, v, i, p, ohm.star_ohm, is_locked, (*remarks, *ohm.remarks))
 
 
 def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> DataRefused | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
-from commissioner.diagnose.catalogue.regressors import with_fine_speed_splines
+from commissioner.diagnose.causes import CATALOGUE, Setting
+from commissioner.diagnose.causes.regressors import with_fine_speed_splines
 from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.fit.normal_equations import NormalEquations, whiten
 from commissioner.diagnose.intake.noise import Noise
@@ -19,9 +18,10 @@ from commissioner.diagnose.intake.record import TO_PHASES, Record, each_segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.journal import Refined
 from commissioner.diagnose.search.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
 from commissioner.diagnose.search.refinement import CLOSER, with_closer_loops, without_curves, without_springs
-from commissioner.diagnose.search.screening import required_chi2
 
 Array = NDArray[np.float64]
 CURVES = {
@@ -31,8 +31,6 @@ CURVES = {
     kinds.LEGS: ("legs_vectors", odd_vectors),
 }
 RANGES = {kinds.IRON_CURVE: ("iron_vectors", "iron_top_wb"), kinds.LEAKAGE_CURVE: ("leak_vectors", "leak_top_wb")}
-CLOSER_SHARE = 0.5
-"""Loops of closer radii must make so much of what is left."""
 ACTING_SHARE = 1e-3
 """Of the strongest second path: a weaker one is idle."""
 SHORTEST_BRANCH_S, LONGEST_BRANCH_S = 5e-5, 0.03
@@ -41,10 +39,6 @@ GRID = 200
 """Points at which a curve is read to be written in another dictionary."""
 MOST_KNOTS = 25
 """A curve of more knots than this is not refined again."""
-FINER_SHARE = 2e-3
-"""Of what is not explained, so much must go with finer knots: beside a cause that lacks, no curve need be right to the last digit."""
-FASTER_SHARE = 0.2
-"""Of what is not explained, so much must go with a faster speed: else another cause makes it."""
 SAME_SLACK = 0.2
 """The slack of a leg's tail is taken anew where it has moved by more than this part of itself."""
 SAME_RATIO = 0.05
@@ -56,7 +50,7 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
     model, there = respread(current.model, setting)
     if there is setting:
         return current, setting
-    again = begun(model, there, noise)
+    again = begun_with(model, there, noise)
     return (again, there) if np.isfinite(again.chi2) else (current, setting)
 
 
@@ -109,7 +103,7 @@ def with_closer_branches(model: Model, setting: Setting) -> tuple[Model, Setting
     return model, there
 
 
-def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
+def begun_with(model: Model, setting: Setting, noise: Noise) -> Fit:
     """The fit that begins with the model's curves and loops as they are or at zero, whichever is nearer."""
     starts = [model] if (flat := without_curves(model)).values == model.values else [model, flat]
     if len(starts) > 1:
@@ -145,24 +139,26 @@ def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
 
 
 def with_faster_speed(
-    current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]
-) -> tuple[Fit, Record, Setting]:
+    current: Fit, full: Record, setting: Setting, noise: Noise
+) -> tuple[Fit, Record, Setting, Refined] | None:
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz. Not tried where less than that
 
     is left across the axes, along which no speed moves anything to first order.
     """
     record = with_fine_speed_splines(full, setting.lines_hz)
     there = replace(setting, record=record.first(setting.record.commanded))
-    speed = [t for t in CATALOGUE["shaft_motion"].terms(there) if t.kind == kinds.OMEGA]
+    turning = dict.fromkeys(t.effect for t in current.model.terms if t.kind == kinds.OMEGA)
+    speed = [t for name in turning for t in CATALOGUE[name].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
-    wanted = current.chi2 - max(
-        required_chi2(len(model.terms) - len(current.model.terms)), FASTER_SHARE * current.normal.unexplained
+    least = max(
+        RULES.required_chi2(len(model.terms) - len(current.model.terms)),
+        RULES.faster_speed_share * current.normal.unexplained,
     )
-    if left_across(current.model, setting, noise) < current.chi2 - wanted:
-        return current, full, setting
-    faster = fit(model, there.record, there.layout, noise, wanted_chi2=wanted)
-    report(f"  a speed on closer knots: gained {current.chi2 - faster.chi2:.4g}")
-    return (faster, record, there) if faster.chi2 < wanted else (current, full, setting)
+    if left_across(current.model, setting, noise) < least:
+        return None
+    faster = fit(model, there.record, there.layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - faster.chi2
+    return faster, record, there, Refined("a speed on closer knots", gained, least, is_taken=gained > least)
 
 
 def left_across(model: Model, setting: Setting, noise: Noise) -> float:
@@ -181,45 +177,44 @@ def left_across(model: Model, setting: Setting, noise: Noise) -> float:
     return sum(each_segment(of_segment, record))
 
 
-def with_finer_curves(
-    current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None], of: Collection[int] = tuple(CURVES)
-) -> tuple[Fit, Setting]:
-    """Curves of the kinds `of` with a knot between every two, as long as that gains what its numbers cost: iron with a sharp
+def finer_curve(current: Fit, setting: Setting, noise: Noise, kind: int) -> tuple[Fit, Setting, Refined] | None:
+    """Curves of a kind with a knot between every two, if that gains what its numbers cost: iron with a sharp knee leaves 1e-3 of its gain
 
-    knee leaves 1e-3 of its gain on ten intervals.
+    on ten intervals. None: there is no such curve, or it is fine already.
     """
-    for kind, (name, make) in CURVES.items():
-        while kind in of and current.model.has_kind(kind) and len(getattr(setting.layout, name)) <= MOST_KNOTS:
-            finer = make(2 * (getattr(setting.layout, name).shape[1] - 3))
-            layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
-            there = replace(setting, layout=layout)
-            model = _on_finer(current.model, kind, getattr(setting.layout, name), finer, there)
-            wanted = current.chi2 - _least_gain(current, len(model.terms))
-            trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
-            report(f"  {name} on twice the knots: gained {current.chi2 - trial.chi2:.4g}")
-            if trial.chi2 > wanted:
-                break
-            current, setting = trial, there
-    return current, setting
+    name, make = CURVES[kind]
+    vectors = getattr(setting.layout, name)
+    if not current.model.has_kind(kind) or len(vectors) > MOST_KNOTS:
+        return None
+    finer = make(2 * (vectors.shape[1] - 3))
+    layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
+    there = replace(setting, layout=layout)
+    model = _on_finer(current.model, kind, vectors, finer, there)
+    least = _least_gain(current, len(model.terms))
+    trial = fit(model, setting.record, layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - trial.chi2
+    return trial, there, Refined(f"{name} on twice the knots", gained, least, is_taken=gained > least)
 
 
-def with_closer_radii(
-    current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None]
-) -> tuple[Fit, Setting]:
+def with_closer_radii(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Setting, Refined]:
     """Loops of radii beside those that act, if they make most of what is left: iron of one radius between two of the
 
     dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
-    wanted = current.chi2 - max(_least_gain(current, len(model.terms)), CLOSER_SHARE * current.normal.unexplained)
-    trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
-    report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
-    return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
+    least = max(_least_gain(current, len(model.terms)), RULES.closer_loops_share * current.normal.unexplained)
+    trial = fit(model, setting.record, layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - trial.chi2
+    refined = Refined("loops of closer radii", gained, least, is_taken=gained > least)
+    return (trial, replace(setting, layout=layout), refined) if refined.is_taken else (current, setting, refined)
 
 
 def _least_gain(current: Fit, numbers: int) -> float:
     """What a model of so many numbers must gain over the present one."""
-    return max(required_chi2(max(numbers - len(current.model.terms), 1)), FINER_SHARE * current.normal.unexplained)
+    return max(
+        RULES.required_chi2(max(numbers - len(current.model.terms), 1)),
+        RULES.finer_curve_share * current.normal.unexplained,
+    )
 
 
 def _on_finer(model: Model, kind: int, vectors: Array, finer: Array, setting: Setting) -> Model:

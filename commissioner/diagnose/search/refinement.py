@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.fit.gauss_newton import Fit, bounded_step, fit, limits, on_part
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
@@ -29,7 +30,6 @@ MOST_OF_THE_FLUX = 0.75
 """A stop whose radius is a larger share of the flux reached is a spring."""
 REFINING = {kinds.CLOCK: (1, 2), kinds.DELAY: (1,), kinds.LAG: (SHAPE,), kinds.LEG_SHARE: (1, 2)}
 """Indices of the numbers that only refine a clock, a delay, a lag or the legs."""
-WARMING = frozenset({"stator_heating", "rotor_heating"})
 
 
 def refined(
@@ -208,10 +208,10 @@ def _spare(model: Model, record: Record) -> list[list[int]]:
     delay, a lag or the legs; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
     """
     rows = list(enumerate(model.terms, 4))
-    alone = [[k] for k, t in rows if t.kind in (kinds.STOP, kinds.BRANCH) or t.effect in WARMING]
+    alone = [[k] for k, t in rows if t.effect and t.kind in CATALOGUE[t.effect].spare]
     groups = [[k for k, t in rows if t.kind == kind and t.index in refined] for kind, refined in REFINING.items()]
     inheriting = {s.uid for s in record.segments if np.any(s.flux_before_wb)}
-    left_anew = [k for k, t in rows if t.effect == "remanence" and t.segment in inheriting]
+    left_anew = [k for k, t in rows if t.effect and t.kind == kinds.INITIAL_FLUX and t.segment in inheriting]
     if left_anew:
         groups += [left_anew, [k for k, t in rows if t.kind == kinds.CARRY]]
     return alone + [group for group in groups if group]

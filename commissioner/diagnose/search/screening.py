@@ -12,29 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
+from commissioner.diagnose.causes import CATALOGUE, Setting
 from commissioner.diagnose.fit.gauss_newton import bounded_step
 from commissioner.diagnose.fit.normal_equations import Normal, NormalEquations
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.model import Layout, Model, Term
+from commissioner.diagnose.rules import RULES
 
 Array = NDArray[np.float64]
-STATISTICAL_FLOOR, STATISTICAL_PER_NUMBER = 40.0, 10.0
-FULL_PRICE = 10
-"""Numbers beyond so many cost chi-square's own mean plus two standard deviations each, not ten."""
 SCREENED_SAMPLES = 320_000
 VISIBLE = 1e-7
 """Share of a direction's power that must be left after projection for it to count as visible."""
-
-
-def price(numbers: int) -> float:
-    """What `numbers` parameters must gain to be worth having: p near 1e-10 for few, the same for many."""
-    return STATISTICAL_PER_NUMBER * min(numbers, FULL_PRICE) + 3.0 * max(numbers - FULL_PRICE, 0)
-
-
-def required_chi2(numbers: int) -> float:
-    return STATISTICAL_FLOOR + price(numbers)
 
 
 @dataclass(frozen=True)
@@ -53,11 +42,11 @@ class Score:
 
     @property
     def threshold(self) -> float:
-        return required_chi2(self.numbers)
+        return RULES.required_chi2(self.numbers)
 
     @property
     def net(self) -> float:
-        return self.delta_chi2 - price(self.numbers)
+        return self.delta_chi2 - RULES.price(self.numbers)
 
 
 @dataclass(frozen=True)
@@ -149,7 +138,7 @@ def joint_net(screening: Screening, names: Sequence[str]) -> float:
     gram, slope = screening.projected[np.ix_(kept, kept)], screening.slope[kept]
     step = bounded_step(gram, slope, lower, upper, 1e-9)
     gain = float(2.0 * step @ slope - step @ gram @ step)
-    return promised(gain, len(kept), screening.times) - sum(price(screening.scores[n].numbers) for n in names)
+    return promised(gain, len(kept), screening.times) - sum(RULES.price(screening.scores[n].numbers) for n in names)
 
 
 def promised(gain: float, numbers: int, times: float) -> float:

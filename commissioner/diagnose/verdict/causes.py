@@ -7,16 +7,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE, between
 from commissioner.diagnose.fit.gauss_newton import on_part
 from commissioner.diagnose.fit.lost_samples import Loss
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.noise import Noise
-from commissioner.diagnose.search.acceptance import SAME_ORDER, shows
+from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.acceptance import shows
 from commissioner.diagnose.search.search import EXPLORED, Found
 from commissioner.diagnose.verdict import calibration
 from commissioner.diagnose.verdict.evidence import (
-    TIE_CHI2,
     Dropped,
     alternatives,
     claim_features,
@@ -25,29 +25,6 @@ from commissioner.diagnose.verdict.evidence import (
     sizes_with_spread,
 )
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit
-
-MOSTLY_EXPLAINED_SIGMA, LEAST_SHARE = 0.1, 0.95
-COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
-"""Named as a cause: steps beyond a share of the rated peak current (12 bits over 3.7 times that, either way) that make a hundredth of the
-
-noise power.
-"""
-TRUNCATION_SLACK = 0.15
-MUCH_LEFT_SIGMA, NEARLY_ALL_OF_IT, LEAST_LOST_TO_A_RIVAL, DOMINANT_CONFIDENCE = 0.3, 0.99, 0.2, 0.9
-"""Where more than this is left, a cause that takes so much of what is not another's is named with so much confidence, unless a rival
-
-that takes its place loses less than this part of its gain: real dead times, with ripple and a current that stops at zero, leave some thousandths of the power.
-"""
-ALWAYS_EQUIVALENT = {"dead_time": ("device_drop",)}
-LEAST_CONFIDENCE = 0.5
-"""Below it a name is more likely wrong than right, and is not given."""
-IMITATED = frozenset({("sensor_offset", "sensor_drift"), ("sensor_gain_mismatch", "sensor_nonlinearity")})
-"""Simple causes, each with one of many numbers that has it as a limit."""
-DELAY_OR_LAG_TIE = 1e-5
-SAME_ORDER_TIE = 2e-3
-NEARLY_ALL, LEFT_TIE = 0.001, 0.1
-"""A rival that loses less than this share of a cause's gain, and less than this share of what no cause makes, is as good:
-what is unknown may favour either."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +56,13 @@ def causes_of(
     )
     without = {name: refitted.get(name, Dropped(found.gains[name], {})) for name in found.accepted}
     causes = [_cause(found, name, lack, without[name], noise, excluded, trust) for name in found.accepted]
-    causes = _without_truncation(_with_open_ties(causes, without), audit)
+    causes = _in_truth(_with_open_ties(causes, without), audit)
     losses = () if lack.from_bursts_sigma > 0.0 and not found.accepted else found.losses
     causes += _audit_causes(audit, found, noise, {c.name for c in causes}, losses)
     unsure = tuple(
         c
         for c in causes
-        if c.confidence < LEAST_CONFIDENCE or (not c.from_audit and _is_less_than_left(c.strength_sigma, lack))
+        if c.confidence < RULES.least_confidence or (not c.from_audit and _is_less_than_left(c.strength_sigma, lack))
     )
     return [c for c in causes if c not in unsure], unsure
 
@@ -99,7 +76,7 @@ def explained_share(found: Found, lack: LackOfFit, left_sigma: float) -> float:
 
 def _is_less_than_left(strength_sigma: float, lack: LackOfFit) -> bool:
     """A cause that makes less of the error than what no cause makes may be a part of that unknown."""
-    return lack.sigma > max(strength_sigma, MOSTLY_EXPLAINED_SIGMA)
+    return lack.sigma > max(strength_sigma, RULES.mostly_explained_sigma)
 
 
 def _may_be_named(found: Found, name: str, lack: LackOfFit, trust: float) -> bool:
@@ -107,7 +84,7 @@ def _may_be_named(found: Found, name: str, lack: LackOfFit, trust: float) -> boo
     count = float(found.fit.normal.count.sum())
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     sure = trust * confidence(claim_features(found.fit, found.accepted, name, lack, total), calibration.WEIGHTS)
-    is_likely = sure >= LEAST_CONFIDENCE or _is_dominant(found.gains[name], lack, count)
+    is_likely = sure >= RULES.least_confidence or _is_dominant(found.gains[name], lack, count)
     return is_likely and not _is_less_than_left(float(np.sqrt(found.gains[name] / count)), lack)
 
 
@@ -116,7 +93,7 @@ def _is_dominant(gain: float, lack: LackOfFit, count: float) -> bool:
 
     the error that is not another's: then it is there, whatever else is.
     """
-    return MUCH_LEFT_SIGMA**2 * count < lack.sigma**2 * count < (1.0 - NEARLY_ALL_OF_IT) * gain
+    return RULES.much_left_sigma**2 * count < lack.sigma**2 * count < (1.0 - RULES.dominant_share) * gain
 
 
 def _refitted_without(found: Found, noise: Noise, excluded: Sequence[str], asked: Sequence[str]) -> dict[str, Dropped]:
@@ -150,17 +127,17 @@ def _cause(
     total = max(found.nominal.chi2 - found.fit.chi2, 1.0)
     # where the way to a cause bends, the loss foretold at its end falls short of a fit's
     gain = total if found.accepted == (name,) else max(found.gains[name], min(without.loss, total))
-    fixed = () if found.setting.link_varies else ALWAYS_EQUIVALENT.get(name, ())
-    unsettled = min(NEARLY_ALL * gain, LEFT_TIE * lack.sigma**2 * count)
+    fixed = () if found.setting.link_varies else tuple(n for n in CATALOGUE if between(name, n).is_always_tied)
+    unsettled = min(RULES.nearly_all_share * gain, RULES.left_tie_share * lack.sigma**2 * count)
     close = tuple(
         n
         for n, r in without.rivals.items()
-        if r.loss + _more_numbers(found, name, n) < max(TIE_CHI2, _share_open(name, n) * gain, unsettled)
+        if r.loss + _more_numbers(found, name, n) < max(RULES.tie_chi2, between(name, n).tied_share * gain, unsettled)
     )
     features = claim_features(found.fit, found.accepted, name, lack, total)
     sure = confidence(features, calibration.WEIGHTS) * trust
-    if _is_dominant(gain, lack, count) and all(r.loss > LEAST_LOST_TO_A_RIVAL * gain for r in without.rivals.values()):
-        sure = max(sure, DOMINANT_CONFIDENCE * trust)
+    if _is_dominant(gain, lack, count) and all(r.loss > RULES.rival_loss_share * gain for r in without.rivals.values()):
+        sure = max(sure, RULES.dominant_confidence * trust)
     if not noise.is_known:
         sure *= calibration.UNKNOWN_NOISE_FACTOR
     strength = float(np.sqrt(gain / count))
@@ -203,43 +180,28 @@ def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> 
     return out
 
 
-def _share_open(name: str, rival: str) -> float:
-    """Share of a gain within which two causes are the same to the terminals, whatever fits better: networks of the same
-
-    order; a delay and a lag, whose currents are taken as straight between the samples.
-    """
-    shares = {SAME_ORDER: SAME_ORDER_TIE, frozenset({"sampling_delay", "sensor_lag"}): DELAY_OR_LAG_TIE}
-    return shares.get(frozenset({name, rival}), 0.0)
-
-
 def _more_numbers(found: Found, name: str, rival: str) -> float:
     """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
 
     has settled at once, a sensor's bend that has.
     """
-    if (name, rival) not in IMITATED:
+    if name not in CATALOGUE[rival].imitates:
         return 0.0
     mine = sum(t.effect == name for t in found.fit.model.terms)
     return float(np.log(found.fit.normal.count.sum())) * (len(CATALOGUE[rival].terms(found.setting)) - mine)
 
 
-def _without_truncation(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
-    """A converter that cuts off instead of rounding shifts every channel by half a step: that is quantization, no offset."""
+def _in_truth(causes: Sequence[Cause], audit: Audit) -> list[Cause]:
+    """Causes under the name that their sizes give them."""
     out = []
     for cause in causes:
-        offsets = [value for value, _, _ in cause.sizes.values()]
-        halves = 0.5 * np.array(audit.step_a)
-        if cause.name == "sensor_offset" and len(offsets) == halves.size and halves.min() > 0.0:
-            ratio = np.array(offsets) / halves
-            if np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0):
-                step = {"step_a": (float(halves.max()) * 2.0, 0.0, "A")}
-                out.append(
-                    replace(
-                        cause, name="quantization", title=CATALOGUE["quantization"].title, sizes=step, equivalent=()
-                    )
-                )
-                continue
-        out.append(cause)
+        truth = CATALOGUE[cause.name].in_truth([value for value, _, _ in cause.sizes.values()], audit)
+        if truth is None:
+            out.append(cause)
+            continue
+        name, sizes = truth
+        exact = {key: (value, 0.0, unit) for key, (value, unit) in sizes.items()}
+        out.append(replace(cause, name=name, title=CATALOGUE[name].title, sizes=exact, equivalent=()))
     return out
 
 
@@ -250,30 +212,15 @@ def _audit_causes(
 
     errors come and go that samples put right do not take away.
     """
-    out = []
-    step = max(audit.step_a, default=0.0)
-    is_coarse = step > COARSE_STEP_SHARE * found.record.facts.rated_current_peak_a
-    if "quantization" not in named and is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a:
-        out.append(_plain("quantization", {"step_a": (step, 0.0, "A")}))
-    if audit.clipped and "clipping" not in named:
-        out.append(
-            _plain(
-                "clipping",
-                {"limit_a": (audit.clipped["limit_a"], 0.0, "A"), "samples": (audit.clipped["samples"], 0.0, "1")},
-            )
+    unmarked = float(sum(x.samples for x in losses))
+    seen = {n: c.seen_in(audit, found.record, noise, unmarked) for n, c in CATALOGUE.items() if n not in named}
+    return [
+        Cause(
+            name, CATALOGUE[name].title, {k: (v, 0.0, unit) for k, (v, unit) in sizes.items()}, 0.0, 0.0, 0.0, 0.99,
+            from_audit=True,
         )
-    if audit.holes or losses:
-        marked, unmarked = sum(h[2] for h in audit.holes), sum(x.samples for x in losses)
-        out.append(
-            _plain(
-                "lost_samples",
-                {
-                    "samples": (float(marked + unmarked), 0.0, "1"),
-                    "without_gap_in_time": (float(unmarked), 0.0, "1"),
-                },
-            )
-        )
-    return out
+        for name, sizes in seen.items() if sizes
+    ]  # fmt: skip
 
 
 def confidence_factor(lack: LackOfFit, share: float) -> float:
@@ -283,10 +230,6 @@ def confidence_factor(lack: LackOfFit, share: float) -> float:
     """
     is_trace = (
         max(lack.from_tones_sigma, lack.from_states_sigma, lack.from_ruled_out_sigma) > 0.0
-        and lack.sigma <= MOSTLY_EXPLAINED_SIGMA
+        and lack.sigma <= RULES.mostly_explained_sigma
     )
-    return min((1.0 - LEAST_SHARE) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0
-
-
-def _plain(name: str, sizes: Mapping[str, tuple[float, float, str]]) -> Cause:
-    return Cause(name, CATALOGUE[name].title, sizes, 0.0, 0.0, 0.0, 0.99, from_audit=True)
+    return min((1.0 - RULES.explained_share) / (1.0 - share), 1.0) if is_trace and share < 1.0 else 1.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from commissioner.diagnose.catalogue import CATALOGUE
-from commissioner.diagnose.catalogue.effect import PLACES, Sizes
-from commissioner.diagnose.search.screening import Screening, required_chi2
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.screening import Screening
 from commissioner.diagnose.search.search import Found
 from commissioner.diagnose.verdict.evidence import sizes_with_spread
 
@@ -32,20 +32,21 @@ def detection_limits(found: Found) -> dict[str, dict[str, dict[str, float | str]
 def _limit_of_named(found: Found, name: str) -> Limit | None:
     """What was found, made as small as a gain that just counts."""
     count = sum(t.effect == name for t in found.fit.model.terms)
-    share = float(np.sqrt(max(required_chi2(count), found.material_chi2) / max(found.gains[name], 1e-300)))
+    share = float(np.sqrt(max(RULES.required_chi2(count), found.material_chi2) / max(found.gains[name], 1e-300)))
     sizes = {key: (value, unit) for key, (value, _, unit) in sizes_with_spread(found.fit, name, found.setting).items()}
     if not sizes:
         return None
-    key, (value, unit) = max(_comparable(sizes), key=lambda item: abs(item[1][0]))
+    key, (value, unit) = max(CATALOGUE[name].measures(sizes), key=lambda item: abs(item[1][0]))
     return key, (share * value, unit)
 
 
 def _limit_of_absent(found: Found, name: str, screening: Screening) -> Limit | None:
     """At the most visible shape, and steady where the size is that of a steady course."""
     score, sizes = screening.scores[name], CATALOGUE[name].sizes
+    measures = CATALOGUE[name].measures
     scale = max(found.record.samples * found.record.facts.phases / max(float(screening.normal.count.sum()), 1.0), 1.0)
     none = dict.fromkeys((t.symbol for t in score.terms), 0.0)
-    alone = [_comparable(sizes(found.setting, {**none, t.symbol: t.step})) for t in score.terms]
+    alone = [measures(sizes(found.setting, {**none, t.symbol: t.step})) for t in score.terms]
     counts = [k for k, items in enumerate(alone) if any(value for _, (value, _) in items)]
     if not counts:
         return None
@@ -58,10 +59,4 @@ def _limit_of_absent(found: Found, name: str, screening: Screening) -> Limit | N
     theta = shape * np.sqrt(max(score.threshold, found.material_chi2) / (scale * power))
     theta = theta if theta.sum() >= 0.0 else -theta
     found_sizes = sizes(found.setting, {t.symbol: float(x) * t.step for t, x in zip(terms, theta, strict=True)})
-    return max(_comparable(found_sizes), key=lambda item: abs(item[1][0]))
-
-
-def _comparable(sizes: Sizes) -> list[tuple[str, tuple[float, str]]]:
-    """The size that measures the effect: the first that does not say where it acts; of several sensors each one's."""
-    measures = [item for item in sizes.items() if item[0] not in PLACES]
-    return [item for item in measures if item[0].split("_")[0] == measures[0][0].split("_")[0]]
+    return max(measures(found_sizes), key=lambda item: abs(item[1][0]))

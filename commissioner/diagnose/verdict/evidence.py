@@ -8,26 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.diagnose.catalogue import CATALOGUE, Setting
-from commissioner.diagnose.catalogue.effect import Sizes
-from commissioner.diagnose.catalogue.inverter import tail_of_legs
-from commissioner.diagnose.catalogue.magnetics import EDGE
+from commissioner.diagnose.causes import CATALOGUE, Setting
+from commissioner.diagnose.causes.setting import Sizes
 from commissioner.diagnose.fit.gauss_newton import Fit, bounded_step, fit, inverse, limits
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, each_segment
 from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.acceptance import is_plausible, loss_without
-from commissioner.diagnose.search.exchanges import read_late, with_closer_paths
+from commissioner.diagnose.search.exchanges import with_closer_paths
 from commissioner.diagnose.search.screening import screen
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit
 
 Array = NDArray[np.float64]
-TIE_CHI2 = 10.0
 UNKNOWN, INSTANTS_PER_NUMBER = 1e-9, 4
 """Information, of the best known number of a course, that any has; and instants at which a course is read, per number."""
-ALTERNATIVE_SHARE = 0.9
-"""An alternative is refitted only if it promises this share of the cause's own gain, or of what that one promises."""
 ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
 """Of a cause's gain: so well is a model without it fitted, and a rival that cannot lose less is not fitted to the last digit."""
 
@@ -127,28 +123,28 @@ def alternatives(
         enough = max(ROUGHLY * loss_without(found, name), 1.0)
         without = fit(found.model.without(name), record, layout, noise, rounds=6, tolerance=enough)
         gain = without.chi2 - found.chi2
-        wanted = found.chi2 + max(NEARLY_A_TIE * gain, TIE_CHI2)
+        wanted = found.chi2 + max(NEARLY_A_TIE * gain, RULES.tie_chi2)
         absent = [n for n in CATALOGUE if n not in accepted and n not in excluded]
         screening = screen(without.model, record, layout, noise, setting, [*absent, name])
         # where the way to a cause bends, its own promise falls short as its rivals' do
         own = screening.scores[name].delta_chi2 if name in screening.scores else gain
         rivals: dict[str, Rival] = {}
         for score in [s for s in screening.ranked() if s.name != name][:3]:
-            if score.delta_chi2 < ALTERNATIVE_SHARE * min(gain, own):
+            if score.delta_chi2 < RULES.alternative_share * min(gain, own):
                 continue
             model = without.model.with_terms(score.form)
             trial, there = fit(model, record, layout, noise, wanted_chi2=wanted), replace(setting, layout=layout)
-            if trial.chi2 - found.chi2 > TIE_CHI2:
+            if trial.chi2 - found.chi2 > RULES.tie_chi2:
                 trial, there = with_closer_paths(trial, there, noise, wanted)
             if is_plausible(trial.model, score.name, there):
                 rivals[score.name] = Rival(
                     (trial.chi2 - found.chi2) * scale,
                     _moved(found.model, trial.model, [n for n in accepted if n != name], there),
                 )
-        if EDGE.symbol in found.model.of(name) and "sampling_delay" in absent:
-            late = fit(read_late(found.model, found.model.nominal[2]), record, layout, noise, wanted_chi2=wanted)
-            moved = _moved(found.model, late.model, [n for n in accepted if n != name], setting)
-            rivals["sampling_delay"] = Rival((late.chi2 - found.chi2) * scale, moved)
+        for rival, model in CATALOGUE[name].rivals(found.model, absent):
+            other = fit(model, record, layout, noise, wanted_chi2=wanted)
+            moved = _moved(found.model, other.model, [n for n in accepted if n != name], setting)
+            rivals[rival] = Rival((other.chi2 - found.chi2) * scale, moved)
         out[name] = Dropped(gain * scale, rivals, _other_forms(found, without, name, setting, noise, scale))
     return out
 
@@ -156,10 +152,10 @@ def alternatives(
 def _other_forms(
     found: Fit, without: Fit, name: str, setting: Setting, noise: Noise, scale: float
 ) -> tuple[Rival, ...]:
-    """The other forms of a cause that lose no more than TIE_CHI2."""
+    """The other forms of a cause that lose no more than a tie."""
     entry, out = CATALOGUE[name], []
     for form in entry.other_forms(found.model.of(name), entry.terms(setting)):
-        wanted = found.chi2 + TIE_CHI2 / scale
+        wanted = found.chi2 + RULES.tie_chi2 / scale
         trial = fit(without.model.with_terms(form), setting.record, setting.layout, noise, wanted_chi2=wanted)
         if trial.chi2 < wanted and is_plausible(trial.model, name, setting):
             out.append(Rival((trial.chi2 - found.chi2) * scale, _moved(found.model, trial.model, [name], setting)))
@@ -200,9 +196,9 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
         slope = np.array(slopes[key])
         variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope)
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
-    if "voltage_v" in out:
-        value, spread, unit = out["voltage_v"]
-        out["voltage_v"] = (value, float(np.hypot(spread, tail_of_legs(found.model, setting.layout)[0])), unit)
+    for key, more in CATALOGUE[name].unknown_form(found.model, setting.layout).items():
+        value, spread, unit = out[key]
+        out[key] = (value, float(np.hypot(spread, more)), unit)
     if CATALOGUE[name].course:
         first = next(iter(sizes))
         out[first] = (*_rms_of_course(found, name, setting), sizes[first][1])

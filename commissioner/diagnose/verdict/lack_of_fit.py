@@ -18,7 +18,7 @@ from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, each_segment
 from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.diagnose.plant.prediction import predict
-from commissioner.diagnose.search.acceptance import MATERIAL_SHARE
+from commissioner.diagnose.rules import RULES
 
 Array = NDArray[np.float64]
 TONE_BINS, BESIDE_BINS = 3, 25
@@ -122,7 +122,7 @@ def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Arr
             np.add.at(samples, at, 1.0)
             parts = zip(np.array_split(np.where(good, white, 0.0), PARTS), np.array_split(good, PARTS), strict=True)
             means[3].add(*(np.array(one) for one in zip(*((w.sum(), g.sum()) for w, g in parts), strict=True)))
-            material += float(np.sum(i**2)) * (MATERIAL_SHARE / noise.sigma_a[phase]) ** 2
+            material += float(np.sum(i**2)) * (RULES.material_share / noise.sigma_a[phase]) ** 2
         for over, one in zip(((1,), (0,), ()), means, strict=False):
             one.add(total.sum(axis=over), samples.sum(axis=over))
     seen = [m.excess for m in means if m.is_beyond_chance and m.excess > PART_OF_MATERIAL * material]

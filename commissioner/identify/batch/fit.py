@@ -31,18 +31,23 @@ def fit_segments(
     max_iterations: int = 40,
     tolerance: float = 1e-4,
     own_start: Matrix | None = None,
+    *,
+    is_coarse: bool = False,
+    known: float | None = None,
 ) -> BatchFit:
     """Fit all segments jointly. `theta_start` (in the model's layout) overrides `start`; `own_start` (segments, 3) is what
-    each segment begins with where an earlier fit knows it, else zero.
+    each segment begins with where an earlier fit knows it, else zero. `is_coarse` as in `Problem`; `known` is the sum of
+    squares of a minimum found before: the fit ends where it comes as low.
 
     Stops when what steps shrinking as the last two did would still add is below `tolerance` standard errors of every
     shared parameter (or the step below 1e-10 of its value); `has_converged` says whether that was reached.
     """
     choice = model or ModelChoice()
-    problem = Problem(segments, sample_period_s, choice)
+    problem = Problem(segments, sample_period_s, choice, is_coarse=is_coarse)
+    low_enough = -math.inf if known is None else known * (1.0 + 1.0 / max(problem.samples, 1))
     theta = start_theta(start, choice) if theta_start is None else theta_start.copy()
     problem.bounds = (theta[:CIRCUIT] / WIDEST, theta[:CIRCUIT] * WIDEST)
-    problem.plateau_v = max(float(np.max(np.abs(theta[choice.leg_slice]), initial=0.0)), 1e-3)
+    problem.expect_leg(theta)
     own = np.zeros((len(segments), OWN)) if own_start is None else own_start.copy()
     present = problem.evaluate(theta, own)
     if not present.is_finite:
@@ -65,7 +70,7 @@ def fit_segments(
             flat = present.squares - trial.squares <= 1e-12 * present.squares
             theta, own, present, spare = new_theta, new_own, trial, present
             damping = max(damping * 0.1, 1e-12)
-            if small or (flat and damping <= 1e-8):
+            if small or (flat and damping <= 1e-8) or trial.squares <= low_enough:
                 converged = True
                 break
         else:

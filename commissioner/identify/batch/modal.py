@@ -14,8 +14,9 @@ from __future__ import annotations
 import cmath
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 MODAL = 7
@@ -58,12 +59,12 @@ def _modes(point: NDArray[np.complex128], period_s: float) -> tuple[complex, ...
     return (*p, *g, *c, *flux)
 
 
-@njit(cache=True)
+@njit()
 def _live(x: float) -> float:
     return x if abs(x) > 1e-200 else 0.0
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def modal_pass(
     u: Array,
     y: Array,

@@ -17,8 +17,9 @@ F_1..F_k, then the segment's own: offset, psi_s(0), psi_R(0).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 Exponents = NDArray[np.int64]
@@ -29,13 +30,14 @@ SHARED = 5
 OWN = 3
 PARTS = 4
 """Steps of a period in which the current passes zero."""
-_SOLVED = 1e-12
+_SOLVED = 1e-9
+"""Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
 _ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
 
 
-@njit(cache=True)
+@njit()
 def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     """(cell, fraction inside it, rows beyond the table) of the size of a current."""
     at = abs(i) * per_a
@@ -45,7 +47,7 @@ def _locate(rows: int, per_a: float, i: float) -> tuple[int, float, float]:
     return cell, at - cell, 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _mean_loss(
     table: Array,
     integral: Array,
@@ -81,7 +83,7 @@ def _mean_loss(
     return mean, (mean - sign0 * f0) / apart, (sign1 * f1 - mean) / apart
 
 
-@njit(cache=True)
+@njit()
 def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, power: Array) -> tuple[float, float]:
     """(g, g') at a stator flux; the odd powers of the relative flux into `power`."""
     relative = flux / flux_scale
@@ -96,7 +98,7 @@ def _extra(theta: Array, exponents: Exponents, flux_scale: float, flux: float, p
     return g, slope
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
     """Share of this part of the period in which the voltage before still acts, and its derivative by `delay` (in periods)."""
     late, d_late = delay * parts - part, float(parts)
@@ -108,7 +110,7 @@ def _late_share(delay: float, part: int, parts: int) -> tuple[float, float]:
     return late, d_late
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _current_at_end(
     theta: Array,
     exponents: Exponents,
@@ -148,17 +150,51 @@ def _current_at_end(
     return i, mean, by_i0, by_i1, g, slope_g
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _push_of_loss(
     basis: Array, basis_integral: Array, per_a: float, i0: float, i: float, first: int, push: Array
 ) -> None:
-    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on."""
-    at0, at = _locate(basis.shape[0], per_a, i0), _locate(basis.shape[0], per_a, i)
+    """What a unit of every shape of F takes off the held voltage over the currents i0 ... i, into `push` from `first` on:
+
+    the mean of `_mean_loss`, whose shares of the tables' rows are the same for every shape.
+    """
+    (cell0, in0, out0) = _locate(basis.shape[0], per_a, i0)
+    (cell1, in1, out1) = _locate(basis.shape[0], per_a, i)
+    sign0, sign1 = (1.0 if i0 >= 0.0 else -1.0), (1.0 if i >= 0.0 else -1.0)
+    # Shares of the rows cell0, cell0 + 1, cell1, cell1 + 1 of the table, and the rows of the integral that are counted from.
+    low0, high0, low1, high1 = 0.0, 0.0, 0.0, 0.0
+    from0, from1, share = cell0, cell1, 0.0
+    if sign0 == sign1 and cell0 == cell1 and (out0 > 0.0) == (out1 > 0.0):
+        low0, high0 = 0.5 * sign0 * (1.0 - in0), 0.5 * sign0 * in0
+        low1, high1 = 0.5 * sign0 * (1.0 - in1), 0.5 * sign0 * in1
+    else:
+        share = 1.0 / ((i - i0) * per_a)
+        if sign0 != sign1:
+            end0, end1 = -(0.5 * in0 + out0), 0.5 * in1 + out1
+            low0, high0 = end0 * (1.0 - in0) - 0.5 * in0, end0 * in0
+            low1, high1 = end1 * (1.0 - in1) + 0.5 * in1, end1 * in1
+        elif cell1 + in1 + out1 > cell0 + in0 + out0:
+            end1 = 0.5 * in1 + out1 - out0
+            low0, high0 = 0.5 * (1.0 - in0) * (1.0 - in0), 0.5 * (1.0 - in0) * (1.0 + in0)
+            low1, high1 = end1 * (1.0 - in1) + 0.5 * in1, end1 * in1
+            from0 = cell0 + 1
+        else:
+            end0 = -(0.5 * in0 + out0 - out1)
+            low0, high0 = end0 * (1.0 - in0) - 0.5 * in0, end0 * in0
+            low1, high1 = -0.5 * (1.0 - in1) * (1.0 - in1), -0.5 * (1.0 - in1) * (1.0 + in1)
+            from1 = cell1 + 1
+        low0, high0, low1, high1 = share * low0, share * high0, share * low1, share * high1
     for c in range(basis.shape[1]):
-        push[first + c] = -_mean_loss(basis[:, c], basis_integral[:, c], per_a, i0, i, at0, at)[0]
+        push[first + c] = -(
+            low0 * basis[cell0, c]
+            + high0 * basis[cell0 + 1, c]
+            + low1 * basis[cell1, c]
+            + high1 * basis[cell1 + 1, c]
+            + share * (basis_integral[from1, c] - basis_integral[from0, c])
+        )
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _add_rows(rows: Array, missed: Array, information: Array, score: Array, block_score: Array) -> None:
     """Weighted sensitivities (rows, p) and residuals (rows,) into the normal equations."""
     information += np.dot(rows.T, rows)
@@ -167,7 +203,7 @@ def _add_rows(rows: Array, missed: Array, information: Array, score: Array, bloc
     block_score += added
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _add_directly(
     x1: float, x2: float, l_l: float, l_0: float, power: Array, first_g: int, to_i: Array, to_g: Array
 ) -> None:
@@ -177,7 +213,7 @@ def _add_directly(
         to_g[first_g + m] = to_i[first_g + m] = power[m]
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@njit(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def simulate(
     u: Array,
     y: Array,
@@ -231,7 +267,7 @@ def simulate(
 
     x1, x2 = own[1], own[2]
     s1, s2, si = np.zeros(p), np.zeros(p), np.zeros(p)  # d(psi_s, psi_R, i)
-    dg, dg_last = np.zeros(p), np.zeros(p)
+    dg, dg_last, push, d1, d2 = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     pushed, to_s1, to_s2, to_i, to_g = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     power = np.zeros(extra_powers + 1)
     s1[first_own + 1], s2[first_own + 2] = 1.0, 1.0
@@ -320,14 +356,20 @@ def simulate(
             _add_directly(x1, x2, l_l, l_0, power, first_g, to_i, to_g)
             scale = 1.0 / (1.0 + (beta + slope_g * b11) * by_i1)
             h_g, back1, back2 = h_s + slope_g, b11 * by_i1, b12 * by_i1
+            # One array is written by each loop: of more, the compiler does not see that they are apart, and takes one by one.
             for j in range(p):
-                push = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
-                dg_last[j] = dg[j]
-                d1 = a11 * s1[j] + a12 * s2[j] + b11 * push + to_s1[j]
-                d2 = a21 * s1[j] + a22 * s2[j] + b12 * push + to_s2[j]
-                moved = (h_g * d1 + h_r * d2 + to_i[j]) * scale * wanted[j]
-                si[j] = moved
-                s1[j] = d1 - back1 * moved
-                s2[j] = d2 - back2 * moved
+                push[j] = pushed[j] - r_s * (dg[j] + ahead * (dg[j] - dg_last[j])) - by_i0 * si[j]
+            dg, dg_last = dg_last, dg
+            for j in range(p):
+                d1[j] = a11 * s1[j] + a12 * s2[j] + b11 * push[j] + to_s1[j]
+            for j in range(p):
+                d2[j] = a21 * s1[j] + a22 * s2[j] + b12 * push[j] + to_s2[j]
+            for j in range(p):
+                si[j] = (h_g * d1[j] + h_r * d2[j] + to_i[j]) * (scale * wanted[j])
+            for j in range(p):
+                s1[j] = d1[j] - back1 * si[j]
+            for j in range(p):
+                s2[j] = d2[j] - back2 * si[j]
+            for j in range(p):
                 dg[j] = slope_g * s1[j] + to_g[j]
     return total

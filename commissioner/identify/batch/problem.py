@@ -42,9 +42,12 @@ class Evaluation:
 
 
 class Problem:
-    """The joint least-squares problem: shared parameters first, then three of each segment."""
+    """The joint least-squares problem: shared parameters first, then three of each segment. `is_coarse`: for comparing
+    models; only periods in which the current passes zero are done in parts."""
 
-    def __init__(self, segments: Sequence[Segment], period_s: float, model: ModelChoice) -> None:
+    def __init__(
+        self, segments: Sequence[Segment], period_s: float, model: ModelChoice, *, is_coarse: bool = False
+    ) -> None:
         self.segments = segments
         self.bounds = (np.zeros(CIRCUIT), np.full(CIRCUIT, np.inf))
         self.period_s = period_s
@@ -55,7 +58,8 @@ class Problem:
         self.current_span_a = CURRENT_MARGIN * max(float(np.max(np.abs(s.current_a))) for s in segments)
         self.bases = [self._basis(s.axis_deg) for s in segments]
         self.integrals = [_from_zero(b) for b in self.bases]
-        self.passes_zero = [self._passes_zero(s.current_a) for s in segments]
+        near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO
+        self.passes_zero = [self._passes_zero(s.current_a, near) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
         self.noise_a2 = float(np.median([np.var(np.diff(s.current_a, 2)) for s in segments])) / 6.0
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
@@ -76,19 +80,28 @@ class Problem:
             return np.zeros((TABLE_ROWS, 0))
         return np.ascontiguousarray(self.model.leg.on_axis(np.linspace(0.0, self.current_span_a, TABLE_ROWS), axis_deg))
 
-    def _passes_zero(self, current_a: Signal) -> NDArray[np.bool_]:
+    def _passes_zero(self, current_a: Signal, near: float) -> NDArray[np.bool_]:
         """Periods in which the leg loss may turn round or bend, by the measured current: near zero beside what it moves in
         one."""
         if self.model.leg is None:
             return np.zeros(current_a.size, dtype=bool)
         moves = np.abs(np.diff(current_a, append=current_a[-1]))
-        near = NEAR_ZERO_WHEN_LATE if self.model.with_delay else NEAR_ZERO
         return np.asarray(np.abs(current_a) < near * self.model.leg.largest_a + 1.5 * moves)
 
     def _held(self, circuit: Matrix) -> tuple[Matrix, ...]:
         """Responses and derivatives over a period and over a part of one, stacked."""
         both = (_held_with_derivatives(circuit, self.period_s / parts) for parts in (1, output_error.PARTS))
         return tuple(np.stack(pair) for pair in zip(*both, strict=True))
+
+    def expect_leg(self, theta: Matrix) -> None:
+        """Of the leg error is expected what its kind allows at the plateau it has in `theta`."""
+        self.plateau_v = max(float(np.max(np.abs(theta[self.model.leg_slice]), initial=0.0)), 1e-3)
+
+    def squares(self, theta: Matrix) -> float:
+        """The sum of squares with every segment from rest; infinite where the model runs away."""
+        self.expect_leg(theta)
+        found = self.evaluate(theta, np.zeros((len(self.segments), OWN)))
+        return found.squares if found.is_finite else math.inf
 
     def evaluate(self, theta: Matrix, own: Matrix, over: Evaluation | None = None) -> Evaluation:
         """All segments simulated; the signals of `over`, which is not needed any more, are written over."""

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import writable
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
@@ -25,6 +26,8 @@ from commissioner.motor.nameplate import Nameplate, prior
 
 Estimator = Literal["pao", "lyapunov", "nls"]
 Matrix = NDArray[np.float64]
+STILL = 1e-3
+"""What a fit that begins at another axis' may still have to go, in standard errors."""
 LARGEST_DISAGREEMENT = 3.0
 """Joint standard errors between observer and batch fit beyond which the observer is not believed."""
 
@@ -55,12 +58,18 @@ class AxisResult:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One test after its batch fit."""
+    """One test after its batch fit; its staircase where that was needed."""
 
     stretches: tuple[Stretch, ...]
     staircase: Staircase | None
     batch: BatchFit
     follows_link: bool = False
+    of: tuple[Stretch, ...] = ()
+    """The stretches as they came, without the link's ripple."""
+
+    def is_of(self, stretches: Sequence[Stretch]) -> bool:
+        """Whether it was made from exactly these samples."""
+        return len(self.of) == len(stretches) and all(map(_are_equal, self.of, stretches))
 
     @property
     def current_span_a(self) -> float:
@@ -75,18 +84,19 @@ def fit_axis(
     leg: InverterError | None,
     like: AxisFit | None,
 ) -> AxisFit:
-    """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with."""
-    stairs = _staircase(stretches)
-    first_leg = leg or (stairs.inverter if stairs else None)
-    fit = _fitted(stretches, stairs, plate, period_s, guess, first_leg, like)
+    """Batch fit of one test; `like` is an earlier axis' whose model and values it begins with, where its own staircase is
+    only looked at if they do not do."""
+    fit = _begun_like(like, stretches, period_s) if like is not None else None
+    stairs = None if fit else _staircase(stretches)
+    fit = fit or _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None))
     try:
         require_alignment(fit.batch)
         require_conditioned(fit.batch)
     except DataRefused:
-        if leg is not None or stairs is None:
+        if leg is not None or (stairs or _staircase(stretches)) is None:
             raise
         # what was taken for settled levels was none: begin as if there were none
-        fit = _fitted(stretches, None, plate, period_s, guess, None, None)
+        fit = _fitted(stretches, None, plate, period_s, guess, None)
         require_alignment(fit.batch)
         require_conditioned(fit.batch)
     return fit
@@ -99,29 +109,31 @@ def _fitted(
     period_s: float,
     guess: InverseGamma | None,
     first_leg: InverterError | None,
-    like: AxisFit | None,
 ) -> AxisFit:
-    begun = _begun_like(like, stretches, period_s) if like is not None else None
-    if begun is not None:
-        chosen, fit = begun
-    else:
-        chosen = list(stretches)
-        starts = _starts(chosen, plate, period_s, guess, first_leg)
-        fit = select_model(segments(chosen), period_s, starts, first_leg)
-        chosen, fit = _better_with_link(chosen, period_s, fit)
-    return AxisFit(tuple(chosen), stairs, fit, follows_link=chosen[0] is not stretches[0])
+    chosen = list(stretches)
+    starts = _starts(chosen, plate, period_s, guess, first_leg)
+    fit = select_model(segments(chosen), period_s, starts, first_leg)
+    chosen, fit = _better_with_link(chosen, period_s, fit)
+    return AxisFit(tuple(chosen), stairs, fit, chosen[0] is not stretches[0], tuple(stretches))
 
 
-def _begun_like(like: AxisFit, stretches: Sequence[Stretch], period_s: float) -> tuple[list[Stretch], BatchFit] | None:
+def _begun_like(like: AxisFit, stretches: Sequence[Stretch], period_s: float) -> AxisFit | None:
     """The earlier axis' model fitted to this one; None where it runs away here (iron bent beyond what it was fitted for)."""
     chosen = with_link(stretches, like.batch.inverter()) if like.follows_link else list(stretches)
     batch = like.batch
     try:
-        return chosen, fit_segments(
-            segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta
+        fit = fit_segments(
+            segments(chosen), period_s, batch.gamma.as_inverse_gamma(), batch.model, batch.theta, tolerance=STILL
         )
     except DataRefused:
         return None
+    return AxisFit(tuple(chosen), None, fit, chosen[0] is not stretches[0], tuple(stretches))
+
+
+def _are_equal(a: Stretch, b: Stretch) -> bool:
+    """The same samples, wherever they stand in their recordings."""
+    pairs = zip(vars(a).values(), vars(b).values(), strict=True)
+    return all(np.array_equal(x, y) if isinstance(x, np.ndarray) else x == y for x, y in pairs)
 
 
 def with_link(stretches: Sequence[Stretch], leg: InverterError | None) -> list[Stretch]:
@@ -153,7 +165,10 @@ def _better_with_link(stretches: list[Stretch], period_s: float, fit: BatchFit) 
 def segments(stretches: Sequence[Stretch]) -> list[Segment]:
     """Between segments the cage still carries what the current left behind, and iron may be remanent before the first:
     no segment is taken to start at rest."""
-    return [Segment(s.voltage_v, s.current_a, s.axis_deg, starts_at_rest=False, kind=s.kind) for s in stretches]
+    return [
+        Segment(writable(s.voltage_v), writable(s.current_a), s.axis_deg, starts_at_rest=False, kind=s.kind)
+        for s in stretches
+    ]
 
 
 def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estimator) -> AxisResult:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -153,11 +154,11 @@ class FluxGuard:
 
     # -- estimates ------------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def _lowest_hz(self) -> float:
         return min(t.frequency_hz for t in self.excitation.tones) if self.excitation.tones else 1.0
 
-    @property
+    @cached_property
     def _window_s(self) -> float:
         return max(0.25 / self._lowest_hz, 0.2)
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from commissioner.identify.excite.minimax import FEWEST_SHARE, minimax_cost
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import admittance_s, held_input, poles_per_s
@@ -170,12 +172,13 @@ def _misses(candidate: int, others: Sequence[int]) -> bool:
     return not lines.intersection(tones)
 
 
+@lru_cache(maxsize=8)
 def _minimax(
     machine: InverseGamma, limits: ExcitationLimits, seconds: float, period_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(frequencies, amplitude shares) that minimise the worst relative standard error, by simplex search in logarithms.
 
-    It starts near what all such optima look like (most of the flux on a tone below the rotor's corner, one above it, little
+    Kept, for the tests of one motor ask for the same. It starts near what all such optima look like (most of the flux on a tone below the rotor's corner, one above it, little
     on the others) and is begun anew where it ended, as a simplex may have collapsed (W. H. Press et al., Numerical
     Recipes, 3rd ed., 10.5).
     """
@@ -185,23 +188,13 @@ def _minimax(
     start_f = np.clip(np.array([0.5 * slow, fast / 6.0, fast / 3.0, fast, 3.0 * fast]), lowest, highest)
     start = np.concatenate([np.log(start_f), np.log([0.6, 0.2, 0.06, 0.06, 0.06])])
 
-    def worst(point: NDArray[np.float64]) -> float:
-        f = np.exp(np.clip(point[:TONE_COUNT], math.log(lowest), math.log(highest)))
-        shares = _shares(point[TONE_COUNT:])
-        amplitudes = _scaled(machine, f, shares, limits)
-        information = _information(machine, f, amplitudes)
-        try:
-            errors = np.diag(np.linalg.inv(information + 1e-12 * np.trace(information) * np.eye(4)))
-        except np.linalg.LinAlgError:
-            return math.inf
-        crowding = sum(
-            max(0.0, 0.4 - abs(math.log(a / b))) for a, b in zip(np.sort(f)[1:], np.sort(f)[:-1], strict=True)
-        )
-        return float(math.log(np.max(errors)) + 5.0 * crowding)
-
+    bounds = np.array([lowest, highest])
+    of_machine = np.array(machine.as_tuple())
+    of_limits = np.array([limits.current_a, limits.flux_wb, limits.voltage_v, limits.rms_current_a])
+    cost = partial(minimax_cost, bounds=bounds, machine=of_machine, limits=of_limits)
     found, options = start, {"maxiter": 1200, "xatol": 0.01, "fatol": 1e-3}
     for _ in range(2):
-        found = minimize(worst, found, method="Nelder-Mead", options=options).x
+        found = minimize(cost, found, method="Nelder-Mead", options=options).x
     f = np.exp(np.clip(found[:TONE_COUNT], math.log(lowest), math.log(highest)))
     order = np.argsort(f)
     return f[order], _shares(found[TONE_COUNT:])[order]
@@ -211,7 +204,7 @@ def _shares(logarithms: NDArray[np.float64]) -> NDArray[np.float64]:
     """Shares of the limits, summing to one, each at least 6 % so that every tone can be measured."""
     raw = np.exp(logarithms - np.max(logarithms))
     raw = raw / raw.sum()
-    floored = np.maximum(raw, 0.06)
+    floored = np.maximum(raw, FEWEST_SHARE)
     return np.asarray(floored / floored.sum())
 
 

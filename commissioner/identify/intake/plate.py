@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from commissioner.errors import DataRefused
-from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check
+from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check, connection_of
 
 NAMEPLATE_KEYS = (*RATED_VALUES, "pole_pairs")
 
@@ -27,7 +27,7 @@ def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:
     plate = Nameplate(
         **number,
         pole_pairs=pole_pairs,
-        connection=str(metadata.get("connection", "star")),
+        connection=str(connection_of(metadata.get("connection", "star"))),
         inertia_kg_m2=float(inertia) if isinstance(inertia, float | int) else None,
     )
     for problem in check(plate):

@@ -18,8 +18,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from commissioner.compiled import njit
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ FAST, LYAPUNOV, FROZEN, REVIEW = 0, 1, 2, 3
 the state at `DEVIATION`."""
 
 
-@njit(cache=True)
+@njit()
 def machine_from_theta(theta: Array, f: Array, period: float, out: Array) -> bool:
     """(R_s, R_R, L_sigma, L_M) into `out`; False (and `out` untouched) where theta is no passive machine."""
     g1, g2 = 1.0 - f[0], 1.0 - f[1]
@@ -74,7 +75,7 @@ def machine_from_theta(theta: Array, f: Array, period: float, out: Array) -> boo
     return True
 
 
-@njit(cache=True)
+@njit()
 def flux_gains(machine: Array, period: float) -> tuple[float, float]:
     """(Ad00, Ad01) of the held-input model: i[k+1] without voltage = Ad00 i[k] + Ad01 psi_R[k]."""
     r_s, r_r, l_s, l_m = machine[0], machine[1], machine[2], machine[3]
@@ -86,7 +87,7 @@ def flux_gains(machine: Array, period: float) -> tuple[float, float]:
     return math.exp(fast * period) + rise * (-(r_s + r_r) / l_s - fast), rise * alpha / l_s
 
 
-@njit(cache=True)
+@njit()
 def lookup(table: Array, span: float, x: float) -> float:
     """Odd function tabulated at 0 ... span; constant beyond."""
     a = abs(x) * (table.size - 1) / span
@@ -98,7 +99,7 @@ def lookup(table: Array, span: float, x: float) -> float:
     return value if x >= 0.0 else -value
 
 
-@njit(cache=True)
+@njit()
 def lookup_with_slope(table: Array, span: float, x: float) -> tuple[float, float]:
     """`lookup` and its derivative."""
     per = (table.size - 1) / span
@@ -111,14 +112,15 @@ def lookup_with_slope(table: Array, span: float, x: float) -> tuple[float, float
     return (value if x >= 0.0 else -value), rise * per
 
 
-@njit(cache=True)
+@njit()
 def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[float, float]:
     """(F(i), F'(i)) where i + b F(i) = known, F odd and tabulated as for `lookup`."""
     size = abs(known)
     last = table.size - 1
     step = span / last
     if b <= 0.0 or step * last + b * table[last] <= size:
-        return lookup_with_slope(table, span, known)
+        found: tuple[float, float] = lookup_with_slope(table, span, known)
+        return found
     low, high = 0, last
     while high - low > 1:
         middle = (low + high) // 2
@@ -131,7 +133,7 @@ def implicit_loss(table: Array, span: float, known: float, b: float) -> tuple[fl
     return (value if known >= 0.0 else -value), slope
 
 
-@njit(cache=True)
+@njit()
 def forecast(
     u: Array,
     period: float,
@@ -163,7 +165,7 @@ def forecast(
 
 
 # Inlined, for a call per sample would cost `advance` half as much again.
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def has_stable_real_poles(theta_1: float, theta_2: float, f1: float, f2: float) -> bool:
     """Whether A(z) keeps two different real poles between 0 and 1, as every machine has."""
     g1, g2 = 1.0 - f1, 1.0 - f2
@@ -172,7 +174,7 @@ def has_stable_real_poles(theta_1: float, theta_2: float, f1: float, f2: float) 
     return half * half > a0 > 0.0 and half < 1.0 and 1.0 - 2.0 * half + a0 > 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def weigh(psi: Array, first: int, r: float, upper: Array, diagonal: Array, ff: Array, v: Array, k_gain: Array) -> float:
     """Bierman's first half: f = U^T psi and v = D f, the gain U v (not yet divided), and its divisor, the variance of the error.
 
@@ -195,7 +197,7 @@ def weigh(psi: Array, first: int, r: float, upper: Array, diagonal: Array, ff: A
     return alpha
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def update_factors(first: int, r: float, ff: Array, v: Array, upper: Array, diagonal: Array, k_gain: Array) -> None:
     """Bierman's second half: the factors after the sample that `weigh` was given, column by column (`k_gain` is scratch)."""
     alpha = r
@@ -211,7 +213,7 @@ def update_factors(first: int, r: float, ff: Array, v: Array, upper: Array, diag
             k_gain[i] += v[j] * old
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def worth_of_white_noise(c0: float, c1: float, beta: float) -> float:
     """Variance times the (AR(1)) length of its correlation, so that an error of the model, which is coloured, is not taken for
 
@@ -222,7 +224,7 @@ def worth_of_white_noise(c0: float, c1: float, beta: float) -> float:
     return c0 * (1.0 + rho) / (1.0 - rho)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def feed_back(
     loop: Array,
     open_loop: float,
@@ -252,7 +254,7 @@ def feed_back(
     loop[3] = f2 * loop[3] + g2 * back
 
 
-@njit(cache=True)
+@njit()
 def advance(
     u: Array,
     y: Array,

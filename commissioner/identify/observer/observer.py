@@ -12,12 +12,15 @@ prior box.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import writable
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
 from commissioner.identify.observer import kernels
 from commissioner.identify.observer.coordinates import (
@@ -35,6 +38,7 @@ from commissioner.motor.nameplate import ParameterBox
 from commissioner.records import Signal
 
 Law = Literal["fast", "lyapunov"]
+Errors = tuple[float, float, float, float]
 Matrix = NDArray[np.float64]
 
 OFFSET_STD = 0.02
@@ -48,12 +52,12 @@ LYAPUNOV_TIME_CONSTANT_S = 2.0
 class BlockEstimate:
     """What the observer knows after a block. Signals are `(n,)`, a posteriori, aligned with the block's samples.
 
-    `std` is one standard deviation of (R_s, R_R, L_sigma, L_M). `rotor_flux_wb` and `stator_flux_wb` are those of the
+    `errors()` makes `std`, one standard deviation of (R_s, R_R, L_sigma, L_M), when it is first asked for. `rotor_flux_wb` and `stator_flux_wb` are those of the
     linear machine at each sample's instant.
     """
 
     parameters: InverseGamma
-    std: tuple[float, float, float, float]
+    errors: Callable[[], Errors]
     residual_rms_a: float
     noise_a: float
     current_a: Signal
@@ -62,6 +66,10 @@ class BlockEstimate:
     samples: int
     lost_samples: int
     restarts: int
+
+    @cached_property
+    def std(self) -> Errors:
+        return self.errors()
 
 
 @dataclass
@@ -73,6 +81,10 @@ class _Shell:
     upper: Matrix
     diagonal: Matrix
     machine: Matrix
+
+    def kept(self) -> _Shell:
+        """As it is now, without the state, for the standard errors."""
+        return _Shell(np.zeros(0), self.theta, self.upper.copy(), self.diagonal.copy(), self.machine.copy())
 
 
 @dataclass(frozen=True)
@@ -144,8 +156,7 @@ class ParallelObserver:
         block and has come to rest; known parameters stay, states start from zero. Without `adapts` only the states
         follow the voltage: for samples that tell about the inverter's dead band and not about the machine.
         """
-        voltage_v = np.ascontiguousarray(voltage_v, dtype=np.float64)
-        current_a = np.ascontiguousarray(current_a, dtype=np.float64)
+        voltage_v, current_a = writable(voltage_v), writable(current_a)
         if voltage_v.ndim != 1 or voltage_v.shape != current_a.shape:
             raise ValueError(f"voltage {voltage_v.shape} and current {current_a.shape} must be equal (n,)")
         if self.law == "lyapunov" and not self._gamma.any():
@@ -185,7 +196,7 @@ class ParallelObserver:
         current, rotor, stator = (np.concatenate(parts) for parts in zip(*signals, strict=True))
         return BlockEstimate(
             parameters=self.parameters,
-            std=self.std(),
+            errors=partial(_std, self.law, self._shell.kept(), self._filter, self.sample_period_s),
             residual_rms_a=math.sqrt(squares / max(total, 1)),
             noise_a=math.sqrt(float(self._shell.state[kernels.NOISE])),
             current_a=current,
@@ -261,7 +272,8 @@ class ParallelObserver:
         if piece.restarts or piece.begins_at_rest:
             _restart(shell, self.current_scale_a, piece.begins_at_rest)
         if piece.open_loop_v is not None:
-            self._kernel(shell, piece.open_loop_v, np.zeros_like(piece.open_loop_v), kernels.FROZEN)
+            known = writable(piece.open_loop_v)
+            self._kernel(shell, known, np.zeros_like(known), kernels.FROZEN)
         chosen = self._law if law is None else law
         return self._kernel(shell, piece.voltage_v, piece.current_a, chosen if piece.adapts else kernels.FROZEN)
 
@@ -269,7 +281,7 @@ class ParallelObserver:
         signals = tuple(np.empty_like(voltage_v) for _ in range(3))
         compensation = self.compensation
         kernels.advance(
-            np.ascontiguousarray(voltage_v, dtype=np.float64),
+            voltage_v,
             current_a,
             self._filter,
             self.sample_period_s,
@@ -305,19 +317,11 @@ class ParallelObserver:
 
     def covariance(self) -> Matrix:
         """(4, 4) of (R_s, R_R, L_sigma, L_M); for the Lyapunov law, which has none, zeros."""
-        if self.law != "fast":
-            return np.zeros((4, 4))
-        back = np.linalg.inv(
-            theta_jacobian(InverseGamma(*map(float, self._shell.machine)), self._filter, self.sample_period_s)
-        )
-        upper, diagonal = self._shell.upper[kernels.THETA :, kernels.THETA :], self._shell.diagonal[kernels.THETA :]
-        root = back @ upper * np.sqrt(diagonal)
-        return np.asarray(root @ root.T)
+        return _covariance(self.law, self._shell, self._filter, self.sample_period_s)
 
-    def std(self) -> tuple[float, float, float, float]:
+    def std(self) -> Errors:
         """Standard errors of (R_s, R_R, L_sigma, L_M)."""
-        a, b, c, d = np.sqrt(np.diag(self.covariance()))
-        return float(a), float(b), float(c), float(d)
+        return _std(self.law, self._shell, self._filter, self.sample_period_s)
 
     def _fresh(self, machine: InverseGamma, variance_a2: float, around_start: bool = False) -> _Shell:
         state = np.zeros(kernels.STATE_SIZE)
@@ -340,6 +344,20 @@ class ParallelObserver:
         power = w.T @ w / max(w.shape[0], 1)
         power += 1e-6 * np.trace(power) * np.eye(4) + 1e-30 * np.eye(4)
         return np.asarray(self.sample_period_s / LYAPUNOV_TIME_CONSTANT_S * np.linalg.inv(power))
+
+
+def _covariance(law: Law, shell: _Shell, filter_z: Matrix, period_s: float) -> Matrix:
+    if law != "fast":
+        return np.zeros((4, 4))
+    back = np.linalg.inv(theta_jacobian(InverseGamma(*map(float, shell.machine)), filter_z, period_s))
+    upper, diagonal = shell.upper[kernels.THETA :, kernels.THETA :], shell.diagonal[kernels.THETA :]
+    root = back @ upper * np.sqrt(diagonal)
+    return np.asarray(root @ root.T)
+
+
+def _std(law: Law, shell: _Shell, filter_z: Matrix, period_s: float) -> Errors:
+    a, b, c, d = np.sqrt(np.diag(_covariance(law, shell, filter_z, period_s)))
+    return float(a), float(b), float(c), float(d)
 
 
 def _restart(shell: _Shell, current_scale_a: float, is_at_rest: bool) -> None:

@@ -19,6 +19,7 @@ class Action(Enum):
     STAGE = "stage motor parameters"
     COMMIT = "bring the staged parameters into use"
     STORE = "store the parameters in non-volatile memory"
+    TUNE = "let the drive tune itself"
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,15 @@ class WriteReport:
 
     written: tuple[WrittenParameter, ...]
     is_stored: bool
-    store_count_before: int
-    store_count_after: int
+    store_count_before: int | None
+    store_count_after: int | None
     endurance_writes: int | None
+    fault: str = ""
+    """What the drive reports now that it is done; empty: no fault, or no register that would tell."""
 
     @property
     def wear_fraction(self) -> float | None:
         """Part of the non-volatile memory's rated life that is used up."""
-        return self.store_count_after / self.endurance_writes if self.endurance_writes else None
+        if self.store_count_after is None or not self.endurance_writes:
+            return None
+        return self.store_count_after / self.endurance_writes

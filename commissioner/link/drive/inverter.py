@@ -22,6 +22,8 @@ from commissioner.link.drive.claim import Claim
 from commissioner.link.drive.disarming import DISABLE_VOLTAGE, SHUTDOWN, de_energise
 from commissioner.link.drive.facts import Action, DisarmReport, Intent, Journal, WriteReport, keep_no_journal
 from commissioner.link.drive.items import Items, number
+from commissioner.link.drive.ordinary.found import Implausible, implausible
+from commissioner.link.drive.ordinary.tuning import Operator, Tuner
 from commissioner.link.drive.readiness import check_ready, not_ready
 from commissioner.link.drive.reading import read_identity, read_nameplate, read_status
 from commissioner.link.drive.write_back import WriteBack
@@ -30,9 +32,10 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
 from commissioner.registers.codec import Value
-from commissioner.registers.convention import drive_values
+from commissioner.registers.convention import drive_values, parameter_limits
 from commissioner.registers.profile import DriveProfile, WindowLayout
 from commissioner.registers.status import DriveState
+from commissioner.registers.tuning import Tuning
 from commissioner.registers.window import (
     StreamCursor,
     StreamFormat,
@@ -238,6 +241,12 @@ class Inverter:
             self.port.read_retries = self._read_retries
         return report
 
+    def implausible(self, held: Mapping[str, float], nameplate: Nameplate) -> list[Implausible]:
+        """What of `held` no motor near this plate has. A commissioning map has proved its registers by its magic number."""
+        if self.profile.kind == "commissioning_map":
+            return []
+        return implausible(self._items, held, parameter_limits(self.profile, nameplate))
+
     # --- parameters ---------------------------------------------------------------------------------------------
     def write_parameters(
         self, values: Mapping[str, float], snapshot: ParameterSnapshot, *, store: bool = True
@@ -255,8 +264,27 @@ class Inverter:
         self, circuit: InverseGamma, nameplate: Nameplate, snapshot: ParameterSnapshot, *, store: bool = True
     ) -> WriteReport:
         """As `write_parameters`: every parameter the drive file knows, in the drive's own circuit, form and unit."""
+        doubtful = self.implausible(snapshot.in_use, nameplate)
+        if doubtful:
+            raise doubtful[0].as_error()
         written = drive_values(self.profile, circuit, nameplate)
         return self.write_parameters(written.values, snapshot, store=store)
+
+    def keep_tuned(self, values: Mapping[str, float], snapshot: ParameterSnapshot) -> WriteReport:
+        """A set that this drive found by its own tuning, in its own terms, in use and stored: no unit needs to be known."""
+        self.profile.require("restore")
+        return self._write_back().write(values, snapshot, store=True, always=True)
+
+    def tuner(self, tuning: Tuning, operator: Operator) -> Tuner:
+        """By which the drive tunes itself."""
+        return Tuner(self._items, tuning, operator, self.journal, sleep=self._sleep, clock=self._clock)
+
+    def read_watchdog_ms(self) -> float:
+        """What the drive's own supervision of the link is set to."""
+        watchdog = self.profile.watchdog
+        assert watchdog is not None
+        unit_ms = 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
+        return unit_ms * self._items.read_number(watchdog.register)
 
     def restore(self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None) -> WriteReport:
         """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`."""

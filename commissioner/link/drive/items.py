@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from commissioner.errors import DriveFault
+from commissioner.errors import DriveFault, LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.foreign import Watched
-from commissioner.link.wire.port import Port, Words
-from commissioner.registers.codec import Value, decode_span, encode_item, encode_span
+from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, Port, Words
+from commissioner.registers.codec import Value, decode_item, decode_span, encode_item, encode_span
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
 
 
@@ -37,18 +37,29 @@ class Items:
             self._write(span, values)
 
     def write_verified(self, values: Mapping[str, Value], step: str) -> None:
-        """Write and read back. DriveFault: the drive acknowledged and holds something else."""
+        """Write and read back; where the answer was lost, what the drive holds tells whether it was written.
+
+        DriveFault: the drive acknowledged and holds something else.
+        """
         spans = self._spans(values)
+        lost = [failure for span in spans if (failure := self._try_to_write(span, values)) is not None]
         for span in spans:
-            self._write(span, values)
-        for span in spans:
-            self._compare(span, self.port.read(span.address, span.count), values, step)
+            seen = self.port.read(span.address, span.count)
+            if lost and seen != encode_span(span, values):
+                raise lost[0]
+            self._compare(span, seen, values, step)
 
     def exchange_verified(self, values: Mapping[str, Value], step: str) -> None:
         """As `write_verified`, each span in one transaction: for values that are steered live."""
         for span in self._spans(values):
             words = encode_span(span, values)
-            seen = self.port.exchange(span.address, words, span.address, span.count)
+            try:
+                seen = self.port.exchange(span.address, words, span.address, span.count)
+            except (ReplyTimeout, ReplyMismatch):
+                self.watched.look_again()
+                seen = self.port.read(span.address, span.count)
+                if seen != words:
+                    raise
             self.watched.wrote(span, values)
             self._compare(span, seen, values, step)
 
@@ -57,9 +68,26 @@ class Items:
         item = self.profile.item(name)
         return encode_item(item, first) == encode_item(item, second)
 
+    def _try_to_write(self, span: Span, values: Mapping[str, Value]) -> LinkError | None:
+        """What lost the answer; None where there was one."""
+        try:
+            self._write(span, values)
+        except (ReplyTimeout, ReplyMismatch) as failure:
+            return failure
+        return None
+
+    def as_held(self, name: str, value: Value) -> Value:
+        """The value as the drive's own words hold it."""
+        item = self.profile.item(name)
+        return decode_item(item, encode_item(item, value))
+
     def _write(self, span: Span, values: Mapping[str, Value]) -> None:
         try:
             self.port.write(span.address, encode_span(span, values))
+        except RequestRefused as refused:
+            self.watched.look_again()
+            if refused.value not in MAY_BE_CARRIED_OUT:
+                raise
         except BaseException:  # it may have arrived all the same
             self.watched.look_again()
             raise

@@ -49,9 +49,10 @@ class ParameterSets:
         """Empty where the drive cannot show its non-volatile set; its items are then not in the drive file."""
         return self._read("stored_")
 
-    def store_count(self) -> int:
-        """Writes of the drive's memory so far; 0 where it does not count them."""
-        return int(number(self.items.read(["store_count"]).get("store_count", 0)))
+    def store_count(self) -> int | None:
+        """Writes of the drive's memory so far; None where it does not count them."""
+        seen = self.items.read(["store_count"])
+        return int(number(seen["store_count"])) if seen else None
 
     def differing(self, wanted: Values, held: Values) -> dict[str, float]:
         return {n: v for n, v in wanted.items() if not self.items.same_words(n, held[n], v)}

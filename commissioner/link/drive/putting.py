@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
-from commissioner.errors import DriveFault
+from commissioner.errors import DriveFault, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
 from commissioner.registers.codec import Value
@@ -13,6 +14,7 @@ from commissioner.registers.convention import staged_words_crc
 BUSY, DONE = 1, 2
 RESULT_DEADLINE_S = 5.0
 POLL_S = 0.01
+STORE_POLL_S = 0.1
 COMMIT_RESULTS = {
     0: "nothing happened",
     1: "still busy",
@@ -47,6 +49,10 @@ class Staged:
         self._items.write(values)
         self._await_result("store_result", STORE_RESULTS, "store")
         self._sets.verify(target, self._sets.stored(), "read back the stored values")
+
+    def keep(self, target: Values) -> None:
+        """What is in use becomes lasting."""
+        self.put_in_memory(target)
 
     def take_back(self, values: Values) -> None:
         """A commit that is still under way can after this only bring `values` into use."""
@@ -93,25 +99,75 @@ class Staged:
 class Direct:
     """Each value takes effect as it is written; what stores it stands in the drive file."""
 
-    def __init__(self, sets: ParameterSets, journal: Journal) -> None:
+    def __init__(
+        self, sets: ParameterSets, journal: Journal, sleep: Callable[[float], None], clock: Callable[[], float]
+    ) -> None:
         self._sets, self._items, self._journal = sets, sets.items, journal
+        self._sleep, self._clock = sleep, clock
 
     def put_in_use(self, target: Values, *, store: bool) -> None:
         differing: dict[str, Value] = dict(self._sets.differing(target, self._sets.in_use()))
         self._journal(Intent(Action.COMMIT, differing))
-        if self._sets.store.coil is not None:
-            self._items.port.write_coil(self._sets.store.coil, store)
-        for name in self._sets.group.order:
-            if name in differing:
-                self._items.write({name: differing[name]})
+        with self._store_mode(store):
+            for name in self._sets.group.order:
+                if name in differing:
+                    self._write(name, differing[name])
+        for address, value in self._sets.group.enter:
+            self._items.port.write(address, [value])
 
     def put_in_memory(self, target: Values) -> None:
-        writes = self._sets.store.writes
-        if not writes:
+        store = self._sets.store
+        if not store.writes:
             return
-        self._journal(Intent(Action.STORE, {f"register {address}": value for address, value in writes}))
-        for address, value in writes:
+        self._journal(Intent(Action.STORE, {f"register {address}": value for address, value in store.writes}))
+        for address, value in store.writes:
             self._items.port.write(address, [value])
+        if store.done is not None:
+            self._await_stored(*store.done, store.within_s)
+
+    def _write(self, name: str, value: Value) -> None:
+        """Where the answer is lost the drive is looked at, not written again: the value may have arrived."""
+        try:
+            self._items.write({name: value})
+        except (ReplyTimeout, ReplyMismatch):
+            if self._sets.group.enter or not self._items.same_words(name, self._items.read([name])[name], value):
+                raise
+
+    @contextmanager
+    def _store_mode(self, store: bool) -> Iterator[None]:
+        """The coil that says whether writes are lasting, put back to what it was; off where it cannot be read."""
+        coil, port = self._sets.store.coil, self._items.port
+        if coil is None:
+            yield
+            return
+        try:
+            before = port.read_coil(coil)
+        except RequestRefused:
+            before = False
+        port.write_coil(coil, store)
+        try:
+            yield
+        finally:
+            port.write_coil(coil, before)
+
+    def _await_stored(self, address: int, value: int, within_s: float) -> None:
+        end = self._clock() + within_s
+        while (seen := self._items.port.read(address, 1)[0]) != value:
+            if self._clock() > end:
+                raise DriveFault(
+                    f"the drive did not say that its memory is written: register {address} holds {seen}", step="store",
+                    value=seen, limit=f"{value} within {within_s:g} s", remedy="store at the drive's keypad and look again",
+                )  # fmt: skip
+            self._sleep(STORE_POLL_S)
+
+    def keep(self, target: Values) -> None:
+        """What is in use becomes lasting, whoever wrote it: by the coil it is written once more, as it stands."""
+        if self._sets.store.coil is not None:
+            self._journal(Intent(Action.STORE, dict(target)))
+            with self._store_mode(True):
+                for name in self._sets.group.order:
+                    self._write(name, target[name])
+        self.put_in_memory(target)
 
     def take_back(self, values: Values) -> None:
         """Nothing is under way."""

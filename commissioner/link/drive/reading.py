@@ -1,4 +1,4 @@
-"""Who a drive is and how it is, from its items. What its file does not describe is NaN, 0 or empty."""
+"""Who a drive is and how it is, from its items. What its file does not describe is None, NaN or empty."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ IDENTITY_ITEMS = (
     "control_period_s",
     "switching_frequency_hz",
 )
+BUS_CONTROL = "bus_control"
 STATUS_ITEMS = (
     "status_word",
     "fault_code",
@@ -61,9 +62,9 @@ def read_identity(items: Items) -> DriveIdentity:
     _check_identity(items.profile, seen)
     return DriveIdentity(
         drive_type=str(seen.get("drive_type", items.profile.name)),
-        serial_number=_whole(seen, "serial_number"),
-        firmware_version=_version(_whole(seen, "firmware_version")),
-        map_version=_whole(seen, "map_version"),
+        serial_number=_known(seen, "serial_number"),
+        firmware_version=_version(_whole(seen, "firmware_version")) if "firmware_version" in seen else "",
+        map_version=_known(seen, "map_version"),
         rated_drive_current_a=_real(seen, "rated_drive_current_a"),
         control_period_s=_real(seen, "control_period_s"),
         switching_frequency_hz=_real(seen, "switching_frequency_hz"),
@@ -74,15 +75,15 @@ def read_status(items: Items) -> DriveStatus:
     """One reading of everything the drive says about its state."""
     profile, seen = items.profile, items.read(STATUS_ITEMS)
     state = _state(profile, seen)
-    fault, trip = _whole(seen, "fault_code"), _whole(seen, "trip_cause")
+    fault, trip = _known(seen, "fault_code"), _whole(seen, "trip_cause")
     return DriveStatus(
         state=state.value,
         is_energised=state.may_be_energised,
         fault_code=fault,
-        fault_text=profile.fault_text(fault),
+        fault_text="a fault of which the drive file knows no code" if fault is None else profile.fault_text(fault),
         trip_value=_real(seen, "trip_value"),
         trip_limit=_real(seen, "trip_limit"),
-        interlocks=decode_bits(_whole(seen, "interlocks"), profile.interlock_bits),
+        interlocks=_interlocks(profile, seen),
         dc_link_v=_real(seen, "dc_link_v"),
         heatsink_degc=_real(seen, "heatsink_degc"),
         winding_degc=_real(seen, "winding_degc"),
@@ -120,6 +121,14 @@ def _state(profile: DriveProfile, seen: Mapping[str, Value]) -> DriveState:
     return decode_state(profile.status_decoder, _whole(seen, "status_word"), profile.status_bits)
 
 
+def _interlocks(profile: DriveProfile, seen: Mapping[str, Value]) -> dict[str, bool]:
+    """The interlocks' own register, and the status word's bit by which some drives say that the bus is in control."""
+    bits = decode_bits(_whole(seen, "interlocks"), profile.interlock_bits)
+    if BUS_CONTROL in profile.status_bits and "status_word" in seen:
+        bits["remote_control"] = bool(_whole(seen, "status_word") >> profile.status_bits[BUS_CONTROL] & 1)
+    return bits
+
+
 def _check_identity(profile: DriveProfile, seen: Mapping[str, Value]) -> None:
     wanted = profile.identity
     exact = {"magic": wanted.magic, "map_version": wanted.map_version, "drive_type": wanted.drive_type}
@@ -134,6 +143,11 @@ def _check_identity(profile: DriveProfile, seen: Mapping[str, Value]) -> None:
 
 def _real(seen: Mapping[str, Value], name: str) -> float:
     return number(seen.get(name, math.nan))
+
+
+def _known(seen: Mapping[str, Value], name: str) -> int | None:
+    """None where the drive file has no such item: unknown is not 0."""
+    return int(number(seen[name])) if name in seen else None
 
 
 def _whole(seen: Mapping[str, Value], name: str) -> int:

@@ -9,13 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from commissioner.errors import CheckFailed, CommissionerError, DriveError, IdentityMismatch, WriteBackFailed
+from commissioner.errors import (
+    CheckFailed,
+    CommissionerError,
+    DriveError,
+    DriveFault,
+    IdentityMismatch,
+    WriteBackFailed,
+)
 from commissioner.link.drive.facts import Journal, WriteReport
-from commissioner.link.drive.items import Items
+from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
 from commissioner.link.drive.putting import Direct, Staged
-from commissioner.link.drive.reading import read_identity, read_status
+from commissioner.link.drive.reading import NAMEPLATE_ITEMS, read_identity, read_status
 from commissioner.records import DriveIdentity, ParameterSnapshot, WrittenParameter
+from commissioner.registers.status import DriveState
+
+SETTLE_POLL_S = 0.1
+"""Between two looks at a drive that settles: shorter than any watchdog that is fed by reading."""
 
 
 class WriteBack:
@@ -26,9 +37,11 @@ class WriteBack:
     ) -> None:
         self._items, self._profile = items, items.profile
         self._sets = ParameterSets(items)
-        self._sleep = sleep
+        self._sleep, self._clock = sleep, clock
         is_staged = items.profile.parameters is not None and items.profile.parameters.is_staged
-        self._way = Staged(self._sets, journal, sleep, clock) if is_staged else Direct(self._sets, journal)
+        self._way = (
+            Staged(self._sets, journal, sleep, clock) if is_staged else Direct(self._sets, journal, sleep, clock)
+        )
 
     def snapshot(self) -> ParameterSnapshot:
         """What the drive holds once its jobs are done. `stored` is empty where the drive cannot show that set."""
@@ -38,17 +51,19 @@ class WriteBack:
             in_use=self._sets.in_use(),
             stored=self._sets.stored(),
             store_count=self._sets.store_count(),
+            plate=self._plate(),
         )
 
-    def write(self, values: Values, snapshot: ParameterSnapshot, *, store: bool) -> WriteReport:
-        """`values` in use, and stored if asked. Nothing is written where the drive is not as in the snapshot."""
+    def write(self, values: Values, snapshot: ParameterSnapshot, *, store: bool, always: bool = False) -> WriteReport:
+        """`values` in use, and stored if asked; `always`: also where the drive has them in use already, by its own doing.
+        Nothing is written where the drive is not as in the snapshot."""
         target = self._sets.complete(values, snapshot.in_use)
         present = self._check_present(snapshot, snapshot.in_use, snapshot.stored)
         self._check_stopped()
         if store:
             self._check_endurance(present.store_count, writes=1)
         try:
-            self._bring(target, store=store)
+            self._bring(target, store=store, always=always)
             return self._report(target, present, is_stored=store and self._sets.can_store)
         except DriveError as error:
             raise self._after_failure(error, snapshot) from error
@@ -76,6 +91,9 @@ class WriteBack:
         theirs, ours = _key(present.identity), _key(snapshot.identity)
         if theirs != ours:
             raise _changed("the drive is not the one of the snapshot", theirs, ours)
+        for name, value in snapshot.plate.items():
+            if name in present.plate and not self._items.same_words(name, present.plate[name], value):
+                raise _changed(f"{name} in the drive is not the one of the snapshot", present.plate[name], value)
         for wanted, held, which in ((in_use, present.in_use, "in use"), (stored, present.stored, "stored")):
             for name in wanted or {}:
                 assert wanted is not None
@@ -95,10 +113,46 @@ class WriteBack:
                 limit="a stopped drive",
                 remedy="stop the motor first",
             )
+        if not status.interlocks.get("remote_control", True):
+            raise CheckFailed(
+                "the drive is under local control: it would not take what is written", step="write parameters",
+                value="local", limit="bus control", remedy="switch the drive to remote (bus) control",
+            )  # fmt: skip
 
-    def _check_endurance(self, count: int, writes: int) -> None:
+    def _plate(self) -> dict[str, float]:
+        """What stands in the drive about its motor, item by item: by this, too, one drive is told from another."""
+        if self._profile.kind == "commissioning_map":
+            return {}  # its serial number tells
+        return {name: number(value) for name, value in self._items.read(NAMEPLATE_ITEMS).items()}
+
+    def _fault(self) -> str:
+        """What the drive reports; empty where nothing, or where its file knows no status."""
+        if "status_word" not in self._profile.items:
+            return ""
+        status = read_status(self._items)
+        return status.fault_text if status.fault_code or status.state == DriveState.FAULT.value else ""
+
+    def _settle(self, before: str) -> None:
+        """The drive's pause after a write, asking all the while: a drive whose watchdog we feed must not starve. DriveFault
+        where it has tripped since the write; `before`: what it reported until then."""
+        left = self._sets.group.settle_s
+        while left > 0:
+            self._sleep(min(left, SETTLE_POLL_S))
+            left -= SETTLE_POLL_S
+            if (now := self._fault()) and not before:
+                break
+            if "status_word" not in self._profile.items:
+                self._sets.in_use()
+        now = self._fault()
+        if now and not before:
+            raise DriveFault(
+                f"the drive tripped after the parameters were written: {now}", step="settle", value=now, limit="no fault",
+                remedy="remove the cause, reset the fault at the drive, then look at its parameters",
+            )  # fmt: skip
+
+    def _check_endurance(self, count: int | None, writes: int) -> None:
         store = self._profile.store
-        if store and store.endurance_writes and count + writes > store.endurance_writes:
+        if count is not None and store and store.endurance_writes and count + writes > store.endurance_writes:
             raise CheckFailed(
                 "the drive's parameter memory is worn out",
                 step="store",
@@ -108,18 +162,22 @@ class WriteBack:
             )
 
     # --- act ----------------------------------------------------------------------------------------------------
-    def _bring(self, target: Values, *, store: bool) -> None:
+    def _bring(self, target: Values, *, store: bool, always: bool = False) -> None:
         """`target` in use and, if asked, stored; verified; only what differs."""
         has_changed = bool(self._sets.differing(target, self._sets.in_use()))
         if has_changed:
+            before = self._fault()
             self._way.put_in_use(target, store=store)
-            self._sleep(self._sets.group.settle_s)
+            self._settle(before)
             self._sets.verify(target, self._sets.in_use(), "read back the values in use")
         is_unstored = (
             bool(self._sets.differing(target, self._sets.stored())) if self._sets.group.is_staged else has_changed
         )
         if store and is_unstored:
             self._way.put_in_memory(target)
+        elif store and always:
+            self._way.keep(target)
+            self._sets.verify(target, self._sets.in_use(), "read back the values in use")
 
     def _bring_back(self, snapshot: ParameterSnapshot) -> bool:
         """Both sets of the snapshot; the stored one first where they differ, for a store takes what is in use. True
@@ -138,7 +196,9 @@ class WriteBack:
             self._way.take_back(snapshot.in_use)
             self._way.let_jobs_end()
             self._bring_back(snapshot)
+            fault = self._fault()
             outcome, was_restored = "the values found before are in the drive again, verified", True
+            outcome += f"; the drive reports: {fault}" if fault else ""
         except CommissionerError as second:
             outcome, was_restored = f"the values found before could not be verified: {second.what}", False
         failed = WriteBackFailed(
@@ -154,9 +214,12 @@ class WriteBack:
     def _report(self, target: Values, before: ParameterSnapshot, *, is_stored: bool) -> WriteReport:
         after = self._sets.in_use()
         rows = tuple(
-            WrittenParameter(name, self._profile.item(name).address, before.in_use[name], target[name], after[name])
+            WrittenParameter(
+                name, self._profile.item(name).address, before.in_use[name],
+                number(self._items.as_held(name, target[name])), after[name],
+            )
             for name in self._sets.differing(target, before.in_use)
-        )
+        )  # fmt: skip
         store = self._profile.store
         return WriteReport(
             written=rows,
@@ -164,6 +227,7 @@ class WriteBack:
             store_count_before=before.store_count,
             store_count_after=self._sets.store_count(),
             endurance_writes=store.endurance_writes if store else None,
+            fault=self._fault(),
         )
 
 

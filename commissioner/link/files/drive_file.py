@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,14 @@ from commissioner.link.files.schema import (
     ItemTable,
     LinkTable,
     ParametersTable,
+    StepTable,
     StoreTable,
+    TuneTable,
     WatchdogTable,
     WindowTable,
     explained,
 )
-from commissioner.registers.convention import CONVENTIONS, QUANTITIES
+from commissioner.registers.convention import CONVENTIONS, QUANTITIES, UNITS, unit_of
 from commissioner.registers.profile import (
     WINDOW_FLAGS,
     DriveLimits,
@@ -32,9 +35,12 @@ from commissioner.registers.profile import (
     Store,
     Watchdog,
     WindowLayout,
+    Worked,
     check_consistency,
 )
 from commissioner.registers.status import STATUS_BITS
+from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
+from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
 
 DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"
@@ -52,7 +58,10 @@ def build(document: Mapping[str, Any], file: str) -> DriveProfile:
         model = DriveFile.model_validate(dict(document))
     except ValidationError as error:
         raise explained(error, file) from error
-    return check_consistency(_profile(model, file))
+    profile = check_worked(check_consistency(_profile(model, file)))
+    if model.tune is None:
+        return profile
+    return replace(profile, tuning=check_tuning(profile, _tuning(model.tune, file)))
 
 
 def known_drives() -> tuple[str, ...]:
@@ -95,22 +104,35 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
         exceptions=_by_code(model.exceptions, "exceptions", file),
         limits=DriveLimits(**model.limits.model_dump()),
         unknown=model.unknown,
+        worked=tuple(Worked(**table.model_dump(exclude={"words"}), words=tuple(table.words)) for table in model.worked),
     )
 
 
 def _link(table: LinkTable) -> LinkLimits:
-    return LinkLimits(**table.model_dump(exclude={"address_base", "word_order"}))
+    functions = tuple(table.write_functions)
+    return LinkLimits(
+        **table.model_dump(exclude={"address_base", "word_order", "write_functions"}), write_functions=functions
+    )
 
 
 def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     key = f"items.{name}"
     if table.address < link.address_base:
         raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
-    for what, value, known in (("convention", table.convention, CONVENTIONS), ("quantity", table.quantity, QUANTITIES)):
+    for what, value, known in (
+        ("convention", table.convention, CONVENTIONS),
+        ("quantity", table.quantity, QUANTITIES),
+        ("unit", table.unit, UNITS),
+    ):
         if value and value not in known:
             raise ConfigurationError(
                 file=file, key=f"{key}.{what}", value=value, expected="one of: " + ", ".join(sorted(known))
             )
+    wanted = unit_of(table.quantity or name, table.convention)
+    if wanted is not None and table.unit != wanted:
+        raise ConfigurationError(
+            file=file, key=f"{key}.unit", value=table.unit, expected=f"{wanted!r}, with the scale that makes it so"
+        )
     return Item(
         name=name,
         address=table.address - link.address_base,
@@ -119,7 +141,7 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
         maximum=table.max,
         word_order=table.word_order or link.word_order,
         **table.model_dump(
-            include={"type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop"}
+            include={"type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop", "source"}
         ),
     )
 
@@ -139,11 +161,35 @@ def _window(table: WindowTable, file: str) -> WindowLayout:
 
 
 def _parameters(table: ParametersTable) -> ParameterGroup:
-    return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s)
+    return ParameterGroup(tuple(table.order), table.staged_crc, table.settle_s, tuple((a, v) for a, v in table.enter))
 
 
 def _store(table: StoreTable) -> Store:
-    return Store(table.endurance_writes, tuple((a, v) for a, v in table.writes), table.coil)
+    writes = tuple((a, v) for a, v in table.writes)
+    done = (table.done[0], table.done[1]) if table.done else None
+    return Store(table.endurance_writes, writes, table.coil, done, table.within_s)
+
+
+def _tuning(table: TuneTable, file: str) -> Tuning:
+    return Tuning(
+        form=table.form,
+        energises=table.energises,
+        results=tuple(table.results),
+        also_changes=tuple(table.also_changes),
+        longest_s=table.longest_s,
+        pause_s=table.pause_s,
+        source=table.source,
+        proved_on=tuple(table.proved_on),
+        facts={name: Fact(**fact.model_dump()) for name, fact in table.facts.items()},
+        steps=tuple(_step(step, f"tune.step[{k}].failed", file) for k, step in enumerate(table.step)),
+        finally_=tuple(_step(step, f"tune.finally[{k}].failed", file) for k, step in enumerate(table.finally_)),
+        watch=tuple(Limit(**limit.model_dump()) for limit in table.watch),
+    )
+
+
+def _step(table: StepTable, key: str, file: str) -> Step:
+    values = table.model_dump(exclude={"done", "busy", "failed"})
+    return Step(**values, done=tuple(table.done), busy=tuple(table.busy), failed=_by_code(table.failed, key, file))
 
 
 def _status_bits(model: DriveFile, file: str) -> dict[str, int]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from commissioner.errors import ConfigurationError
+from commissioner.validation import first_problem
 
 Word = Annotated[int, Field(ge=0, le=0xFFFF)]
 Bit = Annotated[int, Field(ge=0, le=15)]
 Count = Annotated[int, Field(ge=1, le=125)]
 Seconds = Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)]
+Pair = Annotated[list[Word], Field(min_length=2, max_length=2)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Capability = Literal["excite", "stream", "write_back", "restore"]
 HeaderField = Literal[
@@ -39,8 +40,10 @@ class LinkTable(Table):
     word_order: Literal["big", "little"]
     has_read_write_multiple: bool
     turnaround_s: Seconds
-    device_id: Annotated[int, Field(ge=1, le=247)]
+    device_id: Annotated[int, Field(ge=0, le=255)]
     write_pause_s: Seconds = 0.0
+    write_functions: Annotated[list[Literal[6, 16]], Field(min_length=1)] = [16]
+    reply_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] | None = None
 
 
 class IdentityTable(Table):
@@ -62,8 +65,10 @@ class WatchdogTable(Table):
 
 class StoreTable(Table):
     endurance_writes: Annotated[int, Field(ge=1)] | None = None
-    writes: list[Annotated[list[Word], Field(min_length=2, max_length=2)]] = []
+    writes: list[Pair] = []
     coil: Word | None = None
+    done: Pair | None = None
+    within_s: Seconds = 5.0
 
 
 class ItemTable(Table):
@@ -99,6 +104,7 @@ class ParametersTable(Table):
     order: Annotated[list[str], Field(min_length=1)]
     staged_crc: str | None = None
     settle_s: Seconds = 0.0
+    enter: list[Pair] = []
 
 
 class CommandsTable(Table):
@@ -111,6 +117,62 @@ class LimitsTable(Table):
     dc_link_max_v: Finite | None = None
     heatsink_max_degc: Finite | None = None
     winding_max_degc: Finite | None = None
+
+
+class WorkedTable(Table):
+    """One example from the cited document, carried out to the last digit."""
+
+    item: str
+    source: Annotated[str, Field(min_length=1)]
+    wire: Word | None = None
+    words: list[Word] = []
+    value: Finite | None = None
+    per_phase: Finite | None = None
+
+
+class FactTable(Table):
+    item: str
+    value: Word
+    source: str
+
+
+class StepTable(Table):
+    do: Literal["expect", "write", "await", "ask"]
+    item: str = ""
+    value: Word = 0
+    mask: Word = 0xFFFF
+    done: list[Word] = []
+    busy: list[Word] = []
+    failed: dict[str, str] = {}
+    within_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] = 1.0
+    every_s: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
+    once: bool = False
+    why: str = ""
+    text: str = ""
+
+
+class LimitTable(Table):
+    item: str
+    most: Word
+    why: Annotated[str, Field(min_length=1)]
+
+
+class TuneTable(Table):
+    """`step` and `finally` are read as they stand; what they must be together is judged in `registers.tuning`."""
+
+    form: Literal["remote", "assisted"]
+    kind: Literal["standstill"]
+    energises: Annotated[str, Field(min_length=1)]
+    results: Annotated[list[str], Field(min_length=1)]
+    also_changes: list[str] = []
+    longest_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+    pause_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+    source: str
+    proved_on: list[str]
+    facts: dict[Literal["standstill", "start", "finished", "failed", "stop"], FactTable] = {}
+    step: Annotated[list[StepTable], Field(min_length=1)]
+    finally_: Annotated[list[StepTable], Field(alias="finally")] = []
+    watch: list[LimitTable] = []
 
 
 class DriveFile(Table):
@@ -131,35 +193,11 @@ class DriveFile(Table):
     exceptions: dict[str, str] = {}
     limits: LimitsTable = LimitsTable()
     unknown: dict[str, str] = {}
+    worked: list[WorkedTable] = []
+    tune: TuneTable | None = None
 
 
 def explained(error: ValidationError, file: str) -> ConfigurationError:
-    first = error.errors()[0]
-    location = [str(part) for part in first["loc"]]
-    value = None if first["type"] == "missing" else first["input"]
-    return ConfigurationError(file=file, key=".".join(location), value=value, expected=_expected(first))
-
-
-def _expected(problem: Any) -> str:
-    if problem["type"] == "missing":
-        return "this key is needed; see config/drives/simulated.toml for a complete file"
-    if problem["type"] == "extra_forbidden":
-        return "no such key; known here: " + ", ".join(_keys_at(problem["loc"][:-1]))
-    return str(problem["msg"])
-
-
-def _keys_at(location: tuple[object, ...]) -> list[str]:
-    model: type[BaseModel] = DriveFile
-    for part in location:
-        if str(part) in model.model_fields:
-            model = _table_in(model.model_fields[str(part)].annotation) or model
-    return sorted(model.model_fields)
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """The table model inside an annotation such as `X`, `X | None` or `dict[str, X]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    if get_origin(annotation) in (UnionType, Union, dict):
-        return next((found for part in get_args(annotation) if (found := _table_in(part))), None)
-    return None
+    problem = first_problem(error, DriveFile)
+    see = "; see config/drives/simulated.toml for a complete file" if problem.value is None else ""
+    return ConfigurationError(file=file, key=problem.key, value=problem.value, expected=problem.expected + see)

@@ -20,6 +20,9 @@ from commissioner.link.wire.rtu import find_answers
 from commissioner.link.wire.url import DriveUrl, RtuUrl, TcpUrl, TlsUrl
 
 LONGEST_READ = 4096
+UNIT = 6
+"""Where the device's number stands in a TCP frame, behind transaction, protocol and length."""
+LAST_DEVICE = 247
 SILENCE_S = 0.05
 """A frame has no hole this long: USB converters hold bytes back for 16 ms at most by default (FTDI AN232B-04)."""
 
@@ -35,9 +38,15 @@ class _Deadline(ModbusTcpClient):
     """
 
     _end = 0.0
+    _asked, _units = 0, frozenset[int]()
+
+    def other_device(self) -> int | None:
+        """The device whose answer came since the last request was sent, where it was not the one that was asked."""
+        return next(iter(self._units - {self._asked}), None)
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
         wanted = self.comm_params.timeout_connect
+        self._asked, self._units = request[UNIT], frozenset()
         self._end = time.monotonic() + wanted
         if self.socket is None:
             raise ConnectionException("the connection is closed")  # type: ignore[no-untyped-call]
@@ -60,6 +69,8 @@ class _Deadline(ModbusTcpClient):
         if not data:
             self.close()  # type: ignore[no-untyped-call]
             raise ConnectionException("the other end closed the connection")  # type: ignore[no-untyped-call]
+        if len(data) > UNIT and data[2:4] == b"\0\0":
+            self._units |= {data[UNIT]}
         return data
 
 
@@ -124,6 +135,12 @@ class SerialClient(ModbusSerialClient):
             left = end - time.monotonic()
             if not self._take(min(left, SILENCE_S) if self.received else left):
                 return b""
+
+    def other_device(self) -> int | None:
+        """As over TCP."""
+        data = bytes(self.received)
+        seen = {data[k] for k in range(len(data)) if 0 < data[k] <= LAST_DEVICE and data[k] != self.device}
+        return next((device for device in sorted(seen) if find_answers(data, device)), None)
 
     def waiting(self) -> int:
         """Bytes on the line that nobody has read; 0 where the line is gone, which the next request will tell."""

@@ -1,4 +1,4 @@
-"""The port over pymodbus 3.15: every reply checked, every exception mapped, no write repeated.
+"""The port over pymodbus 3.15: every reply checked, every exception mapped, no write repeated that may have arrived.
 
 A request on a closed connection opens it, once, within `connect_timeout_s`: there is no back-off and no reconnection
 behind the caller's back. What may be believed is decided in `link.trust`.
@@ -17,12 +17,12 @@ from pymodbus.pdu import ModbusPDU
 from commissioner.errors import CommissionerError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.debts import Shape
-from commissioner.link.wire.port import LinkStats, Words
+from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, LinkStats, Words
 from commissioner.link.wire.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, SerialTrust, Trust
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.profile import DriveProfile
 
-READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x03, 0x05, 0x06, 0x10, 0x17
+READ_COIL, READ, WRITE_COIL, WRITE_ONE, WRITE, EXCHANGE = 0x01, 0x03, 0x05, 0x06, 0x10, 0x17
 COIL_ON = 0xFF00
 ILLEGAL_FUNCTION = 1
 
@@ -38,6 +38,19 @@ EXCEPTION_MEANINGS = {
     11: "gateway target did not answer",
 }
 """MODBUS Application Protocol Specification V1.1b3, section 7."""
+NOT_CARRIED_OUT = frozenset({6, 10})
+"""Busy, or no way to the device: asked again, whatever it was, until the time for a reply is over."""
+BUSY_PAUSE_S = 0.01
+_GATEWAY = (
+    "the gateway answers and the drive behind it does not: check that device={device} is the drive's number, the gateway's "
+    "table, its baud rate and parity, and the drive's supply"
+)
+REMEDIES = {
+    5: "it stays at work longer than an answer may take: let its job end, then start again",
+    6: "it stays busy: let what occupies it end, or disconnect the other master, then start again",
+    10: _GATEWAY,
+    11: _GATEWAY,
+}
 
 Result = TypeVar("Result")
 
@@ -61,24 +74,36 @@ class ModbusPort:
         self._connect_timeout_s = connect_timeout_s
         self._url, self._profile = url, profile
         self._exceptions = EXCEPTION_MEANINGS | dict(profile.exceptions)
-        self._device = url.device or profile.link.device_id
+        self._device = profile.link.device_id if url.device is None else url.device
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
         self._token = time.time_ns() & 0xFFFF
         self._sleep, self._clock = sleep, clock
+        self._answered_s = clock()
         self._trust = self._make_trust()
 
     # --- the port -------------------------------------------------------------------------------------------------
     def read(self, address: int, count: int) -> Words:
         for _ in range(self.read_retries):
             try:
-                return self._trusted(lambda: self._ask_apart(address, count))
+                return self._trusted(lambda: self._ask_apart(address, count), repeats=True)
             except (ReplyTimeout, ReplyMismatch):
                 continue
-        return self._trusted(lambda: self._ask_apart(address, count))
+        return self._trusted(lambda: self._ask_apart(address, count), repeats=True)
+
+    def write_register(self, address: int, values: Sequence[int]) -> None:
+        """One register by function 6, whatever the drive file says."""
+        self._trusted(lambda: self._ask_write_one(address, values[0]))
+
+    def write_registers(self, address: int, values: Sequence[int]) -> None:
+        """By function 16, whatever the drive file says."""
+        self._trusted(lambda: self._ask_write(address, list(values)))
 
     def write(self, address: int, values: Sequence[int]) -> None:
-        self._trusted(lambda: self._ask_write(address, list(values)))
+        if len(values) == 1 and WRITE_ONE in self._profile.link.write_functions:
+            self._trusted(lambda: self._ask_write_one(address, values[0]))
+        else:
+            self._trusted(lambda: self._ask_write(address, list(values)))
         if self._profile.link.write_pause_s:
             self._sleep(self._profile.link.write_pause_s)
 
@@ -88,17 +113,22 @@ class ModbusPort:
         if self._has_exchange:
             try:
                 return self._trusted(
-                    lambda: self._ask_exchange(write_address, list(values), read_address, count), not proves_itself
+                    lambda: self._ask_exchange(write_address, list(values), read_address, count),
+                    not proves_itself,
+                    repeats=True,
                 )
             except RequestRefused as refused:
                 if refused.value != ILLEGAL_FUNCTION:
                     raise
                 self._has_exchange = False
         self.write(write_address, values)
-        return self._trusted(lambda: self._ask_apart(read_address, count), not proves_itself)
+        return self._trusted(lambda: self._ask_apart(read_address, count), not proves_itself, repeats=True)
 
     def write_coil(self, address: int, value: bool) -> None:
         self._trusted(lambda: self._ask_write_coil(address, value))
+
+    def read_coil(self, address: int) -> bool:
+        return self._trusted(lambda: self._ask_read_coil(address))
 
     def doubt(self) -> None:
         self._trust.doubt_content()
@@ -175,6 +205,14 @@ class ModbusPort:
         )
         self._expect(what, (reply.address, reply.bits[:1]), (address, [value]))
 
+    def _ask_read_coil(self, address: int) -> bool:
+        what = f"read coil {address}"
+        reply = self._transact(
+            (READ_COIL, address), what, lambda: self._client.read_coils(address, count=1, device_id=self._device)
+        )
+        self._expect(what, len(reply.bits) > 0, True)
+        return bool(reply.bits[0])
+
     def _ask_exchange(self, write_address: int, values: list[int], read_address: int, count: int) -> Words:
         what = f"write {len(values)} registers at {write_address} and read {count} at {read_address}"
         reply = self._transact(
@@ -191,15 +229,23 @@ class ModbusPort:
         return self._words(reply, count, what)
 
     # --- trust --------------------------------------------------------------------------------------------------------
-    def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True) -> Result:
-        if not self._client.connected:
-            self.connect()
-        self._checked("bring the line into step", self._trust.ready)
-        try:
-            answer = ask()
-        except RequestRefused:  # an old refusal may come late like any other answer
-            self._checked("prove the refusal", self._trust.confirm)
-            raise
+    def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True, *, repeats: bool = False) -> Result:
+        """`repeats`: it does no harm twice, so that it is asked again where it may have been carried out, too."""
+        waited_for = NOT_CARRIED_OUT | MAY_BE_CARRIED_OUT if repeats else NOT_CARRIED_OUT
+        end = self._clock() + self.reply_timeout_s
+        while True:
+            if not self._client.connected:
+                self.connect()
+            self._checked("bring the line into step", self._trust.ready)
+            try:
+                answer = ask()
+                break
+            except RequestRefused as refused:  # an old refusal may come late like any other answer
+                self._checked("prove the refusal", self._trust.confirm)
+                if refused.value not in waited_for or self._clock() + BUSY_PAUSE_S > end:
+                    raise
+            self.stats.waits += 1
+            self._sleep(BUSY_PAUSE_S)
         if needs_proof:
             self._checked("prove the answer", self._trust.confirm)
         return answer
@@ -250,6 +296,7 @@ class ModbusPort:
         self._client.comm_params.timeout_connect = self.reply_timeout_s
         self.stats.requests += 1
         start = self._clock()
+        self.stats.longest_gap_s = max(self.stats.longest_gap_s, start - self._answered_s)
         try:
             reply = send()
         except ModbusException as error:
@@ -259,7 +306,9 @@ class ModbusPort:
         except BaseException:
             self._trust.doubt()
             raise
-        self.stats.latencies_s.append(self._clock() - start)
+        finally:
+            self._answered_s = self._clock()
+        self.stats.latencies_s.append(self._answered_s - start)
         self._expect(what, (reply.dev_id, reply.function_code & 0x7F), (self._device, shape[0]))
         if reply.isError():
             self._refused(what, reply.exception_code)
@@ -286,7 +335,7 @@ class ModbusPort:
         if isinstance(error, ConnectionException):
             self._broke(what, error)
         if isinstance(error, ModbusIOException) and "No response received" in str(error):
-            self._timed_out(what, f"nothing in {self.reply_timeout_s:g} s", error)
+            self._timed_out(what, self._heard(), error)
         self.stats.mismatches += 1
         self._trust.doubt()
         raise ReplyMismatch(
@@ -310,9 +359,30 @@ class ModbusPort:
             f"no answer to '{what}'",
             step=what,
             value=value,
-            limit=f"an answer within {self.reply_timeout_s:g} s",
-            remedy="check the drive's supply, the cable and the device number",
+            limit=f"an answer of device {self._device} within {self.reply_timeout_s:g} s",
+            remedy=self._remedy(),
         ) from error
+
+    def _heard(self) -> str:
+        """What came in an answer's place."""
+        other = self._client.other_device()
+        if other is not None:
+            return f"an answer of device {other}"
+        if isinstance(self._client, SerialClient) and self._client.received:
+            return f"{len(self._client.received)} bytes that are no Modbus answer"
+        return f"nothing in {self.reply_timeout_s:g} s"
+
+    def _remedy(self) -> str:
+        other = self._client.other_device()
+        if other is not None:
+            return (
+                f"device {other} is another one than {self._device}: give its number as ?device={other} if it is the drive, "
+                "else correct the number in the drive or the gateway's table"
+            )
+        if isinstance(self._url, RtuUrl):
+            line = f"{self._url.baud} Bd, parity {self._url.parity}, {self._url.stop_bits} stop"
+            return f"check that the drive is set to {line} and to device {self._device}; then its supply and the cable"
+        return f"check the drive's supply, the cable, and that device={self._device} is its number behind this address"
 
     def _refused(self, what: str, code: int) -> NoReturn:
         self.stats.refusals += 1
@@ -322,17 +392,20 @@ class ModbusPort:
             step=what,
             value=code,
             limit="a request the drive allows now",
-            remedy=f"the drive says: {meaning}",
+            remedy=REMEDIES.get(code, "the drive says: {meaning}").format(meaning=meaning, device=self._device),
         )
 
 
 def open_port(
     url: DriveUrl, profile: DriveProfile, *, reply_timeout_s: float = 0.5, connect_timeout_s: float = 2.0
 ) -> ModbusPort:
-    """A connected port. `reply_timeout_s` is on top of the time the longest frames take on a serial line.
+    """A connected port. `reply_timeout_s` holds where neither the address (`reply=`) nor the drive file names another
+    time; it is on top of the time the longest frames take on a serial line.
 
     Raises LinkUnreachable where nothing answers, UsageError where a TLS file cannot be used.
     """
+    said = url.reply_s if url.reply_s is not None else profile.link.reply_s
+    reply_timeout_s = reply_timeout_s if said is None else said
     wire_s = 2 * MAX_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
     port = ModbusPort(url, profile, reply_timeout_s=reply_timeout_s + wire_s, connect_timeout_s=connect_timeout_s)
     port.connect()

@@ -10,6 +10,8 @@ from typing import Protocol
 import numpy as np
 
 Words = tuple[int, ...]
+MAY_BE_CARRIED_OUT = frozenset({5, 11})
+"""Still at work, or no answer from behind a gateway: only what may be repeated without harm is asked again."""
 
 
 @dataclass
@@ -25,6 +27,10 @@ class LinkStats:
     refusals: int = 0
     resynchronisations: int = 0
     connections: int = 0
+    waits: int = 0
+    """Requests put again because the drive or a gateway was busy."""
+    longest_gap_s: float = 0.0
+    """Longest time between an answer and the next request: what this host did not ask in. Whoever measures sets it to 0."""
     latencies_s: deque[float] = field(default_factory=lambda: deque(maxlen=2048))
 
     def latency_s(self, quantile: float) -> float:
@@ -33,7 +39,7 @@ class LinkStats:
 
     def as_dict(self) -> dict[str, float]:
         """Counts and latency quantiles, for the journal and the report."""
-        counts = ("requests", "timeouts", "mismatches", "refusals", "resynchronisations", "connections")
+        counts = ("requests", "timeouts", "mismatches", "refusals", "resynchronisations", "connections", "waits")
         quantiles = {"latency_p50_s": 0.5, "latency_p99_s": 0.99, "latency_max_s": 1.0}
         return {name: float(getattr(self, name)) for name in counts} | {
             name: self.latency_s(q) for name, q in quantiles.items()
@@ -43,7 +49,9 @@ class LinkStats:
 class Port(Protocol):
     """Registers over some wire. One owner, no threads; every call ends within the deadline or raises a LinkError.
 
-    No call is ever repeated, except a read, at most `read_retries` times; a write or an exchange never.
+    No call is ever repeated, except a read, at most `read_retries` times; a write or an exchange never. What was refused as
+    busy was not carried out, and is asked again for as long as a reply may take; exceptions 5 and 11 only where twice does
+    no harm (reads, exchanges).
     """
 
     stats: LinkStats
@@ -55,7 +63,7 @@ class Port(Protocol):
         ...
 
     def write(self, address: int, values: Sequence[int]) -> None:
-        """Write the registers in one transaction (FC16)."""
+        """Write the registers in one transaction: FC06 where there is one and the drive file names it, else FC16."""
         ...
 
     def exchange(
@@ -69,6 +77,10 @@ class Port(Protocol):
 
     def write_coil(self, address: int, value: bool) -> None:
         """Set one coil (FC05)."""
+        ...
+
+    def read_coil(self, address: int) -> bool:
+        """One coil (FC01)."""
         ...
 
     def doubt(self) -> None:

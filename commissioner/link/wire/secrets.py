@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import Any
 from urllib.parse import unquote
 
@@ -44,7 +45,7 @@ def shown_call(arguments: Sequence[str]) -> str:
 
 
 def _found(arguments: Sequence[str]) -> Iterator[str]:
-    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+    for argument, following in zip_longest(arguments, arguments[1:], fillvalue=""):
         if option := _OPTION.fullmatch(argument):
             yield following if option[1] is None else option[1]
         if user := USERINFO.search(argument):

@@ -178,9 +178,10 @@ class SerialTrust:
         raise ReplyTimeout(
             f"{self._url}: the line does not come into step",
             step="resynchronise",
-            value=failure.what if failure else None,
+            value=failure.value if failure else None,
             limit=f"a proven answer within {ATTEMPTS} attempts",
-            remedy="check device number, baud rate, parity, cable and termination, and that there is one master only",
+            remedy=(f"{failure.remedy}; " if failure else "")
+            + "check device number, baud rate, parity, termination, and that there is one master only",
         ) from failure
 
     def _fall_silent(self) -> None:

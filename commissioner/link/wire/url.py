@@ -13,10 +13,11 @@ from commissioner.errors import UsageError
 BAUD_RATES = (1200, 2400, 4800, 9600, 14400, 19200, 38400, 57600, 115200, 230400, 460800, 500000, 921600, 1000000)
 WINDOWS_PORT = re.compile(r"COM[1-9]\d{0,2}", re.IGNORECASE)
 PARITIES = ("E", "O", "N")
+REPLY_TIME = re.compile(r"\d{1,2}(\.\d{1,4})?")
 
 
 USERINFO = re.compile(
-    r"(?:(?<=://)(?!/)|(?:^|(?<==))(?!\w+://)[^\s/:@=]*:)(?:(?!\?(?:device|ca|cert|key)=).)*@", re.DOTALL
+    r"(?:(?<=://)(?!/)|(?:^|(?<==))(?!\w+://)[^\s/:@=]*:)(?:(?!\?(?:device|reply|ca|cert|key)=).)*@", re.DOTALL
 )
 """Up to the last @, since a password may hold any character; an @ in an option's value is none of it. Without a scheme only
 where a colon stands between user and password."""
@@ -24,11 +25,12 @@ where a colon stands between user and password."""
 
 @dataclass(frozen=True)
 class TcpUrl:
-    """Modbus TCP. `device` None: the drive file's."""
+    """Modbus TCP. `device` None: the drive file's, as in the others; `reply_s`: how long an answer may take."""
 
     host: str
     port: int = 502
     device: int | None = None
+    reply_s: float | None = None
 
     def __str__(self) -> str:
         return f"tcp://{_bracketed(self.host)}:{self.port}"
@@ -44,6 +46,7 @@ class TlsUrl:
     ca: Path | None = None
     cert: Path | None = None
     key: Path | None = None
+    reply_s: float | None = None
 
     def __str__(self) -> str:
         return f"tls://{_bracketed(self.host)}:{self.port}"
@@ -58,6 +61,7 @@ class RtuUrl:
     parity: str = "E"
     stop_bits: int = 1
     device: int | None = None
+    reply_s: float | None = None
 
     @property
     def character_s(self) -> float:
@@ -96,23 +100,28 @@ def without_secrets(text: str) -> str:
 
 
 def _tcp(text: str, parts: SplitResult) -> TcpUrl:
-    options = _options(text, parts, ("device",))
-    return TcpUrl(_host(text, parts), _port(text, parts, 502), _device(text, options))
+    options = _options(text, parts, ("device", "reply"))
+    return TcpUrl(
+        _host(text, parts), _port(text, parts, 502), _device(text, options, range(256)), _reply(text, options)
+    )
 
 
 def _tls(text: str, parts: SplitResult) -> TlsUrl:
-    options = _options(text, parts, ("device", "ca", "cert", "key"))
+    options = _options(text, parts, ("device", "reply", "ca", "cert", "key"))
     if ("cert" in options) != ("key" in options):
         raise _refuse(text, "cert" if "cert" in options else "key", "cert and key together")
     files = {name: Path(options[name]) for name in ("ca", "cert", "key") if name in options}
     for file in files.values():
         if not file.is_file():
             raise _refuse(text, file.name, "an existing PEM file")
-    return TlsUrl(_host(text, parts), _port(text, parts, 802), _device(text, options), **files)
+    return TlsUrl(
+        _host(text, parts), _port(text, parts, 802), _device(text, options, range(256)), reply_s=_reply(text, options),
+        **files,
+    )  # fmt: skip
 
 
 def _rtu(text: str, parts: SplitResult) -> RtuUrl:
-    options = _options(text, parts, ("device", "baud", "parity", "stop"))
+    options = _options(text, parts, ("device", "reply", "baud", "parity", "stop"))
     device = _serial_device(parts)
     if not device:
         raise _refuse(
@@ -123,7 +132,7 @@ def _rtu(text: str, parts: SplitResult) -> RtuUrl:
         raise _refuse(text, f"parity={parity}", "E, O or N")
     baud = _whole(text, options, "baud", 19200, BAUD_RATES)
     stop = _whole(text, options, "stop", 2 if parity == "N" and "parity" in options else 1, (1, 2))
-    return RtuUrl(device, baud, parity, stop, _device(text, options))
+    return RtuUrl(device, baud, parity, stop, _device(text, options, range(1, 248)), _reply(text, options))
 
 
 def _serial_device(parts: SplitResult) -> str:
@@ -160,8 +169,19 @@ def _port(text: str, parts: SplitResult, default: int) -> int:
     return port
 
 
-def _device(text: str, options: dict[str, str]) -> int | None:
-    return _whole(text, options, "device", 0, range(1, 248)) if "device" in options else None
+def _device(text: str, options: dict[str, str], allowed: range) -> int | None:
+    """On TCP 0 and 255 stand for the device at the address itself; on a serial line 0 is everybody, who does not answer."""
+    return _whole(text, options, "device", 0, allowed) if "device" in options else None
+
+
+def _reply(text: str, options: dict[str, str]) -> float | None:
+    """Seconds, above 0 and at most 60."""
+    written = options.get("reply")
+    if written is None:
+        return None
+    if not REPLY_TIME.fullmatch(written) or not 0.0 < float(written) <= 60.0:
+        raise _refuse(text, f"reply={written}", "seconds above 0, at most 60, as reply=0.8")
+    return float(written)
 
 
 def _whole(text: str, options: dict[str, str], name: str, default: int, allowed: range | tuple[int, ...]) -> int:

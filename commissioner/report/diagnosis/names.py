@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE, TOGETHER, between
+from commissioner.diagnose.causes.cause import AsOne, Words
 from commissioner.report.diagnosis.numbers import PLAIN_NUMBERS, quantity, quantity_name, short, sure
-from commissioner.report.diagnosis.plain import LEGS, PLAIN, READ_LATE, RECORDED_SWING, Plain
 
 Cause = Mapping[str, Any]
-TOGETHER = frozenset({"dead_time", "device_drop"})
-"""Every inverter has both, and both do the same at one switching frequency and link voltage."""
-LATE = frozenset({"sampling_delay", "sensor_lag"})
-COMMON: Mapping[frozenset[str], Mapping[str, str]] = {
-    TOGETHER: {
-        "voltage_v": "lost per leg",
-        "half_current_a": "half of it reached at",
-        "unequal_v": "leg V against the mean of the three",
-        "unequal_w": "leg W against the mean of the three",
-    },
-    LATE: {"delay_us": "delay in all", "time_constant_us": "delay in all"},
-}
-"""What the members of a class share: the only sizes that are known while nobody knows which of them it is."""
 COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 
 
@@ -44,12 +31,22 @@ def members(cause: Cause) -> frozenset[str]:
     return frozenset((cause["name"], *cause["equivalent"]))
 
 
+def is_together(names: Iterable[str]) -> bool:
+    """Whether every inverter has both: such a class leaves nothing open that matters."""
+    return frozenset(names) in TOGETHER
+
+
+def _as_one(cause: Cause) -> AsOne | None:
+    """The words of two that data cannot tell apart."""
+    return between(*members(cause)).as_one if len(members(cause)) == 2 else None
+
+
 def class_name(cause: Cause) -> str:
     """`dead time + device drop, together`; `sampling delay or sensor lag`; a cause alone by its own name."""
-    if members(cause) == TOGETHER:
-        return "dead time + device drop, together"
-    if "of_the_recorded_swing" in cause.get("parameters", {}):
-        return "DC link's recorded swing"
+    one = _as_one(cause)
+    words = one.words if one else _own_words(cause)
+    if words.called:
+        return words.called
     return " or ".join(spoken(n) for n in (cause["name"], *cause["equivalent"]))
 
 
@@ -63,7 +60,7 @@ def sure_words(cause: Cause) -> str:
     """How likely the name is; of a class, that it is one of its members."""
     if not cause["equivalent"]:
         return sure(cause["confidence"])
-    if members(cause) == TOGETHER:
+    if is_together(members(cause)):
         return f"{sure(cause['confidence'])} that it is one of the two or both"
     count = len(members(cause))
     return f"{sure(cause['confidence'])} that it is one of the {COUNTS.get(count, count)}"
@@ -78,7 +75,8 @@ def _stated(cause: Cause) -> dict[str, str]:
     """Which sizes are stated, and what they are called; of a class only what its members share, with no member's own number."""
     if not cause["equivalent"]:
         return {key: quantity_name(key) for key in cause["parameters"]}
-    shared = COMMON.get(members(cause), {})
+    one = _as_one(cause)
+    shared = one.sizes if one else {}
     return {key: shared[key] for key in cause["parameters"] if key in shared}
 
 
@@ -111,7 +109,7 @@ def main_name(cause: Cause) -> str:
 def _main_key(cause: Cause) -> str:
     """Of the stated sizes the first; of several sensors or directions the largest. Empty where none is stated."""
     keys = list(_stated(cause))
-    if not keys or members(cause) == TOGETHER:
+    if not keys or is_together(members(cause)):
         return next(iter(keys), "")
     entries = cause["parameters"]
     alike = [
@@ -120,27 +118,21 @@ def _main_key(cause: Cause) -> str:
     return max(alike, key=lambda k: abs(entries[k]["value"]))
 
 
-def plain_of(cause: Cause) -> Plain:
+def _own_words(cause: Cause) -> Words:
+    known = CATALOGUE[cause["name"]]
+    return known.words_for({key: size["value"] for key, size in cause.get("parameters", {}).items()})
+
+
+def plain_of(cause: Cause) -> Words:
     """The words of the cause, or of its class."""
-    if members(cause) == TOGETHER:
-        return LEGS
-    own = PLAIN[cause["name"]]
-    if cause["name"] == "sampling_delay" and cause["parameters"].get("delay_us", {"value": 0.0})["value"] < 0.0:
-        own = READ_LATE
-    if "of_the_recorded_swing" in cause["parameters"]:
-        own = RECORDED_SWING
+    if one := _as_one(cause):
+        return one.words
+    own = _own_words(cause)
     if not cause["equivalent"]:
         return own
-    if members(cause) == LATE:
-        return Plain(
-            "The current comes {size} late (sampling delay or sensor lag)",
-            own.motor,
-            "",
-            PLAIN["sampling_delay"].measurement,
-        )
-    others = [PLAIN[n] for n in cause["equivalent"]]
+    others = [CATALOGUE[n].words for n in cause["equivalent"]]
     is_one_side = all(o.motor == own.motor for o in others)
-    return Plain(
+    return Words(
         f"Part of the error is {class_name(cause)}; this recording cannot say which",
         own.motor if is_one_side else "",
         is_normal=own.is_normal and all(o.is_normal for o in others),

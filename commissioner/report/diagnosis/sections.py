@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.diagnose.verdict.experiment import DECIDES
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.report.diagnosis.names import Cause, class_name, plain_of, size_words, spoken, sure_words
 from commissioner.report.diagnosis.numbers import PLUS_MINUS, chance, limit_words, number, part_word, percent
 from commissioner.report.diagnosis.words import (
@@ -150,7 +150,7 @@ def not_found(document: Document) -> Section:
     apart = {c["name"] for c in document["causes"]} | {n for c in document["causes"] for n in c["equivalent"]}
     apart |= {u["name"] for u in document.get("uncertain", ())}
     rows = [
-        (spoken(k), limit_words(document, k), coded(DECIDES.get(k, "")))
+        (spoken(k), limit_words(document, k), coded(CATALOGUE[k].decides if k in CATALOGUE else ""))
         for k in document["detection_limits"]
         if k not in apart
     ]
@@ -188,7 +188,7 @@ def parameters(document: Document) -> Section:
 
 
 def _flux_of(document: Document) -> str:
-    if "magnetizing_saturation" in {c["name"] for c in document["causes"]}:
+    if any(CATALOGUE[c["name"]].bends_l_m for c in document["causes"]):
         return " The magnetizing inductance here is the unsaturated value, above the one at rated flux."
     return (
         " The magnetizing inductance depends on the flux: here it holds for this test."

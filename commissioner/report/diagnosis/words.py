@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from commissioner.diagnose.causes import TOGETHER
 from commissioner.report.diagnosis.names import (
     COUNTS,
-    TOGETHER,
     Cause,
     class_name,
+    is_together,
     listed,
     main_name,
     main_size,
@@ -88,7 +89,7 @@ def _how_much(document: Document, causes: list[Cause]) -> str:
 def _how_normal(cause: Cause, document: Document) -> str:
     if not plain_of(cause).is_normal:
         return ""
-    if members(cause) & TOGETHER:
+    if members(cause) & frozenset().union(*TOGETHER):
         if (apart := _legs_apart(cause)) > EQUAL_LEGS:
             return f" Its legs should lose alike; one is {percent(apart)} off their mean: check its gate driver and the compensation."
         link = document.get("dc_link_v")
@@ -110,7 +111,7 @@ def tone(document: Document) -> Tone:
     """Green: nothing is open. A class whose members always come together leaves nothing open that matters."""
     if document["verdict"] in ("unexplained", "refused"):
         return "bad" if document["verdict"] == "refused" or is_finished(document) else "warn"
-    tied = [c for c in document["causes"] if c["equivalent"] and members(c) != TOGETHER]
+    tied = [c for c in document["causes"] if c["equivalent"] and not is_together(members(c))]
     return "warn" if tied or not is_finished(document) else "good"
 
 
@@ -195,8 +196,8 @@ def next_sentence(plan: Mapping[str, Any]) -> str:
     """What to record next and what for."""
     if plan["splits"] == ["unknown"]:
         return f"To find the cause that is in no list: {plan['do']}."
-    if frozenset(plan["splits"]) == TOGETHER:
-        return f"None is needed. Only to tell dead time from device drop: {plan['do']}."
+    if is_together(plan["splits"]):
+        return f"None is needed. Only to tell {said(' from '.join(sorted(plan['splits'])))}: {plan['do']}."
     return f"To tell {said(' from '.join(plan['splits']))}: {plan['do']}."
 
 

@@ -28,10 +28,12 @@ class GuardDocument(TypedDict):
 
 
 class WrittenRow(TypedDict):
-    """One parameter of the drive: before, as written, as read back; `field`: the contract's name."""
+    """One parameter of the drive, in its own unit and convention: before, as written, as read back. `field`: the contract's
+    name; `per_si`: the drive's value by the contract's; not there where both are one."""
 
     name: str
     field: str | None
+    per_si: NotRequired[float]
     register: int
     before: float
     after: float

@@ -1,4 +1,4 @@
-"""How a run stands: its outcome, and whether the drive holds what came of it. Light: a list of runs needs no more."""
+"""How a run stands: its outcome, whether the drive holds what came of it, what its axes showed. Light: lists and screens need no more."""
 
 from __future__ import annotations
 
@@ -13,3 +13,11 @@ def standing(result: Mapping[str, Any]) -> str:
     """The outcome; of a result that was accepted, whether it was written as well."""
     outcome = str(result["outcome"])
     return ACCEPTED if outcome == "commissioned" and not result.get("written") else outcome
+
+
+def finding_sentences(result: Mapping[str, Any]) -> list[str]:
+    """What the axes' comparison saw, each with its size."""
+    return [
+        f"{f['sentence']}, by {100 * abs(f['relative_size']):.2g} ± {100 * f['relative_std']:.2g} %"
+        for f in result.get("findings") or ()
+    ]

@@ -11,8 +11,11 @@ from commissioner.procedure.verdict import PARAMETERS
 from commissioner.report.run.contract import RunDocument, WrittenRow
 
 
-def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Mapping[str, str]) -> RunDocument:
-    """What `run --json` prints and `result.json` holds. `parameter_names`: the drive's name -> the contract's."""
+def summarise(
+    findings: Findings, ended: RunEnded, run: str, names: Mapping[str, str], factors: Mapping[str, float]
+) -> RunDocument:
+    """What `run --json` prints and `result.json` holds. `names`: the drive's name of a parameter -> the contract's;
+    `factors`: by what the drive multiplies the SI value, where that is not 1."""
     identification = findings.identification
     document: dict[str, Any] = {
         "run": run,
@@ -23,8 +26,8 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "duration_s": ended.energised_s,
         "drive": findings.identity,
         "checks": findings.checks,
-        "before": _before(findings, parameter_names),
-        "written": _written(findings, parameter_names),
+        "before": _before(findings, names, factors),
+        "written": _written(findings, names, factors),
         "objections": findings.verdict.objections if findings.verdict else (),
         "parameters": {},
         "remarks": (),
@@ -40,14 +43,6 @@ def summarise(findings: Findings, ended: RunEnded, run: str, parameter_names: Ma
         "limit_wb": findings.flux_limit_wb,
     }
     return cast("RunDocument", document)
-
-
-def finding_sentences(result: Mapping[str, Any]) -> list[str]:
-    """What the axes' comparison saw, each with its size."""
-    return [
-        f"{f['sentence']}, by {100 * abs(f['relative_size']):.2g} ± {100 * f['relative_std']:.2g} %"
-        for f in result.get("findings") or ()
-    ]
 
 
 def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
@@ -78,26 +73,26 @@ def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:
     return more | {"remarks": [*remarks, longer.sentence]} if longer else more
 
 
-def _before(findings: Findings, names: Mapping[str, str]) -> Mapping[str, float] | None:
+def _before(findings: Findings, names: Mapping[str, str], factors: Mapping[str, float]) -> Mapping[str, float] | None:
     """The drive's values in use before the run, by the contract's names."""
     if findings.snapshot is None:
         return None
-    by_field = {names[name]: value for name, value in findings.snapshot.in_use.items() if name in names}
+    held = findings.snapshot.in_use.items()
+    by_field = {names[name]: value / factors.get(name, 1.0) for name, value in held if name in names}
     resistance, inductance = by_field.get(PARAMETERS[1]), by_field.get(PARAMETERS[3])
     if resistance and inductance:
         by_field["rotor_time_constant_s"] = inductance / resistance
     return by_field
 
 
-def _written(findings: Findings, names: Mapping[str, str]) -> list[WrittenRow]:
-    return [
-        {
-            "name": row.name,
-            "field": names.get(row.name),
-            "register": row.register,
-            "before": row.before,
-            "after": row.after,
-            "read_back": row.read_back,
-        }
-        for row in findings.written
-    ]
+def _written(findings: Findings, names: Mapping[str, str], factors: Mapping[str, float]) -> list[WrittenRow]:
+    rows: list[WrittenRow] = []
+    for row in findings.written:
+        written: WrittenRow = {
+            "name": row.name, "field": names.get(row.name), "register": row.register, "before": row.before,
+            "after": row.after, "read_back": row.read_back,
+        }  # fmt: skip
+        if row.name in factors:
+            written["per_si"] = factors[row.name]
+        rows.append(written)
+    return rows

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,8 +59,11 @@ def run_folders(root: Path) -> list[Path]:
 
 def find_folder(root: Path, name: str) -> Path:
     """As `find_run`, its folder. UsageError: none or several."""
-    folders = run_folders(root)
-    matching = folders[:1] if name == "last" else [path for path in folders if path.name.startswith(name)]
+    names = sorted(os.listdir(root), reverse=True) if root.is_dir() else []  # noqa: PTH208  names, not 10 000 paths
+    if name == "last":
+        matching = list(itertools.islice(filter(_is_run, (root / one for one in names)), 1))
+    else:
+        matching = [root / one for one in names if one.startswith(name) and _is_run(root / one)]
     exact = [path for path in matching if path.name == name] or matching
     if len(exact) != 1:
         raise UsageError(

@@ -33,6 +33,7 @@ from commissioner.run.archive.origin import machine_part, this_process
 from commissioner.run.archive.seal import CLOSED, covers, seal
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import summary_of
+from commissioner.run.index.index import note
 
 __all__ = [
     "RunFolder", "archive_lost", "damaged", "read_blocks", "read_document", "read_journal", "read_saved",
@@ -130,14 +131,16 @@ class RunFolder:
             self._saved.add(target.name)
 
     def close(self) -> None:
-        """Never fails: what could not be written by now is lost, and was said when it was tried."""
-        if self._is_open:
-            with suppress(OSError, ValueError):
-                self.cover()
+        """Never fails: what could not be written by now is lost, and was said when it was tried. The archive's index is told."""
+        if not self._is_open:
+            return
+        with suppress(OSError, ValueError):
+            self.cover()
         self._is_open = False
         self._journal.close()
         with suppress(OSError):
             self._blocks.close()
+        note(self.path)
 
 
 def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path | None:

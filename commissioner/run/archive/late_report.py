@@ -14,6 +14,7 @@ from commissioner.report.run.summary import summarise
 from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.replay import learn_again
+from commissioner.run.archive.summary import read_file
 
 
 def mark_restored(run: RunSummary) -> None:
@@ -32,7 +33,7 @@ def make_report(run: RunSummary) -> None:
     path = Path(run.folder)
     job, findings = learn_again(path)
     ended = RunEnded(run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s)
-    result = plain(summarise(findings, ended, run.run, job.parameter_names))
+    result = plain(summarise(findings, ended, run.run, job.parameter_names, job.parameter_factors))
     journal = read_journal(path / "journal.jsonl")
     with closing(RunFolder(path)) as folder:
-        folder.save_text("report.html", run_page(result, journal, findings))
+        folder.save_text("report.html", run_page(result, journal, findings, read_file(path / "request.json")))

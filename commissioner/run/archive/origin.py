@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import getpass
+import datetime as dt
 import hashlib
 import os
 import platform
 import sys
-import uuid
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from commissioner.link.wire.secrets import shown_call
@@ -22,7 +20,8 @@ _MACHINE_IDS = ("/etc/machine-id", "/var/lib/dbus/machine-id")
 
 @dataclass(frozen=True)
 class Origin:
-    """`person` is who asked, `user` whose process it is; they differ where a service acts for somebody."""
+    """`person` is who asked, `user` whose process it is; they differ where a service acts for somebody. `local_time` is
+    that of the machine, with its offset to UTC."""
 
     version: str
     host: str
@@ -33,6 +32,7 @@ class Origin:
     command: str
     python: str
     system: str
+    local_time: str
 
 
 def this_process() -> Origin:
@@ -48,11 +48,14 @@ def this_process() -> Origin:
         command=shown_call([Path(sys.argv[0]).name, *sys.argv[1:]]),
         python=platform.python_version(),
         system=platform.platform(),
+        local_time=dt.datetime.now().astimezone().isoformat(" ", "seconds"),
     )
 
 
 def user_name() -> str:
     """The account of this process; a number where it has no name."""
+    import getpass
+
     try:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):
@@ -61,6 +64,8 @@ def user_name() -> str:
 
 @cache
 def program_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("commissioner")
     except PackageNotFoundError:
@@ -72,6 +77,8 @@ def machine_part() -> str:
     """Six hexadecimal digits that tell this machine from others, so that runs of two laptops never share an id."""
     marks = [platform.node(), *(_text(Path(path)) for path in _MACHINE_IDS)]
     if not any(marks[1:]):
+        import uuid
+
         marks.append(f"{uuid.getnode():012x}")
     return hashlib.sha256("\n".join(marks).encode()).hexdigest()[:6]
 

@@ -75,7 +75,7 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     replayed = list(_decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself))
     if is_by_itself and (folder / "result.json").is_file():
         ended = _ended(folder, next(line["record"] for line in journal if line["kind"] == "run_ended"))
-        formed = summarise(findings, ended, folder.name, job.parameter_names)
+        formed = summarise(findings, ended, folder.name, job.parameter_names, job.parameter_factors)
         archived += _result(read_saved(folder, "result.json"), formed)
         replayed += _result(formed, formed)
     difference = _first_difference(archived, replayed, may_go_on=not is_by_itself or salvage, may_end=salvage)
@@ -243,6 +243,7 @@ def _job(record: Mapping[str, Any]) -> Job:
         parameter_names=record["parameter_names"],
         write_back=record["write_back"],
         link_latency_s=record["link_latency_s"],
+        parameter_factors=record.get("parameter_factors", {}),
     )  # fmt: skip
 
 

@@ -13,13 +13,16 @@ from commissioner.run.archive.documents import read_document
 from commissioner.run.archive.journal import Record, read_journal
 
 NAME = "summary.json"
+NAMED = "motor_named"
+"""Kind of the record that says which motor a run was made on, where a person says so afterwards."""
 RESTORED, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before (restored)", "old or new", "cut off", "unreadable"
 
 
 @dataclass(frozen=True)
 class RunSummary:
     """`written` says which parameter set the drive holds after the run, as far as the run could know. `motor`: the plate;
-    `parameters`: value and standard error of each; both empty where the run did not get so far."""
+    `parameters`: value and standard error of each; both empty where the run did not get so far. `motor_tag`, `motor_serial`: which
+    motor it is, as a person said; `motor_name`: under which name the plate was given."""
 
     run: str
     folder: str
@@ -39,6 +42,14 @@ class RunSummary:
     profile: str = ""
     motor: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    motor_tag: str = ""
+    motor_serial: str = ""
+    motor_name: str = ""
+
+    @property
+    def motor_id(self) -> str:
+        """The motor's tag, or its serial number; empty where nobody said which motor it is."""
+        return self.motor_tag or self.motor_serial
 
     @property
     def standing(self) -> str:
@@ -71,6 +82,8 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
     identity: Record = next(iter(_of(records, "drive_identified")), {})
     result, request = read_file(folder / "result.json"), read_file(folder / "request.json")
     serial = identity.get("serial_number")
+    origin = _mapping(request.get("origin"))
+    named: Mapping[str, Any] = next(reversed(_of(records, NAMED)), origin)
     return RunSummary(
         run=folder.name,
         folder=str(folder),
@@ -90,6 +103,9 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
         profile=_text(request, "profile"),
         motor=_mapping(request.get("nameplate")),
         parameters=_mapping(result.get("parameters")),
+        motor_tag=_text(named, "motor_tag"),
+        motor_serial=_text(named, "motor_serial"),
+        motor_name=_text(origin, "motor"),
     )
 
 
@@ -118,9 +134,12 @@ def read_file(path: Path) -> dict[str, Any]:
 
 
 def _is_typed(summary: RunSummary) -> bool:
-    texts = ("outcome", "reason", "drive", "written", "started_utc", "ended_utc", "person", "host", "version", "url")
+    texts = (
+        "outcome", "reason", "drive", "written", "started_utc", "ended_utc", "person", "host", "version", "url", "profile", "motor_tag",
+        "motor_serial", "motor_name",
+    )  # fmt: skip
     return (
-        all(isinstance(getattr(summary, name), str) for name in (*texts, "profile"))
+        all(isinstance(getattr(summary, name), str) for name in texts)
         and isinstance(summary.energised_s, int | float)
         and isinstance(summary.motor, dict)
         and isinstance(summary.parameters, dict)
@@ -188,4 +207,4 @@ def _wear(report: Any) -> str:
 
 
 def _touches_parameters(intent: Any) -> bool:
-    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store")
+    return isinstance(intent, dict) and intent.get("action") in ("stage", "commit", "store", "tune")

@@ -136,6 +136,13 @@ def find_holder(token: int) -> tuple[Holder | None, bool]:
     return None, False
 
 
+def holder_of(url: DriveUrl, profile: DriveProfile) -> Holder | None:
+    """Who of this computer acts on the drive now; None where nobody does, or somebody only looks at it."""
+    record = _record(endpoint(url, profile.link.device_id))
+    held = _holder(record)
+    return held if held is not None and held.doing != LOOK and _is_held(record) else None
+
+
 def in_use(held: Holder | None, drive: str) -> DriveInUse:
     """The refusal, with who holds the drive."""
     who = "somebody who does not say who" if held is None else held.words

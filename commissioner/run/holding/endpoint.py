@@ -18,7 +18,7 @@ def endpoint(url: DriveUrl, device_id: int) -> str:
     """
     if isinstance(url, RtuUrl):
         return f"serial line {os.path.realpath(url.path)}"
-    return f"{canonical_host(url.host)} port {url.port} device {url.device or device_id}"
+    return f"{canonical_host(url.host)} port {url.port} device {device_id if url.device is None else url.device}"
 
 
 def canonical_host(host: str) -> str:

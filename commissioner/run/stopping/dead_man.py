@@ -17,6 +17,7 @@ from commissioner.run.stopping.operator_stop import OperatorStop
 
 BEAT_S, SILENCE_S = 0.5, 2.0
 """Between two beats; no beat for SILENCE_S ends the run."""
+TICK_S = 0.1
 SERVICE = "service"
 
 
@@ -65,9 +66,16 @@ class DeadMan:
             self._begun.set()
 
     def _count(self) -> None:
+        """Silence is what this process listened through: while it was itself held up, words may wait in the pipe."""
+        silent_s, heard, before = 0.0, self._heard, self._clock()
         while not self._stop.asked:
-            time.sleep(0.1)
-            if self._clock() - self._heard > SILENCE_S:
+            time.sleep(TICK_S)
+            now = self._clock()
+            if self._heard != heard:
+                heard, silent_s = self._heard, 0.0
+            silent_s += min(now - before, 2.0 * TICK_S)
+            before = now
+            if silent_s > SILENCE_S:
                 self._stop.ask(SERVICE, f"nothing heard from the service for {SILENCE_S:g} s")
 
 

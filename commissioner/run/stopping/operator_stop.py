@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -22,8 +25,12 @@ class StopAsked:
         return f"{self.reason} ({self.person})" if self.person else self.reason
 
 
+class Abandoned(Exception):
+    """Computing was given up because the operator wants the run to end."""
+
+
 class OperatorStop:
-    """A wish that the runner grants between two commands; never in the middle of one.
+    """A wish that the runner grants between two commands; never in the middle of one. Computing is given up at once.
 
     So a second Ctrl-C cannot interrupt the de-energising that the first one asked for. May be entered again inside
     itself. `ask` may be called from any thread; the first wish counts.
@@ -31,6 +38,7 @@ class OperatorStop:
 
     def __init__(self) -> None:
         self.wish: StopAsked | None = None
+        self._computes_in: int | None = None
         self._before: list[list[tuple[int, Any]]] = []
 
     @property
@@ -42,6 +50,21 @@ class OperatorStop:
         """The run is to end. Later wishes change nothing."""
         if self.wish is None:
             self.wish = StopAsked(person, reason)
+            if self._computes_in is not None and self._computes_in != threading.get_ident():
+                _thread.interrupt_main(signal.SIGINT)  # runs our handler there, between two of its instructions
+
+    @contextmanager
+    def computing(self) -> Iterator[None]:
+        """What happens inside touches neither drive nor file: a wish raises Abandoned in its midst.
+
+        Only where the signals are ours; a kernel that is compiled is finished first.
+        """
+        is_ours = bool(self._before and self._before[-1]) and threading.current_thread() is threading.main_thread()
+        self._computes_in = threading.get_ident() if is_ours else None
+        try:
+            yield
+        finally:
+            self._computes_in = None
 
     def __enter__(self) -> OperatorStop:
         numbers = STOPS if threading.current_thread() is threading.main_thread() else ()
@@ -54,3 +77,6 @@ class OperatorStop:
 
     def _signalled(self, number: int, _frame: FrameType | None) -> None:
         self.ask("", "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
+        if self._computes_in is not None:
+            self._computes_in = None
+            raise Abandoned

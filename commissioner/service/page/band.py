@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from dataclasses import dataclass
 
+from commissioner.records import drive_words
 from commissioner.service.access.visitors import Visitor
 from commissioner.service.library import Drive
 from commissioner.service.page.texts import NBSP, Texts
@@ -268,26 +269,19 @@ def _ended(run: LiveRun, word: str, t: Texts) -> tuple[str, str, str]:
 def _drive_facts(live: LiveRun | None, drive: Drive | None, seen: Seen, t: Texts) -> tuple[str, str]:
     if live is not None:
         found = live.feed.state.drive
-        name = f"{found['drive_type']} #{found['serial_number']}" if found else (drive.name if drive else live.id)
-        age_s = _age(live.feed.state.utc)
-        return name, t.say("data %(age)s old", age=t.number(age_s, 1, "s"))
+        name = drive_words(found["drive_type"], found["serial_number"]) if found else (drive.name if drive else live.id)
+        return name, t.say("data %(age)s old", age=t.number(live.feed.age_s, 1, "s"))
     if drive is None:
         return t.gettext("none"), ""
     if not drive.url:
         return drive.name, t.gettext("not started")
-    name = f"{seen.identity.drive_type} #{seen.identity.serial_number}" if seen.identity else drive.name
+    name = seen.identity.words if seen.identity else drive.name
     if seen.at_s < 0:
         return name, t.gettext("no answer yet")
     if seen.error:
         return name, t.say("no answer for %(age)s", age=t.number(seen.age_s, 1, "s"))
     latency = t.number(1e3 * seen.latency_s, 1, "ms")
     return name, t.say("data %(age)s old, link %(latency)s", age=t.number(seen.age_s, 1, "s"), latency=latency)
-
-
-def _age(utc: str) -> float:
-    if not utc:
-        return 0.0
-    return max(0.0, (dt.datetime.now(dt.UTC) - dt.datetime.fromisoformat(utc)).total_seconds())
 
 
 def _control(parts: Parts, who: Visitor, drive: Drive | None, live: LiveRun | None, t: Texts) -> tuple[str, str]:

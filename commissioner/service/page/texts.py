@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,19 +14,41 @@ from babel.messages.pofile import read_po
 from babel.numbers import format_decimal
 from starlette.requests import HTTPConnection
 
+from commissioner.service.problems import Refusal
+
 LANGUAGES = ("en", "de")
 NBSP = "\u00a0"
 
 
+CORE = "core"
+"""Context of the catalogue's sentences that come from the core; their %(names)s stand for what the core filled in."""
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """`messages`: message -> translation; `sentences`: the core's ones with gaps, as patterns."""
+
+    messages: Mapping[str, str]
+    sentences: tuple[tuple[re.Pattern[str], str], ...]
+
+
 @cache
-def catalogue(language: str) -> Mapping[str, str]:
-    """Message -> translation; empty for English, whose sentences are the messages."""
+def catalogue(language: str) -> Catalogue:
+    """Empty for English, whose sentences are the messages."""
     path = Path(__file__).parent / "catalogues" / f"{language}.po"
     if not path.is_file():
-        return {}
+        return Catalogue({}, ())
     with path.open("rb") as file:
-        found = read_po(file, locale=language)
-    return {str(message.id): str(message.string) for message in found if message.id and message.string}
+        found = [m for m in read_po(file, locale=language) if m.id and m.string]
+    messages = {str(m.id): str(m.string) for m in found}
+    gaps = [m for m in found if m.context == CORE and "%(" in str(m.id)]
+    gaps.sort(key=lambda m: -len(re.sub(r"%\(\w+\)s", "", str(m.id))))  # the most particular first
+    return Catalogue(messages, tuple((_pattern(str(m.id)), str(m.string)) for m in gaps))
+
+
+def _pattern(message: str) -> re.Pattern[str]:
+    parts = re.split(r"%\((\w+)\)s", message.replace("%%", "%"))
+    return re.compile("".join(f"(?P<{p}>.+?)" if k % 2 else re.escape(p) for k, p in enumerate(parts)), re.DOTALL)
 
 
 class Texts:
@@ -35,7 +59,7 @@ class Texts:
         self._catalogue = catalogue(self.language)
 
     def gettext(self, message: str) -> str:
-        return self._catalogue.get(message, message)
+        return self._catalogue.messages.get(message, message)
 
     def ngettext(self, one: str, many: str, number: int) -> str:
         return self.gettext(one if number == 1 else many)
@@ -43,6 +67,26 @@ class Texts:
     def say(self, message: str, **facts: object) -> str:
         """The message with its %(name)s filled in."""
         return self.gettext(message) % facts
+
+    def tell(self, text: object) -> str:
+        """A word or sentence of the core, its values among it: never a format, never markup."""
+        said = str(text)
+        if (whole := self._catalogue.messages.get(said)) is not None:
+            return whole
+        for pattern, translation in self._catalogue.sentences:
+            if (found := pattern.fullmatch(said)) is not None:
+                return translation % {name: self._value(value) for name, value in found.groupdict().items()}
+        return said
+
+    def knows(self, text: object) -> bool:
+        """Whether `tell` has it in this language."""
+        return self.language == "en" or self.tell(text) != str(text)
+
+    def _value(self, text: str) -> str:
+        """What stood in a sentence's gap: a number with this language's mark, a word that is known, or as it was."""
+        if re.fullmatch(r"[+-]?\d+\.\d+(?:e[+-]?\d+)?", text):
+            return text.replace(".", ",") if self.language == "de" else text
+        return self._catalogue.messages.get(text, text)
 
     def number(self, value: float | None, digits: int, unit: str = "") -> str:
         """`3,716 Ω`: fixed digits, decimal mark of the language, true minus, no-break space before the unit."""
@@ -73,7 +117,7 @@ class Texts:
                 head, *rest = text.split(NBSP)
                 text = NBSP.join([head.rstrip("0").rstrip(mark), *rest])
             return text
-        return self.gettext("no value") if value is None else self.gettext(str(value))
+        return self.gettext("no value") if value is None else self.tell(value)
 
 
 def texts_of(connection: HTTPConnection) -> Texts:
@@ -83,3 +127,15 @@ def texts_of(connection: HTTPConnection) -> Texts:
         return Texts(chosen)
     wanted = connection.headers.get("accept-language", "en").split(",")
     return Texts(next((w[:2].lower() for w in wanted if w[:2].lower() in LANGUAGES), "en"))
+
+
+def sentence(text: str) -> str:
+    """With its first letter as a sentence has it."""
+    return text[:1].upper() + text[1:]
+
+
+def told(refusal: Refusal, texts: Texts) -> Refusal:
+    """The same refusal in the language of a page's script."""
+    facts = refusal.problem.model_dump(exclude={"status", "title"})
+    facts |= {key: texts.tell(facts[key]) for key in ("detail", "step", "remedy") if facts[key]}
+    return Refusal(refusal.problem.status, texts.tell(refusal.problem.title), headers=refusal.headers, **facts)

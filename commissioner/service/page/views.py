@@ -11,7 +11,8 @@ from commissioner.errors import CommissionerError
 from commissioner.service.access.visitors import visitor_of
 from commissioner.service.page import shelves, work
 from commissioner.service.page.frame import ToLogin, local, refused
-from commissioner.service.problems import Refusal, refusal_of, respond
+from commissioner.service.page.texts import texts_of, told
+from commissioner.service.problems import Refusal, disk_refuses, refusal_of, respond
 
 router = APIRouter()
 router.include_router(shelves.router)
@@ -33,12 +34,18 @@ def install(app: FastAPI) -> None:
     async def fail(request: Request, error: CommissionerError) -> Response:
         return answer(request, refusal_of(error))
 
+    @app.exception_handler(OSError)
+    async def lost(request: Request, failure: OSError) -> Response:
+        return answer(request, disk_refuses(failure))
+
 
 def answer(request: Request, refusal: Refusal) -> Response:
     """The refusal in the form that was asked for."""
     wants_page = not request.url.path.startswith("/api/") and "text/html" in request.headers.get("accept", "")
-    if not wants_page:
+    if request.url.path.startswith("/api/"):
         return respond(refusal)
+    if not wants_page:
+        return respond(told(refusal, texts_of(request)))
     if refusal.problem.status == 401 or visitor_of(request).role is None:
         return RedirectResponse("/login", 303)
     return refused(

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from commissioner.service.page.texts import NBSP, Texts
+from markupsafe import Markup
+
+from commissioner.service.page.texts import NBSP, Texts, sentence
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -18,7 +20,7 @@ SCRIPT_TEXTS = (
     "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
     "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
-    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing", "efficiency %s; motors of this size have %s",
+    "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
     "Reading the drive …", "The file is being sent …", "no value",
 )  # fmt: skip
 """What scripts say; the page hands it to them in its own language."""
@@ -52,17 +54,13 @@ UNITS: Mapping[str, tuple[str, int]] = {
     "rated frequency in the drive": ("Hz", 0), "rated current in the drive": ("A", 1), "rated speed in the drive": ("1/min", 0),
     "power factor in the drive": ("", 2), "pole pairs in the drive": ("", 0), "shaft at rest over the dwell time": ("rad/s", 1),
 }  # fmt: skip
-CAUSES = {
-    "dead_time": ("Dead time of the inverter legs", "Normal for an inverter. The identification takes it off; nothing to do."),
-    "device_drop": ("Voltage drop of the devices", "Normal for an inverter. The identification takes it off; nothing to do."),
-    "sensor_offset": ("Offset of the current sensors", "Zero them at the drive if it offers that."),
-    "magnetizing_saturation": ("Saturation of the main flux path", "Normal. Give the drive its saturation curve if it takes one."),
-    "sensor_gain_mismatch": ("Current sensors of unequal gain", "Values change with the axis. Beyond 1 %: have the sensors compared."),
-    "sensor_lag": ("Lag of the current sensors", "Normal where it is a part of a sample period."),
-    "sampling_delay": ("Delay of sampling", "Normal where it is a part of a sample period."),
-    "leakage_saturation": ("Saturation of the leakage path", "Normal in small motors with closed slots."),
-    "iron_loss": ("Iron loss", "Normal."), "rotor_skin_effect": ("Deep bars of the rotor", "Normal in larger motors."),
-}  # fmt: skip
+
+
+def _named(text: str) -> str:
+    """A sentence with the parameters' names in place of their keys."""
+    for quantity in QUANTITIES:
+        text = text.replace(quantity.key, quantity.name)
+    return text
 
 
 class Words:
@@ -77,8 +75,7 @@ class Words:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
         plain = re.sub(r", deg[A-Z]$", "", name)
         plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        said = self._t.gettext(plain)
-        return said[:1].upper() + said[1:]
+        return sentence(self._t.tell(plain))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -100,20 +97,23 @@ class Words:
             text = f"{text} {unit}"
         return self._localised(text)
 
-    def sentence(self, text: str) -> str:
-        """A sentence of the core, with its first letter as a sentence has it."""
-        said = self._t.gettext(text)
-        return said[:1].upper() + said[1:]
-
-    def is_checked(self, check: Mapping[str, Any]) -> bool:
-        """A check without a value was not made: it locks like one that failed."""
-        return check["value"] is not None
+    def sentence(self, text: object) -> str:
+        """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
+        plain = _named(str(text))
+        said = sentence(self._t.tell(plain))
+        return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:
-        return self._t.gettext(CAUSES[name][0]) if name in CAUSES else name.replace("_", " ").capitalize()
+        from commissioner.diagnose.causes import CATALOGUE
+
+        called = CATALOGUE[name].in_service[0] if name in CATALOGUE else ""
+        return self._t.gettext(called) if called else name.replace("_", " ").capitalize()
 
     def cause_advice(self, name: str) -> str:
-        return self._t.gettext(CAUSES[name][1]) if name in CAUSES else ""
+        from commissioner.diagnose.causes import CATALOGUE
+
+        advice = CATALOGUE[name].in_service[1] if name in CATALOGUE else ""
+        return self._t.gettext(advice) if advice else ""
 
     def size(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         """Sizes of a cause, each with its 95 % interval and unit."""
@@ -133,7 +133,7 @@ class Words:
 
     def _localised(self, text: str) -> str:
         """`at most 120 degC` with marks, units and no-break spaces of the language."""
-        if (said := self._t.gettext(text)) != text:
+        if (said := self._t.tell(text)) != text:
             return said
         text = re.sub(r"(\d)\s*%", rf"\1{NBSP}%", text.replace("degC", "°C"))
         text = re.sub(r"(\d) (?=[A-Za-z°])", rf"\1{NBSP}", text)

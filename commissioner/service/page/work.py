@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from fastapi import APIRouter, Request
-from fastapi.responses import Response
+from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
 
 from commissioner.service.access.accounts import Role
@@ -21,10 +21,10 @@ from commissioner.service.library import (
     Motor,
     judge_plate,
     plate_document,
-    usual_efficiency,
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
+from commissioner.service.page.texts import Texts, sentence, texts_of
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
@@ -35,6 +35,7 @@ from commissioner.service.runs.control import Party
 from commissioner.service.runs.live import live_document
 from commissioner.service.simulator import SCENARIOS
 from commissioner.settings import MotorFile
+from commissioner.validation import first_problem
 
 router = APIRouter()
 START = View("work/start.html", "What do you want to measure?", 1)
@@ -98,15 +99,14 @@ def _drive_table(parts: Parts, name: str, fields: dict[str, str]) -> DriveTable:
             id=identifier, name=name, url=fields.get("url", "").strip(), profile=fields.get("profile", "")
         )
     except ValidationError as error:
-        first = error.errors()[0]
-        key = str(first["loc"][0])
+        problem = first_problem(error, DriveTable)
         raise Refusal(
             422,
-            f"{key} cannot be used",
+            f"{problem.key} cannot be used",
             step="add a drive",
-            value=str(first["input"])[:100],
-            limit=str(first["msg"]),
-            remedy=f"correct {key}",
+            value=str(problem.value)[:100],
+            limit=problem.expected,
+            remedy=f"correct {problem.key}",
         ) from error
 
 
@@ -131,8 +131,6 @@ def _motor_page(
     name: str,
     status: int = 200,
 ) -> Response:
-    parts = parts_of(request)
-    usual = usual_efficiency(chosen.plate) if chosen else None
     return render(
         request,
         MOTOR,
@@ -142,10 +140,49 @@ def _motor_page(
         chosen=chosen,
         values=values,
         judged=judged,
-        motors=parts.library.motors(),
+        said=say_plate(judged, texts_of(request)),
+        motors=parts_of(request).library.motors(),
         name=name,
-        usual=usual,
     )
+
+
+def say_plate(judged: dict[str, Any], t: Texts) -> dict[str, Any]:
+    """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
+    fields = {
+        key: "" if field["ok"] else f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}"
+        for key, field in judged["fields"].items()
+    }
+    if judged["efficiency"] is None:
+        return {"ok": False, "fields": fields, "verdict": "", "reason": "", "is_odd": False}
+    eta, is_odd = t.number(100 * judged["efficiency"], 1, "%"), bool(judged["questions"])
+    if is_odd:
+        question = t.tell(judged["questions"][0])
+        reason = t.say("It implies an efficiency of %(eta)s: %(question)s", eta=eta, question=question)
+    else:
+        low, high = judged["usual_efficiency"]
+        reason = " ".join(
+            (
+                t.say("The plate means an efficiency of %(eta)s.", eta=eta),
+                t.say(
+                    "Motors of this size have %(low)s … %(high)s.",
+                    low=t.number(100 * low, 0),
+                    high=t.number(100 * high, 0, "%"),
+                ),
+            )
+        )
+    verdict = t.gettext("Is this plate read right?" if is_odd else "Plausible.")
+    return {"ok": judged["ok"], "fields": fields, "verdict": verdict, "reason": reason, "is_odd": is_odd}
+
+
+@router.post("/plate")
+async def judge(request: Request) -> Response:
+    """The form's plate as it is being typed, judged in the page's language: what `POST /api/nameplates/validate` finds."""
+    _who, fields = await enter_form(request)
+    return JSONResponse(say_plate(judge_plate(_si(_plate_values(fields))), texts_of(request)))
+
+
+def _plate_values(fields: dict[str, str]) -> dict[str, str]:
+    return {key: fields.get(key, "").strip() for key in (*PLATE_FIELDS, "rated_power_kw")}
 
 
 @router.post("/drives/{drive}/motor")
@@ -154,7 +191,7 @@ async def take_motor(request: Request, drive: str) -> Response:
     who, fields = await enter_form(request)
     parts = parts_of(request)
     known = parts.library.drive(drive)
-    values = {key: fields.get(key, "").strip() for key in (*PLATE_FIELDS, "rated_power_kw")}
+    values = _plate_values(fields)
     judged = judge_plate(_si(values))
     name = fields.get("name", "").strip()[:80]
     if not judged["ok"]:
@@ -250,21 +287,24 @@ def _energise_page(request: Request, drive: Drive, motor: Motor, message: str = 
 
 
 @router.post("/drives/{drive}/energise")
-async def energise_by_word(request: Request, drive: str) -> Response:
-    """For whoever cannot hold a button: the motor's name typed, three points confirmed."""
+async def do_energise(request: Request, drive: str) -> Response:
+    """The button was held; or, for whoever cannot hold one, the motor's name was typed. Three points confirmed."""
     who, fields = await enter_form(request)
-    parts = parts_of(request)
+    parts, wants_json = parts_of(request), "application/json" in request.headers.get("accept", "")
     known, motor = parts.library.drive(drive), parts.library.motor(fields.get("motor", ""))
     confirmed = all(fields.get(f"confirm{k}") == "yes" for k in (1, 2, 3))
-    if not confirmed or fields.get("word", "").strip() != motor.id:
+    meant = fields.get("held") == "yes" or fields.get("word", "").strip() == motor.id
+    if not (confirmed and meant):
         message = "Nothing was energised: confirm the three points and type the motor’s name."
         return _energise_page(request, known, motor, message, 422)
     wish = RunWish(drive=known.id, motor=motor.id, write_back=fields.get("write_back") == "yes", confirm=True)
     try:
         run = await start_run(parts, wish, who)
     except Refusal as refusal:
+        if wants_json:
+            raise
         return refused(request, refusal, Place(drive=known.id), f"/drives/{known.id}/checks?motor={motor.id}")
-    return go(f"/runs/{run.id}")
+    return JSONResponse({"url": f"/runs/{run.id}"}, 201) if wants_json else go(f"/runs/{run.id}")
 
 
 @router.get("/runs/{run}")
@@ -273,7 +313,7 @@ async def run(request: Request, run: str) -> Response:
     enter(request)
     parts = parts_of(request)
     live = parts.desk.runs.get(run)
-    if live is not None and not live.is_over and not live.feed.state.is_over:
+    if live is not None and not live.has_result:
         state = live.feed.state
         document = live_document(state, live.feed.current_now_a)
         return render(request, LIVE, Place(run=run, drive=live.drive), state=state, live=document, run=live)

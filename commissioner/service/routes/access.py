@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
@@ -16,12 +16,17 @@ from commissioner.service.problems import Refusal
 
 router = APIRouter()
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+Administrator = Annotated[Visitor, Depends(require(Role.ADMINISTRATOR))]
 
 
 class Credentials(BaseModel):
     model_config = ConfigDict(extra="forbid")
     name: Annotated[str, Field(max_length=200)]
     password: Annotated[str, Field(max_length=1000)]
+
+
+class NewAccount(Credentials):
+    role: Literal["viewer", "operator", "administrator"]
 
 
 @router.post("/api/login")
@@ -91,6 +96,34 @@ async def log_out(parts: Parts, who: Visitor) -> None:
         parts.sessions.end(who.session.id)
         if who.session.is_logged_in:
             await asyncio.to_thread(parts.audit.write, who.person, who.address, "logged out")
+
+
+@router.get("/api/accounts")
+async def accounts(request: Request, _who: Administrator) -> dict[str, Any]:
+    """Names and roles."""
+    known = await asyncio.to_thread(parts_of(request).accounts.all)
+    return {"accounts": [{"name": account.name, "role": account.role.name.lower()} for account in known]}
+
+
+@router.post("/api/accounts", status_code=201)
+async def add_account(request: Request, wish: NewAccount, who: Administrator) -> dict[str, Any]:
+    """Who may log in. The first one is added at the computer: `commissioner accounts add`."""
+    parts = parts_of(request)
+    await asyncio.to_thread(parts.accounts.add, wish.name, Role[wish.role.upper()], wish.password)
+    await asyncio.to_thread(
+        parts.audit.write, who.person, who.address, "added an account", name=wish.name, role=wish.role
+    )
+    return {"name": wish.name, "role": wish.role}
+
+
+@router.delete("/api/accounts/{name}")
+async def remove_account(request: Request, name: str, who: Administrator) -> dict[str, Any]:
+    """No longer an account; its sessions end."""
+    parts = parts_of(request)
+    await asyncio.to_thread(parts.accounts.remove, name)
+    parts.sessions.end_all_of(name)
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, "removed an account", name=name)
+    return {"removed": name}
 
 
 @router.get("/api/audit")

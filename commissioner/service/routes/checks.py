@@ -56,11 +56,13 @@ async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> dict[str, Any
             limit="no run on this drive",
             remedy="wait for its end, or stop it",
         )
+    axes = ",".join(f"{axis:g}" for axis in parts.settings.file.service.axes_deg)
+    more = ["--axes", axes] if axes else []
     watch, log = parts.desk.watch(drive), parts.desk.log("check", drive.id)
     await asyncio.to_thread(watch.pause)
     try:
         code, document = await ask(
-            ["check", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, "--json"], log
+            ["check", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, *more, "--json"], log
         )
     finally:
         watch.resume()

@@ -17,7 +17,7 @@ from starlette.requests import HTTPConnection
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require, visitor_of
 from commissioner.service.page.band import Place, band_of
-from commissioner.service.page.texts import texts_of
+from commissioner.service.page.texts import texts_of, told
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Party
@@ -208,7 +208,8 @@ class _Socket:
             try:
                 await self._change_control(str(said["control"]))
             except Refusal as refusal:
-                await self._send({"refused": refusal.problem.model_dump(mode="json")})
+                answer = told(refusal, texts_of(self._socket))
+                await self._send({"refused": answer.problem.model_dump(mode="json")})
 
     async def _change_control(self, do: str) -> None:
         live = self._parts.desk.runs.get(self._run)

@@ -89,7 +89,7 @@ async def one(request: Request, run: str, _who: Viewer) -> dict[str, Any]:
     """The result document; of a run that goes on, its state under `live`."""
     parts = parts_of(request)
     live = parts.desk.runs.get(run)
-    if live is not None and not live.is_over and not live.feed.state.is_over:
+    if live is not None and not live.has_result:
         return {"run": run, "outcome": None, "live": live_document(live.feed.state, live.feed.current_now_a)}
     return parts.archive.result(run)
 

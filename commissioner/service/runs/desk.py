@@ -49,6 +49,11 @@ class LiveRun:
     follower: asyncio.Task[None] | None = None
 
     @property
+    def has_result(self) -> bool:
+        """The run is over for whoever looks: its result is saved, or nobody will save one any more."""
+        return self.is_over or (self.feed.state.is_over and (self.feed.folder / "result.json").is_file())
+
+    @property
     def is_cut_off(self) -> bool:
         """Its process is gone, and it has no end."""
         return self.is_over and self.feed.state.end is None
@@ -56,7 +61,7 @@ class LiveRun:
 
 @dataclass(frozen=True)
 class Stopped:
-    """What became of a STOP. `after_s`: from the asking to the journalled word of the drive; 0 where it was off before."""
+    """What became of a STOP. `after_s`: from the asking until the service had read the journalled word of the drive; 0 where it was off before."""
 
     run: str
     asked_utc: str
@@ -139,7 +144,8 @@ class Desk:
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
     def _arguments(self, drive: Drive, motor: Motor, axes_deg: Sequence[float], write_back: bool) -> list[str]:
-        axes = ["--axes", ",".join(f"{axis:g}" for axis in axes_deg)] if axes_deg else []
+        chosen = axes_deg or self.settings.file.service.axes_deg
+        axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
         more += [] if self.settings.file.service.diagnosis else ["--no-diagnosis"]
         return [
@@ -183,8 +189,7 @@ class Desk:
     def _has_gone(self, run: LiveRun, waiting: asyncio.Task[int] | None) -> bool:
         if waiting is not None:
             return waiting.done()
-        quiet_s = time.monotonic() - run.feed.heard_s
-        return quiet_s > (1.0 if run.feed.state.is_over else STALE_S)
+        return run.feed.age_s > (1.0 if run.feed.state.is_over else STALE_S)
 
     def _watch_over(self, run: LiveRun) -> None:
         state = run.feed.state
@@ -216,6 +221,8 @@ class Desk:
     async def stop(self, run: LiveRun, person: str, reason: str) -> Stopped:
         """Ask for zero volts and wait for the drive's word. Never refused; twice is harmless."""
         asked_s, asked = time.monotonic(), dt.datetime.now(dt.UTC)
+        run.feed.poll()
+        was_off = _is_off(run)
         if not run.is_over:
             run.stop_asked_by = run.stop_asked_by or person or SERVICE
             if run.child is not None:
@@ -227,9 +234,9 @@ class Desk:
             run.feed.poll()
             await asyncio.sleep(0.005)
         is_off = _is_off(run)
+        after_s = 0.0 if was_off else time.monotonic() - asked_s
         confirmed = state.output_utc if is_off else ""
-        after_s = (dt.datetime.fromisoformat(confirmed) - asked).total_seconds() if confirmed else 0.0
-        return Stopped(run.id, asked.isoformat(), is_off, confirmed, round(max(0.0, after_s), 4), state.output_word)
+        return Stopped(run.id, asked.isoformat(), is_off, confirmed, round(after_s, 4), state.output_word)
 
     async def stop_all(self, person: str, reason: str, drive: str | None = None) -> list[Stopped]:
         """Every run of this service, or of one drive; those that are only starting never begin."""
@@ -293,7 +300,7 @@ def _young(runs: Path) -> list[Path]:
     now, found = time.time(), []
     for folder in sorted(runs.iterdir(), reverse=True)[:20]:
         with contextlib.suppress(OSError):
-            if now - (folder / "journal.jsonl").stat().st_mtime < FRESH_S:
+            if abs(now - (folder / "journal.jsonl").stat().st_mtime) < FRESH_S:  # a clock may have been set back
                 found.append(folder)
     return found
 

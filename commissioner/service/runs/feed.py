@@ -60,6 +60,11 @@ class Feed:
         self.heard_s = time.monotonic()
 
     @property
+    def age_s(self) -> float:
+        """Since the run was last heard of, by this computer's monotonic clock."""
+        return time.monotonic() - self.heard_s
+
+    @property
     def watchers(self) -> int:
         return len(self._watchers)
 

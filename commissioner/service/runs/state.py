@@ -186,6 +186,13 @@ def _diagnosing(state: RunState, record: dict[str, Any]) -> None:
     state.phase, state.diagnosis_s = "diagnosing", float(record.get("seconds") or 0.0)
 
 
+def _identified(state: RunState, record: dict[str, Any]) -> None:
+    state.drive = record
+    rated_a = record.get("rated_drive_current_a")
+    if rated_a and state.current_limit_a is not None:
+        state.current_limit_a = min(state.current_limit_a, 2**0.5 * rated_a)
+
+
 def _put(name: str, key: str | None = None) -> Any:
     def fold(state: RunState, record: dict[str, Any]) -> None:
         setattr(state, name, record if key is None else record.get(key, []))
@@ -208,7 +215,7 @@ def _stopped(state: RunState, record: dict[str, Any]) -> None:
 _FOLDS = {
     "warming_up": _warming, "job": _job, "state_entered": _entered, "about_to": _intent, "disarmed": _disarmed,
     "excitation_chosen": _chosen, "bias_chosen": _bias, "estimate_updated": _estimate, "axis_finished": _axis_done,
-    "run_ended": _ended, "diagnosing": _diagnosing, "diagnosed": _diagnosed, "drive_identified": _put("drive"),
+    "run_ended": _ended, "diagnosing": _diagnosing, "diagnosed": _diagnosed, "drive_identified": _identified,
     "checks_judged": _put("checks", "results"), "guard_acted": _put("guard"), "verdict_reached": _put("verdict"),
     "error": _put("error"), "link": _put("link"), "parameters_written": _put("written", "written"),
     "snapshot_restored": _restored, "stop_asked": _stopped,

@@ -104,14 +104,23 @@ class DriveWatch:
         from commissioner.link.files.drive_file import load_profile
         from commissioner.link.wire.modbus import open_port
         from commissioner.link.wire.url import parse_url
+        from commissioner.run.holding.drive_lock import holder_of, in_use
 
-        profile = load_profile(self._profile)
-        port = open_port(parse_url(self._url), profile, reply_timeout_s=REPLY_TIMEOUT_S)
+        profile, url = load_profile(self._profile), parse_url(self._url)
+
+        def leave_to_others() -> None:
+            """A run, a write-back or a restore of another process of this computer has the drive for itself."""
+            if (holder := holder_of(url, profile)) is not None:
+                raise in_use(holder, self._url)
+
+        leave_to_others()
+        port = open_port(url, profile, reply_timeout_s=REPLY_TIMEOUT_S)
         try:
             inverter = Inverter(port, profile)
             identity = inverter.identify()
             has_status = "status_word" in profile.items
             while self._may_look:
+                leave_to_others()
                 began = time.monotonic()
                 status = inverter.read_status() if has_status else None
                 now = time.monotonic()

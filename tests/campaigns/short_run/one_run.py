@@ -25,7 +25,7 @@ from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings, Job
 from commissioner.run.archive.catalogue import RunSummary, summarise
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.job import bounds, drive_limits, parameter_names, watch_limits
+from commissioner.run.job import bounds, drive_limits, names_of, watch_limits
 from commissioner.run.runner import Runner
 from sim.scenario import Scenario, build, read_document
 from sim.wire.line import Handler
@@ -209,7 +209,7 @@ def _watch_requests(running: Running, wire: str) -> truth.Requests:
 
 def make_job(*, write_back: bool, tests: int) -> Job:
     profile = load_profile("simulated")
-    return Job(PLAN, plate(), drive_limits(profile), parameter_names(profile), write_back, LINK_LATENCY_S)
+    return Job(PLAN, plate(), drive_limits(profile), names_of(profile)[0], write_back, LINK_LATENCY_S)
 
 
 def _run(sequence: Sequence, url: str, root: Path) -> tuple[RunEnded | None, RunSummary, int]:

@@ -267,3 +267,22 @@ def test_a_line_that_vanishes_is_a_typed_error():
         port.read(10, 4)
     port.close()
     assert not os.path.exists(path)  # noqa: PTH110
+
+
+@pytest.mark.parametrize(
+    ("answer", "value", "remedy"),
+    [
+        (lambda frame: [], "nothing in", f"{BAUD} Bd, parity N"),
+        (lambda frame: [bytes(byte ^ 0x80 for byte in frame)], "bytes that are no Modbus answer", "parity"),
+        (lambda frame: [rtu_frame(b"\x07" + frame[1:-2])], "an answer of device 7", "?device=7"),
+    ],
+)
+def test_wrong_parity_or_device_number_is_named_with_what_to_set(answer, value, remedy):
+    with RtuDevice(Bank()) as device:
+        port = connect(device)
+        device.script = lambda request, frame: answer(frame)
+        with pytest.raises(ReplyTimeout) as caught:
+            port.read(100, 1)
+        port.close()
+    assert value in str(caught.value.value)
+    assert remedy in caught.value.remedy

@@ -4,6 +4,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 
 import pytest
 from pymodbus import exceptions as pymodbus_exceptions
@@ -130,11 +131,80 @@ def test_a_refusal_is_an_answer_and_is_not_repeated():
     with TcpDevice(Bank()) as device:
         port = connect(device)
         port.read_retries = 5
-        device.script = lambda request, frame: [frame[:5] + b"\x03" + frame[6:7] + b"\x83\x06"]
-        with pytest.raises(RequestRefused, match="device busy"):
+        device.script = lambda request, frame: [refusal(request, frame, 2)]
+        with pytest.raises(RequestRefused, match="illegal data address"):
             port.read(100, 1)
         port.close()
     assert len(device.bank.requests) == 1
+
+
+def refusal(request: bytes, frame: bytes, code: int) -> bytes:
+    return frame[:5] + b"\x03" + frame[6:7] + bytes([request[7] | 0x80, code])
+
+
+class Busy:
+    """Refuses the first requests with an exception, then answers."""
+
+    def __init__(self, code: int, times: int) -> None:
+        self.code, self.left = code, times
+
+    def __call__(self, request: bytes, frame: bytes) -> list[bytes]:
+        self.left -= 1
+        return [refusal(request, frame, self.code)] if self.left >= 0 else [frame]
+
+
+@pytest.mark.parametrize("code", [5, 6, 10, 11])
+def test_a_drive_or_gateway_that_is_busy_for_a_moment_is_waited_for(code):
+    with TcpDevice(Bank()) as device:
+        port = connect(device)
+        device.script = Busy(code, 3)
+        assert port.read(100, 2) == (100, 101)
+        device.script = Busy(code, 3)
+        assert port.exchange(200, [7], 200, 1) == (7,)
+        port.close()
+    assert port.stats.waits == 6
+
+
+@pytest.mark.parametrize(("code", "writes"), [(6, 4), (10, 4), (5, 1), (11, 1)])
+def test_a_write_is_repeated_only_where_it_was_surely_not_carried_out(code, writes):
+    with TcpDevice(Bank()) as device:
+        port = connect(device)
+        device.script = Busy(code, 3)
+        if writes > 1:
+            port.write(100, [1])
+        else:
+            with pytest.raises(RequestRefused):
+                port.write(100, [1])
+        port.close()
+    assert device.bank.count(0x10) == writes
+
+
+@pytest.mark.parametrize(("code", "word"), [(6, "busy"), (11, "gateway")])
+def test_a_drive_that_stays_busy_is_waited_for_as_long_as_an_answer_may_take(code, word):
+    with TcpDevice(Bank()) as device:
+        port = connect(device, timeout_s=0.1)
+        device.script = lambda request, frame: [refusal(request, frame, code)]
+        began = time.monotonic()
+        with pytest.raises(RequestRefused) as caught:
+            port.read(100, 1)
+        port.close()
+    assert time.monotonic() - began < 0.5
+    assert word in caught.value.remedy
+
+
+def test_an_answer_of_another_device_is_named():
+    """A gateway whose table is wrong."""
+    with TcpDevice(Bank()) as device:
+        port = connect(device)
+        device.script = lambda request, frame: [frame[:6] + b"\x11" + frame[7:]]
+        with pytest.raises(ReplyTimeout) as caught:
+            port.read(100, 1)
+        assert "device 17" in str(caught.value.value) and "?device=17" in caught.value.remedy
+        device.script = lambda request, frame: []
+        with pytest.raises(ReplyTimeout) as silent:
+            port.read(100, 1)
+        assert "nothing" in str(silent.value.value) and "device=1" in silent.value.remedy
+        port.close()
 
 
 def test_a_connection_closed_by_the_drive_is_reported_and_reopened_by_the_next_request():
@@ -248,3 +318,17 @@ def test_the_library_writes_nothing_to_the_terminal():
         )
     assert run.stdout == "no answer to 'read 1 registers at 100'\n"
     assert run.stderr == ""
+
+
+def test_how_long_this_host_did_not_ask_is_kept():
+    with TcpDevice(Bank()) as device:
+        port = connect(device)
+        device.script = lambda request, frame: [0.03, frame]
+        port.read(100, 1)
+        port.stats.longest_gap_s = 0.0
+        port.read(100, 1)
+        assert port.stats.longest_gap_s < 0.03  # waiting for an answer is none of it
+        time.sleep(0.06)
+        port.read(100, 1)
+        port.close()
+    assert port.stats.longest_gap_s >= 0.06

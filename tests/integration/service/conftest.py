@@ -1,15 +1,20 @@
-"""One service for the whole folder, its simulator as fast as its reader."""
+"""One service for the whole folder, its simulator as fast as its reader; one browser for all its users."""
 
 from collections.abc import Iterator
 
 import pytest
+from playwright.sync_api import Browser
 
+from tests.support.browser import chromium
 from tests.support.service_process import ServiceProcess
+
+PAGE_LOST_S = 2.0
 
 
 @pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
-    with ServiceProcess(tmp_path_factory.mktemp("service")) as made:
+    settings = f"page_lost_s = {PAGE_LOST_S}\nhand_over_s = 60.0\naxes_deg = [0]"
+    with ServiceProcess(tmp_path_factory.mktemp("service"), settings=settings) as made:
         made.start_simulator()
         yield made
 
@@ -20,3 +25,9 @@ def finished(service: ServiceProcess) -> str:
     run = service.start_run()
     assert service.wait_over(run)["outcome"] == "commissioned"
     return run
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with chromium() as made:
+        yield made

@@ -96,6 +96,22 @@ def test_a_call_that_cannot_be_right_is_a_usage_error(capsys, arguments):
     assert (code, document["outcome"]) == (2, "usage")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"), [((), "demo"), (("runs",), "verify"), (("--version",), "commissioner ")]
+)
+def test_a_call_without_arguments_ends_in_the_help_and_a_version_is_told(capsys, arguments, said):
+    with pytest.raises(SystemExit) as left:
+        run_to_exit(app, list(arguments))
+    assert (left.value.code or 0) == 0
+    assert said in capsys.readouterr().out
+
+
+def test_the_last_argument_hides_its_secret_and_an_option_without_one_hides_nothing():
+    assert Secrets(["check", "--password"]).hide("check") == "check"
+    assert Secrets(["--password", "hunter2"]).hide("with hunter2") == "with ***"
+    assert Secrets([]).hide("anything") == "anything"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     """The verb waits at the pipe that it was given for its input."""

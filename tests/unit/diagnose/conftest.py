@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import Setting
-from commissioner.diagnose.catalogue.regressors import add_channels
+from commissioner.diagnose.causes import Setting
+from commissioner.diagnose.causes.regressors import add_channels
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.plant.model import Model

@@ -468,3 +468,40 @@ def test_what_breaks_one_path_of_disarm_does_not_keep_it_from_the_next(bench, er
     report = bench.inverter.disarm()
     assert report.is_confirmed and len(calls) > 1
     assert type(error).__name__ in report.attempts[0].outcome
+
+
+# --- an answer that was lost, a drive that is still at work -----------------------------------------------------
+def test_a_write_whose_answer_was_lost_is_looked_at_and_not_repeated(bench):
+    bench.drive.fails_after_acting = True
+    bench.drive.failures.append(timeout())
+    bench.inverter.set_watchdog(500)
+    assert bench.drive.get("watchdog_ms") == 500
+    assert len(bench.drive.written("watchdog_ms")) == 1
+
+
+def test_a_write_that_was_lost_on_the_way_is_the_error_that_it_is(bench):
+    bench.drive.failures.append(timeout())
+    with pytest.raises(ReplyTimeout):
+        bench.inverter.set_watchdog(500)
+
+
+def test_steering_whose_answer_was_lost_goes_on_where_the_drive_took_it(bench):
+    bench.set_up()
+    bench.drive.fails_after_acting = True
+    bench.drive.failures.append(timeout())
+    bench.inverter.set_scale(0.5)
+    assert bench.drive.get("amplitude_scale") == 0.5
+    bench.drive.fails_after_acting = False
+    bench.drive.failures.append(timeout())
+    with pytest.raises(ReplyTimeout):
+        bench.inverter.set_scale(0.7)
+
+
+@pytest.mark.parametrize("code", [5, 11])
+def test_a_write_that_may_be_carried_out_is_judged_by_what_the_drive_holds(bench, code):
+    bench.drive.refuses["test_time_limit_s"] = code
+    with pytest.raises(DriveFault, match="acknowledged test_time_limit_s"):
+        bench.inverter.set_limits(current_a=8.0, voltage_v=90.0, time_s=60.0)
+    bench.drive.refuses["test_time_limit_s"] = 3
+    with pytest.raises(RequestRefused):
+        bench.inverter.set_limits(current_a=8.0, voltage_v=90.0, time_s=60.0)

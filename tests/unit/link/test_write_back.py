@@ -326,6 +326,9 @@ class Registers:
         self.log.append((address, list(values)))
         self.words[address : address + len(values)] = values
 
+    def read_coil(self, address):
+        return False
+
     def write_coil(self, address, value):
         self.log.append((address, value))
 
@@ -338,13 +341,13 @@ class Registers:
 
 def test_danfoss_takes_the_phase_resistance_in_tenths_of_milliohms_with_the_store_coil_first():
     drive = Registers()
-    drive.words[50199] = 0x0002
+    drive.words[50199] = 0x0202
     drive.words[1299:1301] = [0, 30000]
     inverter = Inverter(drive, load_profile("danfoss_fc302"), sleep=lambda s: None)
     snapshot = inverter.snapshot()
     assert snapshot.in_use == {"stator_resistance": pytest.approx(3.0)}
     report = inverter.write_parameters({"stator_resistance": 3.2}, snapshot)
-    assert drive.log == [(64, True), (1299, [0, 32000])]
+    assert drive.log == [(64, True), (1299, [0, 32000]), (64, False)]
     assert report.is_stored and report.written[0].register == 1299
 
 
@@ -355,9 +358,9 @@ def test_yaskawa_is_stored_by_its_enter_register_once():
     inverter = Inverter(drive, load_profile("yaskawa_a1000"), sleep=lambda s: None)
     snapshot = inverter.snapshot()
     inverter.write_parameters({"stator_resistance": 6.4}, snapshot)
-    assert drive.log == [(0x312, [6400]), (0x0900, [0])]
+    assert drive.log == [(0x312, [6400]), (0x0910, [0]), (0x0900, [0])]
     inverter.write_parameters({"stator_resistance": 6.4}, inverter.snapshot())
-    assert len(drive.log) == 2
+    assert len(drive.log) == 3
 
 
 CIRCUIT, PLATE = InverseGamma(3.2, 2.1, 0.021, 0.23), load_motor("motor_2kw2")
@@ -366,7 +369,7 @@ CIRCUIT, PLATE = InverseGamma(3.2, 2.1, 0.021, 0.23), load_motor("motor_2kw2")
 @pytest.mark.parametrize(
     ("profile", "stopped", "register", "old", "words"),
     [
-        ("danfoss_fc302", (50199, 0x0002), 1299, [0, 30000], [0, 32000]),  # per phase, 0.1 milliohm, 32 bits
+        ("danfoss_fc302", (50199, 0x0202), 1299, [0, 30000], [0, 32000]),  # per phase, 0.1 milliohm, 32 bits
         ("yaskawa_a1000", (0x20, 0x0004), 0x312, [6000], [6400]),  # line to line, milliohm
     ],
 )
@@ -402,7 +405,7 @@ def test_altivar_is_restored_raw_and_says_that_it_is_not_stored():
 
 def test_a_running_commercial_drive_is_not_written():
     drive = Registers()
-    drive.words[50199] = 0x0802
+    drive.words[50199] = 0x0A02
     inverter = Inverter(drive, load_profile("danfoss_fc302"), sleep=lambda s: None)
     with pytest.raises(CheckFailed):
         inverter.write_parameters({"stator_resistance": 3.2}, inverter.snapshot())

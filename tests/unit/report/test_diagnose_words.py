@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Diagnosis, Verdict
 from commissioner.diagnose.document import as_document, refused_document
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.intake.refusal import refused
-from commissioner.diagnose.verdict.experiment import DECIDES, next_experiment, procedure, what_decides
+from commissioner.diagnose.verdict.experiment import next_experiment, procedure, what_decides
 from commissioner.report.diagnosis import sections
 from commissioner.report.diagnosis.names import (
     class_name,
@@ -25,7 +25,6 @@ from commissioner.report.diagnosis.names import (
     sure_words,
 )
 from commissioner.report.diagnosis.page import page_of
-from commissioner.report.diagnosis.plain import PLAIN
 from commissioner.report.diagnosis.words import actions, headline, meaning, remarks, tone
 from commissioner.report.page import Page, Table, render
 
@@ -161,7 +160,9 @@ def test_what_is_uncertain_or_behind_a_class_does_not_stand_among_the_absent():
     seen = document(
         "not_distinguishable",
         [LATE],
-        uncertain=[{"name": "sensor_offset", "why": "w", "decides": DECIDES["sensor_offset"], "is_seen": True}],
+        uncertain=[
+            {"name": "sensor_offset", "why": "w", "decides": CATALOGUE["sensor_offset"].decides, "is_seen": True}
+        ],
     )
     absent = [row[0] for row in sections.not_found(seen).parts[0].rows]
     assert absent == ["leakage saturation"]
@@ -193,7 +194,7 @@ def test_every_cause_has_a_sentence_with_and_without_a_size_and_what_decides_it(
     for one in (bare, sized, cause(name, equivalent=["clock_drift"])):
         words = sentence(one)
         assert "{" not in words and "_" not in words and "()" not in words and not words.endswith((" ", ":", ","))
-    assert DECIDES[name].endswith(".") and (PLAIN[name].motor or plain_of(bare).motor)
+    assert CATALOGUE[name].decides.endswith(".") and (CATALOGUE[name].words.motor or plain_of(bare).motor)
     assert "_" not in spoken(name)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
 from commissioner.operations import archive, write
+from commissioner.records import drive_words
 from commissioner.run.archive.seal import read_key
 from commissioner.run.write_accepted import Plan, as_document
 
@@ -44,7 +45,9 @@ def restore_run(
         if rows
         else "the drive held the snapshot's values already"
     )
-    if done.wear_fraction is not None:
+    if done.fault:
+        screen.out.print(f"[yellow]the drive reports a fault: {screen.text(done.fault)}[/]")
+    if done.wear_fraction is not None and done.store_count is not None:
         screen.out.print(screen.wear(done.store_count, done.wear_fraction))
 
 
@@ -68,7 +71,7 @@ def write_run(
         screen.emit({"outcome": "written", "reason": reason} | vars(done))
         return
     screen.out.print(f"[green]{len(report.written)} parameters written, {screen.kept(report.is_stored)}[/]")
-    if report.wear_fraction is not None:
+    if report.wear_fraction is not None and report.store_count_after is not None:
         screen.out.print(screen.wear(report.store_count_after, report.wear_fraction))
 
 
@@ -77,7 +80,7 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
         screen.emit(as_document(plan))
         return
     rows = [(str(r.register), r.name, f"{r.now:.6g}", f"{r.will_be:.6g}", r.unit, r.convention) for r in plan.rows]
-    screen.out.print(f"[bold]{plan.drive_type} #{plan.serial_number}[/]")
+    screen.out.print(f"[bold]{screen.text(drive_words(plan.drive_type, plan.serial_number))}[/]")
     header = ("register", "parameter", "now", "will be", "unit", "convention")
     screen.out.print(screen.table("", header, rows, right=(2, 3)))
 

@@ -1,34 +1,55 @@
-"""`commissioner runs`: the archive."""
+"""`commissioner runs`: list, find, show, index; report, export, compare."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.operations import archive
-from commissioner.operations.compare import Compared
-from commissioner.operations.compare import compare_runs as carry_out
-from commissioner.run.archive.catalogue import OLD_OR_NEW, RunSummary
+from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs
+from commissioner.operations.history.runs import show_run as look_up
+from commissioner.run.archive.catalogue import RunSummary
+
+SHOWN = 50
+"""Rows of a list for a person, unless another number is given."""
 
 
-def list_runs(folder: Path, *, as_json: bool) -> None:
-    """All runs, newest first."""
-    found = archive.list_runs(folder, with_results=as_json)
+def list_runs(folder: Path, *, as_json: bool, wanted: Wanted | None = None, database: str | None = None) -> None:
+    """The runs that are wanted, newest first."""
+    wanted = wanted or Wanted(limit=0 if as_json else SHOWN)
+    found = find_runs(Archive(folder, database), wanted)
     if as_json:
-        screen.emit({"runs": found})
+        screen.emit_texts("runs", [row.document for row in found.rows], total=found.total)
         return
-    if not found:
-        screen.out.print(f"no runs in {folder}/")
+    if not found.rows:
+        screen.out.print(
+            f"no runs in {screen.text(folder)}/" if wanted == Wanted(limit=wanted.limit) else "no such run"
+        )
         return
     rows = [
-        (run.run, screen.outcome_mark(run.standing), run.drive, OLD_OR_NEW if run.is_unknown else "") for run in found
-    ]
-    screen.out.print(screen.table("", ("run", "outcome", "drive", "holds"), rows))
+        (screen.text(row.run), screen.outcome_mark(row.standing), screen.text(row.motor or row.plate), screen.text(row.drive),
+         screen.text(row.person), row.holds)
+        for row in found.rows
+    ]  # fmt: skip
+    screen.out.print(screen.table("", ("run", "outcome", "motor", "drive", "person", "holds"), rows))
+    if (more := found.total - len(rows)) > 0:
+        screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
+
+
+def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -> None:
+    """The index brought into step, or made anew."""
+    with screen.busy("reading the folders"):
+        done = index_runs(Archive(folder, database), rebuild=rebuild)
+    if as_json:
+        screen.emit(done)
+    else:
+        screen.out.print(
+            f"{done.runs} runs, {done.read} read, {done.gone} taken out: {screen.text(done.index)}", soft_wrap=True
+        )
 
 
 def show_run(folder: Path, name: str, *, as_json: bool) -> None:
     """One run, as its result says; a run that was cut off is told from its journal."""
-    summary = archive.show_run(folder, name)
+    summary = look_up(folder, name)
     if as_json:
         screen.emit({"run": summary.run, "summary": summary, "result": summary.result})
         return
@@ -36,15 +57,24 @@ def show_run(folder: Path, name: str, *, as_json: bool) -> None:
 
 
 def _print(summary: RunSummary) -> None:
-    screen.out.print(f"[bold]{summary.run}[/]  {screen.outcome_mark(summary.standing)}  {summary.reason}")
-    screen.out.print(f"  drive       {summary.drive}\n  energised   {summary.energised_s:.1f} s")
-    screen.out.print(f"  parameters  {summary.written}\n  folder      {summary.folder}")
+    mark, motor = (
+        screen.outcome_mark(summary.standing),
+        " ".join(filter(None, (summary.motor_tag, summary.motor_serial))),
+    )
+    screen.out.print(f"[bold]{screen.text(summary.run)}[/]  {mark}  {screen.text(summary.reason)}")
+    screen.out.print(
+        f"  drive       {screen.text(summary.drive)}\n  motor       {screen.text(motor) or 'nobody said which'}"
+    )
+    screen.out.print(f"  energised   {summary.energised_s:.1f} s")
+    screen.out.print(f"  parameters  {screen.text(summary.written)}\n  folder      {screen.text(summary.folder)}")
     if summary.result is not None:
         screen.result(summary.result, summary.standing)
 
 
 def report_run(folder: Path, name: str, *, as_json: bool) -> None:
     """The path of the run's report, made from its archive where the run could not make it."""
+    from commissioner.operations import archive
+
     with screen.busy("making the report"):
         done = archive.report_run(folder, name)
     if as_json:
@@ -53,28 +83,21 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
         screen.out.print(done.report, soft_wrap=True)
 
 
-def export_run(folder: Path, name: str, out: Path, *, as_json: bool, salvage: bool = False) -> None:
-    """The run's whole samples as a recording in the contract's format."""
+def export_run(folder: Path, name: str, out: Path, form: str, *, as_json: bool, salvage: bool = False) -> None:
+    """The run's whole samples as a recording in the contract's format, or its parameters in another form."""
+    if form != "samples":
+        from commissioner.operations.export import export_model
+
+        model = export_model(folder, name, out, form)
+        if as_json:
+            screen.emit(model)
+        else:
+            screen.out.print(f"{model.form}: {screen.text(model.model)}", soft_wrap=True)
+        return
+    from commissioner.operations import archive
+
     done = archive.export_run(folder, name, out, salvage=salvage)
     if as_json:
         screen.emit(done)
     else:
         screen.out.print(f"{done.samples} samples in {done.recording}", soft_wrap=True)
-
-
-def compare_runs(folder: Path, before: str, after: str, *, as_json: bool) -> None:
-    """Same motor, changed, or another one."""
-    done = carry_out(folder, before, after)
-    if as_json:
-        screen.emit(done)
-    else:
-        _show(done)
-
-
-def _show(done: Compared) -> None:
-    comparison = done.comparison
-    rows = [(c.parameter, f"{100 * c.relative_change:+.2f} %", f"{c.sigmas:.1f}") for c in comparison.changes]
-    screen.out.print(f"[bold]{comparison.verdict.value}[/]\n  {comparison.reason}")
-    screen.out.print(screen.table("", ("parameter", "change", "standard errors"), rows, right=(1, 2)))
-    for sentence in done.common.sentences:
-        screen.out.print(f"  [dim]•[/] {screen.text(sentence)}")

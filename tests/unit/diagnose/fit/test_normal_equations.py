@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.fit.normal_equations import NormalEquations, whiten
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.plant.prediction import predict

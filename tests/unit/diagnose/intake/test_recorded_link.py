@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
-from commissioner.diagnose.catalogue.inverter import without_the_recorded_link
-from commissioner.diagnose.catalogue.mains_lines import recorded_sag
-from commissioner.diagnose.catalogue.regressors import RECORDED_LINK
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.causes.mains_lines import recorded_sag
+from commissioner.diagnose.causes.regressors import RECORDED_LINK
 
 SAG = CATALOGUE["dc_link_sag"]
 
@@ -35,7 +34,7 @@ def test_a_sag_has_the_same_size_on_the_recorded_link_and_on_lagged_power(settin
     column = setting.record.channel("sag_3ms")
     seen = with_link(setting, lambda s, c: 0.1 * c[:, column])
     model = model_of(seen, nominal, link_recorded=0.5, sag_3ms=0.01)
-    alone = without_the_recorded_link(model, seen.record)
+    alone = SAG.without_recorded(model, seen.record)
     wanted = {"sag_3ms": 0.06}
     assert alone.of("dc_link_sag") == pytest.approx(
         {t.symbol: wanted.get(t.symbol, 0.0) for t in model.terms}, abs=1e-6

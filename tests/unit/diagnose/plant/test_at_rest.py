@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant.model import Model
 from tests.unit.diagnose.conftest import NOMINAL
 

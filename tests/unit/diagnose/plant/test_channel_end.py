@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Verdict, diagnose
 from commissioner.diagnose.plant.channel_end import COUNT, KNOTS, current_lost, reported, slope_lost
 from commissioner.diagnose.plant.prediction import predict

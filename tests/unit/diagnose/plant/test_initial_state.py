@@ -8,14 +8,14 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
 from scipy.linalg import expm
 
-from commissioner.diagnose.catalogue import CATALOGUE
-from commissioner.diagnose.catalogue.magnetics import CARRIED
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.causes.iron.magnetic_hysteresis import CARRIED
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.initial_state import per_ampere, slopes_of_start
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict, trajectory
 from commissioner.diagnose.search.nominal import CARRY, with_flux_before
-from tests.unit.diagnose.catalogue.test_effects import central_slope
+from tests.unit.diagnose.causes.test_effects import central_slope
 
 BEFORE_WB = np.array([0.4, -0.3])
 TILTED = {"leakage_cos": 0.02, "leakage_sin": -0.03, "magnetizing_cos": 0.04, "split": 0.2}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant import sensor_curve
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict

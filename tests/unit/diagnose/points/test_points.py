@@ -26,7 +26,7 @@ def locked(motor, random, scatter, skin=0.0, saturation=0.0):
     resistance = r_s + r_r * rise
     v = np.sqrt(3.0) * i * np.hypot(resistance, reactance)
     return _table(f, v, i, 3.0 * resistance * i**2, random, scatter) | {
-        "winding_resistance_ohm": np.full(12, 2.0 * r_s)
+        "winding_resistance_uv_ohm": np.full(12, 2.0 * r_s)
     }
 
 
@@ -39,7 +39,7 @@ def no_load(motor, random, scatter, saturation=0.0, growth=0.0):
     reactive = v / np.sqrt(3.0) / (2 * np.pi * f * (main + leak)) * (1.0 + saturation * (v / v.max()) ** 7)
     i = np.hypot(reactive, loss / (np.sqrt(3.0) * v))
     return _table(f, v, i, loss + 3.0 * r_s * i**2, random, scatter) | {
-        "winding_resistance_ohm": np.full(10, 2.0 * r_s)
+        "winding_resistance_uv_ohm": np.full(10, 2.0 * r_s)
     }
 
 

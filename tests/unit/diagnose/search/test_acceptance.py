@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.causes.sampling.clock_drift import LEAST_INCONSTANT, RATES, constancy
 from commissioner.diagnose.plant.sampling import clock_courses
-from commissioner.diagnose.search.acceptance import CLOCK_RATES, LEAST_INCONSTANT, constancy, guard, is_plausible
+from commissioner.diagnose.search.acceptance import guard, is_plausible
 
 
 def test_clocks_pass_and_what_imitates_a_delay_does_not(setting):
@@ -17,19 +18,17 @@ def test_clocks_pass_and_what_imitates_a_delay_does_not(setting):
     like_a_delay = np.linalg.lstsq((forms * moves).T, moves, rcond=None)[0]
     constant = 1.0 - LEAST_INCONSTANT * (1.0 - constancy({"drift": 1.0}, record))
     assert 0.95 < constant < 1.0
-    assert constancy(dict(zip(CLOCK_RATES, like_a_delay, strict=True)), record) > constant
+    assert constancy(dict(zip(RATES, like_a_delay, strict=True)), record) > constant
     for rates in ({"drift": 3.0}, {"wander_cos": 1.0}, {"wander_sin": 2.0}, {"running": 1.0}, {}):
         assert constancy(rates, record) < min(constant, 0.95) - 0.1
-    assert (
-        constancy(dict(zip(CLOCK_RATES, -like_a_delay, strict=True)), record) > constant
-    )  # early alike: a conductance
+    assert constancy(dict(zip(RATES, -like_a_delay, strict=True)), record) > constant  # early alike: a conductance
     both = [constancy({"drift": 1.0, "wander_sin": x}, record) for x in np.linspace(-10.0, 10.0, 81)]
     assert max(both) < min(constant, 0.95)
 
 
 def test_constancy_is_a_share(setting):
-    for rates in np.random.default_rng(3).normal(size=(20, len(CLOCK_RATES))):
-        assert 0.0 <= constancy(dict(zip(CLOCK_RATES, rates, strict=True)), setting.record) <= 1.0
+    for rates in np.random.default_rng(3).normal(size=(20, len(RATES))):
+        assert 0.0 <= constancy(dict(zip(RATES, rates, strict=True)), setting.record) <= 1.0
 
 
 def recorded_link(setting, swing):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.diagnose.catalogue import CATALOGUE
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.fit.gauss_newton import Fit, fit, inverse
 from commissioner.diagnose.fit.normal_equations import Normal
 from commissioner.diagnose.intake.noise import Noise

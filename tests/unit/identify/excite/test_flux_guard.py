@@ -105,7 +105,9 @@ def test_the_amplitude_for_a_known_machine_behind_a_large_loss_is_held_by_its_cu
 def estimate_at(current_a: float) -> BlockEstimate:
     """An observer that knows the machine and sees a constant current and no flux."""
     signal = np.full(50, current_a)
-    return BlockEstimate(MACHINE, (0.006, 0.004, 1e-4, 2e-3), 0.0, 0.01, signal, 0.0 * signal, 0.0 * signal, 50, 0, 0)
+    return BlockEstimate(
+        MACHINE, lambda: (0.006, 0.004, 1e-4, 2e-3), 0.0, 0.01, signal, 0.0 * signal, 0.0 * signal, 50, 0, 0
+    )
 
 
 @pytest.mark.parametrize(("current_a", "backs_off"), [(9.9, False), (11.5, True)])

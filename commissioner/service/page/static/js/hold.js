@@ -26,9 +26,10 @@ async function energise() {
   level("live");
   document.querySelector("#big").textContent = say("ENERGISED SOON");
   message.textContent = say("The run is being started …");
-  const wish = { drive: form.dataset.drive, motor: form.dataset.motor, write_back: document.querySelector("#writeback").checked, confirm: true };
+  const wish = new URLSearchParams(new FormData(form));
+  wish.set("held", "yes");
   try {
-    const answer = await fetch("/api/runs", { method: "POST", headers: { "content-type": "application/json", "x-csrf-token": document.body.dataset.csrf }, body: JSON.stringify(wish) });
+    const answer = await fetch(form.action, { method: "POST", headers: { accept: "application/json" }, body: wish });
     const said = await answer.json();
     if (answer.ok) { location.assign(said.url); return; }
     message.textContent = [said.title, said.remedy].filter(Boolean).join(". ");

@@ -7,7 +7,7 @@ const FACTOR = [1, 1, 1e3, 1e3], DIGITS = [3, 3, 3, 1], SYMBOL = ["R_s", "R_R", 
 const WANTED = ["resistance_std_percent", "rotor_resistance_std_percent", "leakage_std_percent", "magnetizing_std_percent"];
 const first = JSON.parse($("#livedata").textContent), acceptance = first.acceptance;
 let limits = { current: first.live.current.limit_a, flux: first.live.flux.limit_wb };
-let current = { t: [], low: [], high: [] }, flux = { t: [], y: [] }, history = [], newest = performance.now(), segment = null;
+let current = { t: [], low: [], high: [] }, flux = { t: [], y: [] }, history = [], newest = performance.now(), segment = null, isOn = first.live.output === "on";
 
 /* ---- plots --------------------------------------------------------------------------------------------------------- */
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -22,24 +22,25 @@ function limitLines(value) {
 }
 function plot(element, span, range, splits, series, limit, bands) {
   const size = () => ({ width: Math.max(160, element.clientWidth), height: Math.max(80, element.clientHeight) });
-  const axis = { stroke: css("--ink2"), grid: { stroke: css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
+  const axis = { stroke: () => css("--ink2"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
   const made = new uPlot({
     ...size(), legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
     scales: { x: { time: false, range: (u, low, high) => [(high ?? span) - span, high ?? span] }, y: { range } },
     axes: [{ ...axis, size: 24, splits: (u) => [0, 1, 2, 3, 4].map((k) => u.scales.x.max - span + (k * span) / 4), values: (u, at) => at.map((x) => number(x - u.scales.x.max, 1, "s")) },
       { ...axis, size: 48, splits, values: (u, at) => at.map((y) => number(y, Math.abs(y) < 1 && y !== 0 ? 2 : 0)) }],
-    series: [{}, ...series.map((extra) => ({ stroke: css("--trace"), width: 1.2, points: { show: false }, spanGaps: false, ...extra }))],
+    series: [{}, ...series.map((extra) => ({ stroke: () => css("--trace"), width: 1.2, points: { show: false }, spanGaps: false, ...extra }))],
     bands, plugins: [limitLines(limit)],
   }, [[], ...series.map(() => [])], element);
   new ResizeObserver(() => made.setSize(size())).observe(element);
   return made;
 }
 const currentTop = () => 1.12 * (limits.current ?? 1), fluxTop = () => 1.12 * (limits.flux ?? 1);
-const fill = () => css("--band95");
 const plots = {
-  current: plot($("#pi"), WINDOW_S, () => [-currentTop(), currentTop()], () => [-Math.round(limits.current ?? 1), 0, Math.round(limits.current ?? 1)], [{}, {}], () => limits.current && [limits.current, -limits.current], [{ series: [2, 1], fill }]),
+  current: plot($("#pi"), WINDOW_S, () => [-currentTop(), currentTop()], () => [-Math.round(limits.current ?? 1), 0, Math.round(limits.current ?? 1)], [{}, {}], () => limits.current && [limits.current, -limits.current], [{ series: [2, 1], fill: () => css("--band95") }]),
   flux: plot($("#pf"), FLUX_WINDOW_S, () => [0, fluxTop()], () => [0, 0.5 * (limits.flux ?? 1), limits.flux ?? 1], [{ width: 1.6 }], () => limits.flux && [limits.flux], []),
 };
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { for (const made of Object.values(plots)) made.redraw(false, true); });
 
 /* ---- samples ---------------------------------------------------------------------------------------------------------- */
 on("samples", (event) => {
@@ -125,13 +126,14 @@ function show(live) {
   }
   draw();
 }
-on("live", (live) => { newest = performance.now(); show(live); });
+on("live", (live) => { newest = performance.now(); isOn = live.output === "on"; show(live); });
 on("history", (past) => { history = past; sparks(); });
 setInterval(() => {
   const age = $("#age"); if (!age) return;
   const seconds = (performance.now() - newest) / 1000;
-  age.textContent = say(seconds > 2 ? "%s old: stale" : "%s old", number(seconds, 1, "s"));
-  age.classList.toggle("old", seconds > 1);
+  const isSilent = isOn && seconds > 1; /* between tests the computer works and nothing is said: that is no loss */
+  age.textContent = say(isSilent && seconds > 2 ? "%s old: stale" : "%s old", number(seconds, 1, "s"));
+  age.classList.toggle("old", isSilent);
   $("#live")?.classList.toggle("stale", seconds > 2);
 }, 200);
 show(first.live);

@@ -101,7 +101,7 @@ async function follow(phase) {
     const answer = await fetch(location.href, { headers: { accept: "text/html" } });
     if (!answer.ok) return;
     const next = new DOMParser().parseFromString(await answer.text(), "text/html");
-    if (next.querySelector("#livedata") && $("#livedata")) return;
+    if (next.querySelector("#livedata") && $("#livedata")) { place.phase = before; return; }
     for (const selector of ["#main", "#steps"]) {
       const fresh = next.querySelector(selector), old = $(selector);
       if (fresh && old) old.replaceWith(fresh);

@@ -1,34 +1,28 @@
-/* The nameplate's fields, judged by the service as they are left: what is wrong, and what to do. */
-import { number, say } from "./page.js";
+/* The nameplate's fields, judged by the service as they are left: what is wrong, what to do, and what the plate means. */
+import { say } from "./page.js";
 
 const form = document.querySelector("#plate");
-const csrf = document.body.dataset.csrf;
-const value = (name) => form.elements[name]?.value.trim() ?? "";
-
-function plate() {
-  const fields = {};
-  for (const name of ["rated_voltage_v", "rated_current_a", "rated_frequency_hz", "rated_speed_rpm", "pole_pairs", "power_factor", "inertia_kg_m2", "connection"]) if (value(name) !== "") fields[name] = value(name);
-  const kilowatts = Number(value("rated_power_kw").replace(",", "."));
-  fields.rated_power_w = value("rated_power_kw") !== "" && Number.isFinite(kilowatts) ? Number((1000 * kilowatts).toPrecision(10)) : value("rated_power_kw");
-  return fields;
-}
+let asked = 0;
 
 async function judge() {
-  const answer = await fetch("/api/nameplates/validate", { method: "POST", headers: { "content-type": "application/json", "x-csrf-token": csrf }, body: JSON.stringify(plate()) });
-  if (answer.ok) show(await answer.json());
+  const number = ++asked;
+  const answer = await fetch("/plate", { method: "POST", headers: { accept: "application/json" }, body: new URLSearchParams(new FormData(form)) });
+  if (answer.ok && number === asked) show(await answer.json());
 }
 
 function show(judged) {
   let wrong = 0;
   for (const box of form.querySelectorAll("[data-field]")) {
-    const field = judged.fields[box.dataset.field], input = box.querySelector("input"), message = box.querySelector(".msg");
-    box.classList.toggle("bad", !field.ok);
-    if (field.ok) input.removeAttribute("aria-invalid"); else { input.setAttribute("aria-invalid", "true"); wrong += 1; }
-    message.textContent = field.ok ? message.dataset.hint : `${field.what}: ${field.remedy}`;
+    const complaint = judged.fields[box.dataset.field], input = box.querySelector("input"), message = box.querySelector(".msg");
+    box.classList.toggle("bad", complaint !== "");
+    if (complaint === "") input.removeAttribute("aria-invalid"); else { input.setAttribute("aria-invalid", "true"); wrong += 1; }
+    message.textContent = complaint || message.dataset.hint;
   }
   document.querySelector("#why").textContent = wrong ? say("%s to correct", wrong) : say("energises nothing, writes nothing");
-  const note = document.querySelector("#judgement p");
-  if (note && judged.efficiency !== null) note.dataset.efficiency = number(100 * judged.efficiency, 1, "%");
+  const note = document.querySelector(judged.is_odd ? "#judgedodd" : "#judged").content.firstElementChild.cloneNode(true);
+  note.querySelector("b").textContent = judged.verdict;
+  note.querySelector("span").textContent = judged.reason;
+  document.querySelector("#judgement").replaceChildren(...(judged.verdict ? [note] : []));
 }
 
 for (const input of form.querySelectorAll("input")) input.addEventListener("change", judge);

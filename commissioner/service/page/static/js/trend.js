@@ -20,7 +20,7 @@ for (const element of document.querySelectorAll("[data-trend]")) {
     c.restore();
   };
   const size = () => ({ width: Math.max(160, element.clientWidth), height: Math.max(100, element.clientHeight) });
-  const axis = { stroke: css("--ink2"), grid: { stroke: css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
+  const axis = { stroke: () => css("--ink2"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false }, font: "12px Plex, sans-serif" };
   const pad = 0.06 * (times.at(-1) - times[0]) || 86400;
   const made = new uPlot({
     ...size(), legend: { show: false }, cursor: { show: false },

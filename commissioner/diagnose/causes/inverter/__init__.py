@@ -1,0 +1,1 @@
+"""The power stage: legs, link and cable."""

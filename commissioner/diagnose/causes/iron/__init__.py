@@ -1,0 +1,1 @@
+"""The iron: main path, leakage path, what they remember and lose."""

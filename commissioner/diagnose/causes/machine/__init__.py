@@ -1,0 +1,1 @@
+"""Rotor, windings and shaft: how they lie, turn and warm."""

@@ -1,0 +1,1 @@
+"""Converter, clock and recorder: when a current is taken, in which steps, and whether it is kept."""

@@ -1,0 +1,1 @@
+"""The current sensors: their zero, gain, form, speed, and what they pick up."""

@@ -1,0 +1,54 @@
+"""Which runs there are. Light: a list starts no estimator and reads no journal (tests/architecture/test_start_up.py)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.errors import UsageError
+from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.index.index import Found, Refreshed
+from commissioner.run.index.index import find as look_up
+from commissioner.run.index.index import refresh as bring_into_step
+from commissioner.run.index.rows import Row, Wanted
+
+__all__ = ["Found", "Refreshed", "Row", "Wanted", "find_runs", "index_runs", "show_run"]
+
+
+@dataclass(frozen=True)
+class Archive:
+    """The run folders, and the URL of a database that several computers share."""
+
+    runs: Path
+    database: str | None = None
+
+
+def find_runs(archive: Archive, wanted: Wanted | None = None) -> Found:
+    """Newest first, all of them where nothing is wanted; a folder that cannot be read is a row that says so. UsageError: a date
+    that is none."""
+    wanted = wanted or Wanted()
+    for name in ("since", "until"):
+        _check_date(getattr(wanted, name), name)
+    return look_up(archive.runs, wanted, archive.database)
+
+
+def show_run(runs: Path, run: str) -> RunSummary:
+    """The run of which the id starts so, or the newest for `last`. UsageError: none or several."""
+    return find_run(runs, run)
+
+
+def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:
+    """The index in step with the folders, made where there is none; `rebuild`: from the folders alone."""
+    return bring_into_step(archive.runs, archive.database, rebuild=rebuild)
+
+
+def _check_date(value: str, name: str) -> None:
+    shape = "2026-11-25T10:17:45"
+    fits = value == "" or (
+        len(value) >= 4 and all(a.isdigit() if b.isdigit() else a == b for a, b in zip(value, shape, strict=False))
+    )
+    if not fits:
+        raise UsageError(
+            f"--{name} is no date", step="archive", value=value, limit=f"{shape[:4]}, {shape[:7]}, {shape[:10]} or {shape}, UTC",
+            remedy="write year, month and day with four, two and two digits",
+        )  # fmt: skip

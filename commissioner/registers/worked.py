@@ -1,0 +1,67 @@
+"""Worked examples of a drive file: address, words, value and conversion carried out as the cited document does, to the last digit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from commissioner.errors import ConfigurationError, ReplyMismatch, UsageError
+from commissioner.registers.codec import decode_item, encode_item
+from commissioner.registers.convention import our_values
+from commissioner.registers.profile import DriveProfile, Worked
+
+DIGITS = 12
+"""Compared after rounding to so many significant digits: scales like 0.0001 have no exact binary form."""
+
+
+def check_worked(profile: DriveProfile) -> DriveProfile:
+    """The profile itself. ConfigurationError where an example does not come out, or a parameter that can be written has none."""
+    for index, example in enumerate(profile.worked):
+        for key, seen, wanted in _compared(profile, example, index):
+            if not _same(seen, wanted):
+                raise ConfigurationError(
+                    file=profile.file, key=f"worked[{index}].{key}", value=wanted, expected=f"{seen!r} by this file"
+                )
+    if profile.kind == "commercial" and "write_back" in profile.capabilities:
+        _check_each_has_one(profile)
+    return profile
+
+
+def _check_each_has_one(profile: DriveProfile) -> None:
+    proved = {w.item for w in profile.worked if w.words and w.value is not None and w.per_phase is not None}
+    for name in profile.parameters.order if profile.parameters else ():
+        if profile.item(name).convention and name not in proved:
+            raise ConfigurationError(
+                file=profile.file, key="worked", value=None,
+                expected=f"an example with item = {name!r}, words, value and per_phase: what is written must be proved",
+            )  # fmt: skip
+
+
+def _compared(profile: DriveProfile, example: Worked, index: int) -> Iterator[tuple[str, object, object]]:
+    """Key, what the file makes of it, what the document says."""
+    if example.item not in profile.items:
+        raise ConfigurationError(
+            file=profile.file,
+            key=f"worked[{index}].item",
+            value=example.item,
+            expected="the name of a table [items.NAME]",
+        )
+    item = profile.item(example.item)
+    if example.wire is not None:
+        yield "wire", item.address, example.wire
+    if example.words and example.value is not None:
+        try:
+            yield "value", decode_item(item, example.words), example.value
+            yield "words", encode_item(item, example.value), example.words
+        except (ReplyMismatch, UsageError) as error:
+            raise ConfigurationError(
+                file=profile.file, key=f"worked[{index}].words", value=list(example.words), expected=str(error.limit)
+            ) from error
+    if example.per_phase is not None and example.value is not None:
+        ours = our_values(profile, {example.item: example.value}, None).get(example.item)
+        yield "per_phase", ours.value if ours else None, example.per_phase
+
+
+def _same(seen: object, wanted: object) -> bool:
+    if isinstance(seen, float) and isinstance(wanted, int | float):
+        return f"{seen:.{DIGITS}g}" == f"{float(wanted):.{DIGITS}g}"
+    return seen == wanted

@@ -1,0 +1,162 @@
+"""The index of one archive, brought into step with its folders whenever it is asked."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Callable, Mapping
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from commissioner.errors import CommissionerError
+from commissioner.run.archive.catalogue import read_run
+from commissioner.run.archive.origin import machine_part
+from commissioner.run.index.rows import STAMPS, Row, Wanted, row_of, select
+from commissioner.run.index.store import NAME, SharedStore, SqliteStore, Store, check_url, forget, open_file
+
+FEW = 100
+"""An archive of fewer runs has no index file unless one was asked for: its summaries are read in 20 ms."""
+ARCHIVE = "COMMISSIONER_ARCHIVE"
+"""Environment: the URL of a shared database that every ended run is told to as well."""
+JOURNAL = "journal.jsonl"
+T = TypeVar("T")
+Stamps = Mapping[str, tuple[int, int]]
+"""Run -> size and modification time of its journal: whatever happens to a run is journalled."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """`rows` newest first; `total`: how many there are without the limit; `indexed`: by what they were found."""
+
+    rows: tuple[Row, ...]
+    total: int
+    indexed: str
+
+
+@dataclass(frozen=True)
+class Refreshed:
+    """How many runs there are, were read anew, and were taken out as their folders are gone."""
+
+    runs: int
+    read: int
+    gone: int
+    index: str
+
+
+def find(root: Path, wanted: Wanted, archive: str | None = None) -> Found:
+    """The runs of the archive in `root` that are wanted; with `archive` also those that other computers told that database.
+
+    An index that cannot be had here (a disk that is full or read-only, a lock that is held too long) is done without.
+    """
+    place, seen = place_of(root), stamps(root)
+    if archive is not None:
+        with closing(SharedStore(check_url(archive))) as shared:
+            _refresh(shared, root, place, seen)
+            return _select(shared, wanted, place, archive)
+    if len(seen) >= FEW or (root / NAME).is_file():
+        with suppress(sqlite3.Error):
+            return _on_file(
+                root, lambda store: (_refresh(store, root, place, seen), _select(store, wanted, place, NAME))[1]
+            )
+    with closing(SqliteStore(None)) as memory:
+        _refresh(memory, root, place, seen)
+        return _select(memory, wanted, place, "folders")
+
+
+def refresh(root: Path, archive: str | None = None, *, rebuild: bool = False) -> Refreshed:
+    """Bring the index into step; `rebuild` reads every folder, and needs nothing of what was there. CommissionerError: it
+    cannot be written."""
+    place, seen = place_of(root), stamps(root)
+    try:
+        if archive is None:
+            read, gone = _on_file(root, lambda store: _refresh(store, root, place, seen, anew=rebuild))
+        else:
+            with closing(SharedStore(check_url(archive))) as shared:
+                read, gone = _refresh(shared, root, place, seen, anew=rebuild)
+    except (sqlite3.Error, OSError) as failure:
+        raise CommissionerError(
+            f"the index cannot be written: {failure}", step="archive index", value=str(root / NAME),
+            limit="a folder that this user may write", remedy="lists work without it, from the folders; free the disk or the lock",
+        ) from failure  # fmt: skip
+    return Refreshed(len(seen), read, gone, str(root / NAME) if archive is None else archive)
+
+
+def note(folder: Path) -> None:
+    """Tell the indexes that there are of a run that has ended or was changed. Never fails: a list puts right what is missing."""
+    root, archive = folder.parent, os.environ.get(ARCHIVE, "").strip()
+    with suppress(sqlite3.Error, OSError):
+        if (root / NAME).is_file():
+            _on_file(root, lambda store: _note(store, folder))
+    if archive:
+        with suppress(CommissionerError, OSError), closing(SharedStore(check_url(archive), connect_s=2)) as shared:
+            _note(shared, folder)
+
+
+def stamps(root: Path) -> Stamps:
+    """Of every folder with a journal; empty where there is no archive."""
+    found: dict[str, tuple[int, int]] = {}
+    try:
+        with os.scandir(root) as entries:
+            names = [entry.name for entry in entries]
+    except OSError:
+        return found
+    prefix = f"{root}{os.sep}"
+    for name in names:
+        with suppress(OSError, ValueError):
+            seen = os.stat(f"{prefix}{name}{os.sep}{JOURNAL}")  # noqa: PTH116  a Path for each of 10 000 takes as long as the rest
+            found[name] = (seen.st_size, seen.st_mtime_ns)
+    return found
+
+
+def place_of(root: Path) -> str:
+    """Which archive this is, where several share a database: the computer and the folder."""
+    return f"{machine_part()}:{root.absolute()}"
+
+
+def _on_file(root: Path, act: Callable[[Store], T]) -> T:
+    """What `act` makes of the SQLite index; one that turns out to be damaged is made anew. sqlite3.Error: it cannot be had."""
+    try:
+        with closing(open_file(root)) as store:
+            return act(store)
+    except sqlite3.DatabaseError as damaged:
+        if isinstance(damaged, sqlite3.OperationalError):  # locked, read-only, no room: not damaged
+            raise
+        forget(root)
+    with closing(open_file(root)) as store:
+        return act(store)
+
+
+def _refresh(store: Store, root: Path, place: str, seen: Stamps, *, anew: bool = False) -> tuple[int, int]:
+    """(read anew, gone)"""
+    known = {} if anew else {str(run): (size, time) for run, size, time in store.read(STAMPS, {"place": place})}
+    changed = [name for name, stamp in seen.items() if known.get(name) != stamp]
+    gone = [name for name in known if name not in seen]
+    if changed or gone or anew:
+        rows = [_row(root / name, place, seen[name]) for name in changed]
+        store.write(place, rows, gone, anew=anew)
+    return len(changed), len(gone)
+
+
+def _note(store: Store, folder: Path) -> None:
+    seen = (folder / JOURNAL).stat()
+    place = place_of(folder.parent)
+    store.write(place, [_row(folder, place, (seen.st_size, seen.st_mtime_ns))], ())
+
+
+def _row(folder: Path, place: str, stamp: tuple[int, int]) -> Row:
+    """A name that is no text (bytes of another encoding) is told with marks for what cannot be said."""
+    row = row_of(read_run(folder, with_result=False), place, stamp)
+    return Row._make(_sayable(value) for value in row)
+
+
+def _sayable(value: str | int) -> str | int:
+    return value.encode("utf-8", "replace").decode("utf-8") if isinstance(value, str) else value
+
+
+def _select(store: Store, wanted: Wanted, place: str, indexed: str) -> Found:
+    rows, count, bound = select(wanted, place, is_shared=store.is_shared)
+    found = tuple(map(Row._make, store.read(rows, bound | ({"most": wanted.limit} if wanted.limit > 0 else {}))))
+    total = int(store.read(count, bound)[0][0]) if wanted.limit > 0 and len(found) == wanted.limit else len(found)
+    return Found(found, total, indexed)

@@ -1,0 +1,165 @@
+"""What the service costs: `python -m tests.campaigns.page.costs [--runs N] [--viewers 20]`; CPU in seconds of one core.
+
+ready: process start to the first answer. paint: first contentful paint of the start page and of a result. viewers: CPU of the
+service over one live run with so many pages and scripts watching, the largest delay of a record, records and blocks missed.
+memory: resident size of the service after each of N runs. overhead: service and run together against `commissioner run`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from tests.support.browser import chromium, technician
+from tests.support.service_process import ServiceProcess
+
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def cpu_s(pid: int, *, with_children: bool = False) -> float:
+    """User and system time of a process, and of those of its children that have ended."""
+    fields = Path(f"/proc/{pid}/stat").read_text("utf-8").rsplit(")", 1)[1].split()
+    return sum(int(fields[k]) for k in ((11, 12, 13, 14) if with_children else (11, 12))) / TICKS
+
+
+def resident_mb(pid: int) -> float:
+    """Megabytes."""
+    line = next(x for x in Path(f"/proc/{pid}/status").read_text("utf-8").splitlines() if x.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024
+
+
+@dataclass
+class Viewer:
+    """One script at the event stream: records and blocks seen, and how late the latest record was."""
+
+    service: ServiceProcess
+    run: str
+    records: list[int] = field(default_factory=list)
+    blocks: int = 0
+    latest_s: float = 0.0
+
+    def watch(self) -> None:
+        import datetime as dt
+
+        import httpx
+
+        with (
+            httpx.Client(base_url=self.service.url, timeout=120) as client,
+            client.stream("GET", f"/api/runs/{self.run}/events") as stream,
+        ):
+            event, began = "", time.time()
+            for line in stream.iter_lines():
+                if line.startswith("event: "):
+                    event = line[7:]
+                    if event == "end":
+                        return
+                elif line.startswith("data: "):
+                    document = json.loads(line[6:])
+                    if event == "samples":
+                        self.blocks = document["blocks"]
+                    elif "n" in document:
+                        self.records.append(document["n"])
+                        written = dt.datetime.fromisoformat(document["utc"]).timestamp()
+                        if written > began:
+                            self.latest_s = max(self.latest_s, time.time() - written)
+
+
+def page(service: ServiceProcess, run: str) -> None:
+    """One page's line; it only listens."""
+    try:
+        with connect(f"ws://127.0.0.1:{service.port}/api/runs/{run}/control") as socket:
+            while "over" not in json.loads(socket.recv()):
+                pass
+    except ConnectionClosed:
+        pass
+
+
+def viewers(service: ServiceProcess, count: int) -> dict[str, object]:
+    """One run, half of the watchers scripts and half pages."""
+    run = service.start_run()
+    scripts = [Viewer(service, run) for _ in range(count // 2)]
+    threads = [threading.Thread(target=viewer.watch) for viewer in scripts]
+    threads += [threading.Thread(target=page, args=(service, run)) for _ in range(count - count // 2)]
+    before_s, began = cpu_s(service.process.pid), time.monotonic()
+    for thread in threads:
+        thread.start()
+    service.wait_over(run, 600)
+    seconds, used_s = time.monotonic() - began, cpu_s(service.process.pid) - before_s
+    for thread in threads:
+        thread.join(60)
+    lines = len((service.runs / run / "journal.jsonl").read_text("utf-8").splitlines())
+    return {
+        "viewers": count,
+        "of_a_core_percent": round(100 * used_s / seconds, 1),
+        "cpu_s": round(used_s, 2),
+        "latest_record_s": round(max(viewer.latest_s for viewer in scripts), 3),
+        "records_missed": sum(lines - len(set(viewer.records)) for viewer in scripts),
+        "blocks_seen": sorted({viewer.blocks for viewer in scripts}),
+    }
+
+
+def paint(service: ServiceProcess, run: str) -> dict[str, float]:
+    """Milliseconds from the navigation to the first contentful paint; second visit, as a technician's is."""
+    found = {}
+    with chromium() as browser, technician(browser, service) as hand:
+        for name, path in (("start", "/"), ("result", f"/runs/{run}")):
+            for _ in range(3):
+                hand.go(path)
+            hand.page.wait_for_timeout(300)
+            found[name] = hand.page.evaluate(
+                "() => performance.getEntriesByName('first-contentful-paint')[0].startTime"
+            )
+    return {name: round(ms) for name, ms in found.items()}
+
+
+def command_line_s(service: ServiceProcess) -> float:
+    """CPU of the same run by `commissioner run`, on the same simulator."""
+    url = next(d["url"] for d in service.client.get("/api/drives").json()["drives"] if d["id"] == "simulator")
+    command = [sys.executable, "-m", "commissioner", "run", "--drive", url, "--motor", "motor_2kw2", "--axes", "0", "--yes", "--no-diagnosis",
+               "--runs", str(service.folder / "by_hand"), "--json"]  # fmt: skip
+    before = os.times()
+    subprocess.run(command, check=True, capture_output=True)
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--viewers", type=int, default=20)
+    parser.add_argument("--speed", default="1")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, ServiceProcess(Path(folder) / "s", speed=asked.speed) as service:
+        pid = service.process.pid
+        report: dict[str, object] = {"ready_s": round(service.ready_s, 2), "ready_cpu_s": round(cpu_s(pid), 2)}
+        service.start_simulator()
+        service.wait_over(service.start_run(), 600)
+        memory, through_page = [round(resident_mb(pid), 1)], []
+        for _ in range(asked.runs):
+            before = cpu_s(pid, with_children=True)
+            service.wait_over(service.start_run(), 600)
+            time.sleep(0.5)
+            through_page.append(round(cpu_s(pid, with_children=True) - before, 2))
+            memory.append(round(resident_mb(pid), 1))
+        run = service.client.get("/api/runs").json()["runs"][0]["run"]
+        report |= {"memory_mb": memory, "through_the_service_cpu_s": through_page}
+        report["command_line_cpu_s"] = round(min(command_line_s(service) for _ in range(2)), 2)
+        report["paint_ms"] = paint(service, run)
+        report["watched"] = viewers(service, asked.viewers)
+    print(json.dumps(report))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""`tune` on emulated vendors: each way a tuning can go ends in the right outcome, by the drive's own answer key.
+
+The whole campaign: python -m tests.campaigns.tunings.cases --seeds 4
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from commissioner.errors import CheckFailed
+from commissioner.link.files.drive_file import load_profile
+from commissioner.run import restore as restoring
+from commissioner.run.archive.catalogue import find_run
+from commissioner.run.tuning.tune import TuneOrder, order_of, tune
+from commissioner.settings import load_motor, load_procedure
+from sim.vendors.drive import Habits
+from tests.campaigns.tunings import bench
+from tests.campaigns.tunings.cases import applies, campaign, cases, judge, names
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda case: case.name.replace(" ", "-"))
+def test_a_tuning_ends_in_the_right_outcome_on_every_family(case, tmp_path):
+    wrong = {}
+    for name in names():
+        if applies(case, name):
+            tried = bench.try_tune(name, tmp_path / name, habits=case.habits, seed=1, **case.more)
+            wrong[name] = judge(case, name, tried)
+    assert {name: why for name, why in wrong.items() if why} == {}
+    assert wrong
+
+
+def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monkeypatch):
+    """Check, snapshot, three tunings, write, power cycle, read back; then `restore`, on every family that can be written."""
+    for name in names():
+        if "restore" not in load_profile(name).capabilities:
+            continue
+        tried = bench.try_tune(name, tmp_path / name)
+        assert tried.done.ended.outcome == "commissioned", name
+        assert "proved: the values outlasted a power-off" in tried.done.result["remarks"]
+        assert tried.truth["held"] != tried.before
+        clock = tried.person.clock
+        monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
+        restoring.restore(find_run(tmp_path / name, "last"), None)
+        assert tried.drive.truth()["held"] == tried.before, name
+
+
+def test_a_remote_tune_without_a_known_watchdog_wants_a_hard_wired_stop(tmp_path):
+    profile = load_profile("schneider_atv340")
+    order = order_of("tcp://127.0.0.1:9", profile, load_motor("motor_2kw2"), load_procedure(None), write_back=False)
+    with pytest.raises(CheckFailed, match="nothing would stop the tuning"):
+        tune(TuneOrder(order, 3, 0.0, hardwired_stop=False, power_cycle=False), tmp_path, None, lambda _: None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_drive_whose_watchdog_is_not_fed_while_it_tunes_would_trip_and_one_that_is_does_not(tmp_path):
+    tried = bench.try_tune("schneider_atv340", tmp_path, habits=Habits(watchdog_s=1.0, tuning_s=20.0))
+    assert tried.done.ended.outcome == "commissioned"
+    assert [t["end"] for t in tried.truth["tunings"]] == ["done"] * 3
+
+
+def test_a_result_in_line_to_line_ohm_is_compared_with_the_plate_per_phase(tmp_path):
+    tried = bench.try_tune("yaskawa_a1000", tmp_path)
+    row = next(r for r in tried.done.result["tune"]["rows"] if r["name"] == "stator_resistance")
+    assert row["ours"] == pytest.approx(row["median"] / 2)
+    assert row["conversion"] == "line to line: divided by 2"
+    assert row["plate_low"] < row["ours"] < row["plate_high"]
+    again = bench.try_tune("yaskawa_a1000", tmp_path, seed=2)
+    earlier = next(r for r in again.done.result["tune"]["rows"] if r["name"] == "stator_resistance")["earlier"]
+    assert [e["run"] for e in earlier] == [tried.done.folder.name]
+
+
+def test_every_result_says_that_no_physical_drive_has_proved_it(tmp_path):
+    tried = bench.try_tune("danfoss_fc302", tmp_path)
+    assert "tuning: proved on no physical drive yet" in tried.done.result["remarks"]
+    assert tried.done.result["tune"]["proved_on"] == []
+
+
+def test_a_drive_under_local_control_is_not_tuned(tmp_path):
+    tried = bench.try_tune("danfoss_fc302", tmp_path, habits=replace(Habits(), is_local=True))
+    assert tried.done.ended.outcome == "rejected" and tried.truth["tunings"] == []
+
+
+@pytest.mark.campaign
+def test_at_least_two_hundred_cases_end_as_they_must():
+    rows = list(campaign(range(2, 4)))
+    assert len(rows) >= 200
+    assert [row for row in rows if row[4]] == []

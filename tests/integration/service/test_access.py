@@ -1,0 +1,391 @@
+"""Who may do what: hosts, origins, tokens, roles, passwords, and the audit. The application alone, without a drive."""
+
+import contextlib
+import json
+import re
+import stat
+import subprocess
+import sys
+import time
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+import pytest
+from argon2 import PasswordHasher
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from commissioner.errors import UsageError
+from commissioner.service import parts as service_parts
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.sessions import Sessions
+from commissioner.service.access.throttle import Throttle
+from commissioner.service.application import create_app
+from commissioner.service.audit import Audit, verify
+from commissioner.service.configuration import ServiceFile, Settings, TlsTable, check_may_listen
+
+PASSWORDS = {"vera": "watching 1234", "otto": "operating 1234", "ada": "administering 1234"}
+ROLES = {"vera": Role.VIEWER, "otto": Role.OPERATOR, "ada": Role.ADMINISTRATOR}
+BASE = "http://127.0.0.1:8321"
+RUN = {"drive": "simulator", "motor": "motor_2kw2", "confirm": True}
+
+
+class Clock:
+    """Monotonic seconds that a test moves."""
+
+    def __init__(self):
+        self.s = 100.0
+
+    def __call__(self):
+        return self.s
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory):
+    """Its lifetime is never begun: no child, no task."""
+    folder = tmp_path_factory.mktemp("app")
+    return create_app(service_parts.make_parts(Settings(folder / "runs", folder / "data")))
+
+
+@pytest.fixture
+def parts(app, tmp_path, clock, monkeypatch):
+    cheap = PasswordHasher(time_cost=1, memory_cost=64, parallelism=1)
+    monkeypatch.setattr("commissioner.service.access.accounts.PasswordHasher", lambda: cheap)
+    made = service_parts.make_parts(Settings(tmp_path / "runs", tmp_path / "data"))
+    made.sessions = Sessions(1800.0, clock)
+    made.login_tries = Throttle(service_parts.LOGIN_TRIES, service_parts.LOGIN_WITHIN_S, clock)
+    app.state.parts = made
+    return made
+
+
+@pytest.fixture
+def accounts(parts):
+    for name, role in ROLES.items():
+        parts.accounts.add(name, role, PASSWORDS[name])
+
+
+@pytest.fixture
+def client(app, parts):
+    return TestClient(app, base_url=BASE)
+
+
+@contextlib.contextmanager
+def socket_of(client, **headers):
+    """A page's line; its end in the midst of a message is how pages go."""
+    with (
+        contextlib.suppress(CancelledError),
+        client.websocket_connect("/api/control", headers={"host": "127.0.0.1:8321"} | headers) as made,
+    ):
+        yield made
+
+
+def log_in(client, name):
+    """The token that requests of this session carry."""
+    client.cookies.clear()
+    answer = client.post("/api/login", json={"name": name, "password": PASSWORDS[name]})
+    assert answer.status_code == 200, answer.text
+    return {"x-csrf-token": answer.json()["csrf"]}
+
+
+def refused(answer, status):
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert problem["title"] and problem["step"] and problem["remedy"]
+    return problem
+
+
+# --- where it listens ---------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.7", "::", "panel.local"])
+def test_another_host_needs_tls_and_accounts(tmp_path, host):
+    tls = TlsTable(certificate="c.pem", key="k.pem")
+    plain = Settings(tmp_path, tmp_path, host)
+    sealed = Settings(tmp_path, tmp_path, host, file=ServiceFile(tls=tls))
+    for settings, has_accounts, missing in (
+        (plain, False, ("tls", "account")),
+        (plain, True, ("tls",)),
+        (sealed, False, ("account",)),
+    ):
+        with pytest.raises(UsageError) as error:
+            check_may_listen(settings, has_accounts)
+        assert all(word in error.value.remedy for word in missing)
+    check_may_listen(sealed, True)
+    check_may_listen(Settings(tmp_path, tmp_path, "127.0.0.1"), False)
+
+
+def test_serve_refuses_another_host_before_it_listens(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "commissioner",
+        "serve",
+        "--host",
+        "0.0.0.0",
+        "--port",
+        "0",
+        "--runs",
+        str(tmp_path),
+        "--json",
+    ]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert json.loads(done.stdout)["error"]["value"] == "0.0.0.0"
+
+
+# --- whose page ---------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "localhost.evil", ""])
+def test_a_foreign_host_name_is_refused(client, host):
+    refused(client.get("/api/health", headers={"host": host}), 400)
+    with pytest.raises(WebSocketDisconnect) as closed, client.websocket_connect("/api/control", headers={"host": host}):
+        pass
+    assert closed.value.code == 4403
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "null", "http://127.0.0.1:1", "http://localhost:8321"])
+def test_a_foreign_origin_changes_nothing_and_gets_no_socket(client, origin):
+    for method, path in (
+        ("post", "/api/runs"),
+        ("post", "/api/stop"),
+        ("post", "/stop"),
+        ("post", "/appearance"),
+        ("delete", "/api/accounts/x"),
+    ):
+        refused(getattr(client, method)(path, headers={"origin": origin}), 403)
+    with (
+        pytest.raises(WebSocketDisconnect) as closed,
+        socket_of(client, origin=origin),
+    ):
+        pass
+    assert closed.value.code == 4403
+    refused(client.post("/api/stop", headers={"sec-fetch-site": "cross-site"}), 403)
+
+
+def test_its_own_origin_is_served(client):
+    assert client.post("/api/stop", headers={"origin": BASE}).status_code == 200
+    with socket_of(client, origin=BASE) as socket:
+        assert "band" in json.loads(socket.receive_text())
+
+
+def test_every_answer_is_under_a_policy_without_inline(client):
+    for path in (
+        "/",
+        "/runs",
+        "/audit",
+        "/login",
+        "/drives/simulator",
+        "/runs/none",
+        "/api/health",
+        "/static/js/page.js",
+        "/api/none",
+    ):
+        answer = client.get(path, headers={"accept": "text/html"})
+        policy = answer.headers["content-security-policy"]
+        assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "frame-ancestors 'none'" in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        if answer.headers["content-type"].startswith("text/html"):
+            assert not re.search(r"<[^>]+\s(?:style|on\w+)=", answer.text)
+            assert not re.search(r"<script(?![^>]*\ssrc=)(?![^>]*application/json)", answer.text)
+            assert not re.search(r"""(?:src|href|action)=["']?(?:https?:)?//""", answer.text)
+
+
+def test_a_body_larger_than_any_request_needs_is_refused(client):
+    refused(client.post("/api/checks", content=b"x" * 1_000_001, headers={"content-type": "application/json"}), 413)
+    refused(client.post("/api/checks", content=iter([b"{}"]), headers={"content-type": "application/json"}), 413)
+
+
+# --- tokens and sessions ------------------------------------------------------------------------------------------
+def test_a_session_without_its_token_changes_nothing(client, accounts):
+    token = log_in(client, "ada")
+    for headers in ({}, {"x-csrf-token": "another"}):
+        refused(client.post("/api/runs", json=RUN, headers=headers), 403)
+        refused(
+            client.post(
+                "/api/accounts", json={"name": "eve", "password": "long enough", "role": "viewer"}, headers=headers
+            ),
+            403,
+        )
+        refused(
+            client.post(
+                "/drives", data={"name": "x", "url": "tcp://127.0.0.1:9", "profile": "simulated"}, headers=headers
+            ),
+            403,
+        )
+        refused(client.post("/api/logout", headers=headers), 403)
+    assert client.get("/api/accounts").status_code == 200
+    assert client.post("/api/logout", headers=token).status_code == 200
+    refused(client.get("/api/accounts"), 401)
+
+
+def test_the_cookie_is_out_of_reach_for_scripts_and_other_sites(client, accounts):
+    answer = client.post("/api/login", json={"name": "vera", "password": PASSWORDS["vera"]})
+    cookie = answer.headers["set-cookie"].lower()
+    assert "httponly" in cookie and "samesite=strict" in cookie
+
+
+def test_an_idle_session_ends_and_a_busy_one_after_a_working_day(client, accounts, clock):
+    log_in(client, "vera")
+    clock.s += 1799
+    assert client.get("/api/runs").status_code == 200
+    clock.s += 1801
+    refused(client.get("/api/runs"), 401)
+    log_in(client, "vera")
+    for _ in range(25):
+        clock.s += 1790
+        client.get("/api/runs")
+    refused(client.get("/api/runs"), 401)
+    page = client.get("/runs", headers={"accept": "text/html"}, follow_redirects=False)
+    assert page.headers["location"] == "/login?next=/runs"
+
+
+def test_a_log_in_is_a_new_session(client, accounts):
+    log_in(client, "vera")
+    first = dict(client.cookies)
+    client.post("/api/login", json={"name": "otto", "password": PASSWORDS["otto"]})
+    assert dict(client.cookies) != first
+    client.cookies.clear()
+    client.cookies.update(first)
+    refused(client.get("/api/runs"), 401)
+
+
+def test_wrong_passwords_are_slowed_by_name_and_by_address(client, accounts, clock):
+    for _ in range(5):
+        refused(client.post("/api/login", json={"name": "ada", "password": "guess"}), 401)
+    late = client.post("/api/login", json={"name": "ada", "password": PASSWORDS["ada"]})
+    refused(late, 429)
+    assert int(late.headers["retry-after"]) > 0
+    refused(client.post("/api/login", json={"name": "vera", "password": PASSWORDS["vera"]}), 429)
+    clock.s += 61
+    assert log_in(client, "ada")
+
+
+def test_the_redirect_after_a_log_in_stays_here(client, accounts):
+    for wanted in ("https://evil.example", "//evil.example", "/\\evil.example", "javascript:alert(1)"):
+        form = {"name": "vera", "password": PASSWORDS["vera"], "next": wanted}
+        assert client.post("/login", data=form, follow_redirects=False).headers["location"] == "/"
+
+
+# --- roles --------------------------------------------------------------------------------------------------------
+LOOKS = ("/api/runs", "/api/drives", "/api/motors", "/api/procedures")
+ACTS = (("/api/runs", RUN), ("/api/checks", {"drive": "simulator", "motor": "motor_2kw2"}), ("/api/simulator", {"scenario": "default"}),
+        ("/api/drives", {"id": "lab", "name": "Lab", "url": "tcp://127.0.0.1:9"}), ("/api/runs/x/write-back", {"token": "x"}),
+        ("/api/runs/x/restore", {"token": "x"}), ("/api/drives/simulator/control", {"do": "ask"}))  # fmt: skip
+
+
+def test_nobody_sees_and_does_nothing_but_stop(client, accounts):
+    for path in (*LOOKS, "/api/audit", "/api/accounts"):
+        refused(client.get(path), 401)
+    for path, wish in ACTS:
+        refused(client.post(path, json=wish), 401)
+    assert client.post("/api/stop", json={"reason": "smoke"}).status_code == 200
+    assert client.post("/stop", data={"run": ""}, follow_redirects=False).status_code == 303
+    with socket_of(client) as socket:
+        socket.send_text('{"stop": "smoke"}')
+        while "stopped" not in (said := json.loads(socket.receive_text())):
+            pass
+    assert said["stopped"] == []
+    told = [entry for entry in client.app.state.parts.audit.newest(10) if entry["what"] == "STOP"]
+    assert {entry["by"] for entry in told} == {"POST", "form", "WebSocket"}
+    assert {entry["person"] for entry in told} == {"somebody at a page"}
+
+
+def test_a_viewer_looks_and_an_operator_acts(client, accounts):
+    token = log_in(client, "vera")
+    for path in LOOKS:
+        assert client.get(path).status_code == 200
+    for path, wish in ACTS:
+        assert refused(client.post(path, json=wish, headers=token), 403)["value"] == "role viewer"
+    refused(client.get("/api/audit"), 403)
+    page = client.get("/drives/simulator", headers={"accept": "text/html"})
+    assert page.status_code == 403 and "Take its plate" not in page.text
+    token = log_in(client, "otto")
+    assert client.get("/api/audit").status_code == 200
+    assert refused(client.post("/api/runs", json=RUN, headers=token), 409)["title"] == "the simulator is not running"
+    for answer in (client.get("/api/accounts"), client.delete("/api/accounts/vera", headers=token)):
+        assert refused(answer, 403)["limit"] == "role administrator"
+
+
+def test_an_administrator_adds_and_removes_accounts(client, accounts):
+    token = log_in(client, "ada")
+    wish = {"name": "eve", "password": "long enough", "role": "viewer"}
+    assert client.post("/api/accounts", json=wish, headers=token).status_code == 201
+    refused(client.post("/api/accounts", json=wish, headers=token), 422)
+    refused(client.post("/api/accounts", json=wish | {"name": "short", "password": "short"}, headers=token), 422)
+    assert "password" not in json.dumps(client.get("/api/accounts").json())
+    other = TestClient(client.app, base_url=BASE)
+    assert other.post("/api/login", json={"name": "eve", "password": "long enough"}).status_code == 200
+    assert other.get("/api/runs").status_code == 200
+    assert client.delete("/api/accounts/eve", headers=token).status_code == 200
+    refused(other.get("/api/runs"), 401)
+    refused(client.delete("/api/accounts/eve", headers=token), 422)
+
+
+def test_whoever_sits_at_the_computer_is_operator_until_there_is_an_account(client, parts):
+    assert client.get("/api/audit").status_code == 200
+    refused(client.get("/api/accounts"), 403)
+    parts.accounts.add("ada", Role.ADMINISTRATOR, PASSWORDS["ada"])
+    refused(client.get("/api/audit"), 401)
+
+
+# --- what is written down -----------------------------------------------------------------------------------------
+def test_the_audit_is_a_chain_that_only_grows(tmp_path):
+    path = tmp_path / "audit.jsonl"
+    audit = Audit(path)
+    for number in range(5):
+        audit.write("ada", "127.0.0.1", f"did {number}")
+    Audit(path).write("ada", "127.0.0.1", "after a restart")
+    whole = path.read_bytes()
+    assert verify(path).is_intact and verify(path).lines == 6
+    lines = whole.decode("utf-8").splitlines(keepends=True)
+    for broken, at in (
+        (lines[:2] + lines[3:], 2),
+        ([*lines[:2], lines[2].replace("did 2", "did 9"), *lines[3:]], 2),
+        ([*lines[:2], lines[3], lines[2], *lines[4:]], 2),
+        ([*lines[:2], lines[2], lines[2], *lines[3:]], 3),
+    ):
+        path.write_text("".join(broken), encoding="utf-8")
+        assert verify(path).broken_at == at
+    path.write_bytes(whole[:-20])
+    Audit(path).write("ada", "", "after a power loss")
+    assert verify(path).broken_at == 5
+
+
+def test_no_route_takes_anything_from_the_audit(client):
+    paths = client.get("/openapi.json").json()["paths"]
+    assert set(paths["/api/audit"]) == {"get"}
+
+
+def test_secrets_are_nowhere_but_hashed(client, accounts, parts, tmp_path):
+    token = log_in(client, "ada")
+    client.post("/api/accounts", json={"name": "eve", "password": "a secret of eve", "role": "viewer"}, headers=token)
+    client.post("/api/login", json={"name": "ada", "password": "a wrong secret"})
+    client.get("/audit", headers={"accept": "text/html"})
+    secrets = [
+        *PASSWORDS.values(),
+        "a secret of eve",
+        "a wrong secret",
+        token["x-csrf-token"],
+        *dict(client.cookies).values(),
+    ]
+    for path in Path(tmp_path).rglob("*"):
+        if path.is_file():
+            text = path.read_text("utf-8", "replace")
+            assert not [secret for secret in secrets if secret in text], path
+    file = tmp_path / "data" / "accounts.json"
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert file.read_text("utf-8").count("$argon2id$") == 4
+
+
+def test_an_unknown_name_takes_as_long_as_a_wrong_password(parts, accounts):
+    def seconds(name):
+        began = time.process_time()
+        for _ in range(3):
+            assert parts.accounts.verify(name, "wrong password") is None
+        return time.process_time() - began
+
+    seconds("ada")
+    assert seconds("nobody") > 0.2 * seconds("ada")

@@ -1,0 +1,173 @@
+"""A technician at the page: Debian's chromium, driven by playwright, and what a hand does in each view.
+
+with chromium() as browser, technician(browser, service) as hand:
+    hand.commission()
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+
+from tests.support.service_process import ServiceProcess
+
+CHROMIUM = "/usr/bin/chromium"
+AXE = Path(__file__).parent.parent / "data" / "axe_core" / "axe.min.js"
+SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
+SLOW_MS = 240_000
+"""A simulated drive beside other work on the host."""
+WORDS = {
+    "en": {"try": "Try it without a drive", "check": "Check the drive", "what": "What will happen", "see": "See what would be written",
+           "write": re.compile("Write these . values"), "written": re.compile("Written and read back"), "energised": "MOTOR ENERGISED",
+           "restore": "Restore the old values", "restore all": re.compile("Restore these . values"), "restored": re.compile("Restored"),
+           "off": "Motor not energised", "passed": re.compile("Every parameter is within")},
+    "de": {"try": "Ohne Umrichter ausprobieren", "check": "Umrichter prüfen", "what": "Was geschehen wird", "see": "Zeigen, was geschrieben würde",
+           "write": re.compile("Diese . Werte schreiben"), "written": re.compile("Geschrieben und zurückgelesen"), "energised": "MOTOR BESTROMT",
+           "restore": "Alte Werte zurückschreiben", "restore all": re.compile("Diese . Werte zurückschreiben"),
+           "restored": re.compile("Zurückgeschrieben"), "off": "Motor nicht bestromt", "passed": re.compile("Alle Parameter liegen")},
+}  # fmt: skip
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """One browser; its contexts are its users."""
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*arguments, "--disable-gpu"])
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+class Technician:
+    """One person's browser. `complaints`: what its console said, and every request to another machine."""
+
+    def __init__(self, page: Page, service: ServiceProcess, language: str) -> None:
+        self.page, self.service, self.words = page, service, WORDS[language]
+        self.complaints: list[str] = []
+        page.on("console", self._hear)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on(
+            "request",
+            lambda request: (
+                request.url.startswith((service.url, "data:", "blob:")) or self.complaints.append(request.url)
+            ),
+        )
+        page.set_default_timeout(SLOW_MS)
+
+    def _hear(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning") and "the server responded with a status of 4" not in message.text:
+            self.complaints.append(message.text)
+
+    def go(self, path: str) -> None:
+        self.page.goto(self.service.url + path)
+
+    def size(self, name: str) -> None:
+        width, height = SIZES[name]
+        self.page.set_viewport_size({"width": width, "height": height})
+
+    def button(self, word: str) -> None:
+        """Press the button or link of this name."""
+        name = self.words.get(word, word)
+        self.page.locator("main").get_by_role("button", name=name).or_(
+            self.page.locator("main").get_by_role("link", name=name)
+        ).first.click()
+
+    # --- the work, step by step ------------------------------------------------------------------------------------
+    def choose_simulator(self) -> None:
+        self.go("/")
+        self.button("try")
+        expect(self.page.locator("#plate")).to_be_visible(timeout=120_000)
+
+    def check(self) -> None:
+        """The plate as it is, then the checks."""
+        self.button("check")
+        expect(self.page).to_have_url(re.compile("/checks"), timeout=SLOW_MS)
+
+    def see_what_will_happen(self) -> None:
+        self.button("what")
+        expect(self.page.locator("#energise")).to_be_visible()
+        expect(self.page.locator("#hold")).to_be_visible(timeout=180_000)
+
+    def confirm(self) -> None:
+        for box in self.page.locator(".must").all():
+            box.check()
+
+    def hold(self, milliseconds: float = 2300) -> None:
+        """Press the button, hold it, let go."""
+        self.page.locator("#hold").hover()
+        self.page.mouse.down()
+        self.page.wait_for_timeout(milliseconds)
+        self.page.mouse.up()
+
+    def energise(self) -> str:
+        """From the start page to a running test; the run's id."""
+        self.choose_simulator()
+        self.check()
+        self.see_what_will_happen()
+        self.confirm()
+        self.hold()
+        expect(self.page).to_have_url(re.compile("/runs/"), timeout=SLOW_MS)
+        return self.page.url.rsplit("/", 1)[1]
+
+    def wait_energised(self) -> None:
+        expect(self.page.locator("#big")).to_have_text(str(self.words["energised"]), timeout=SLOW_MS)
+
+    def wait_result(self, timeout_ms: float = 600_000) -> None:
+        expect(self.page.locator(".verdict")).to_be_visible(timeout=timeout_ms)
+
+    # --- judging ---------------------------------------------------------------------------------------------------
+    def violations(self) -> list[str]:
+        """What axe finds: WCAG 2.2 A and AA and its best practices; all folds opened."""
+        for fold in self.page.locator("details:not([open]) > summary").all():
+            fold.click()
+        self.page.evaluate(AXE.read_text("utf-8") + "\n;0")
+        found: dict[str, Any] = self.page.evaluate(
+            "() => axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })"
+        )
+        return [
+            json.dumps(
+                {
+                    "rule": v["id"],
+                    "help": v["help"],
+                    "nodes": [n["html"][:160] + " | " + n["failureSummary"][:200] for n in v["nodes"][:4]],
+                }
+            )
+            for v in found["violations"]
+        ]
+
+    def overflow(self) -> int:
+        """Pixels by which the page is wider than its window."""
+        return int(self.page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth"))
+
+    def stop_is_in_view(self) -> bool:
+        """STOP, whole, inside the window and not covered."""
+        return bool(
+            self.page.evaluate(
+                """() => { const s = document.querySelector('#stop'), b = s.getBoundingClientRect();
+                const top = document.elementFromPoint(b.x + b.width / 2, b.y + b.height / 2);
+                return b.top >= 0 && b.left >= 0 && b.bottom <= innerHeight && b.right <= innerWidth && b.height >= 44 && s.contains(top) && !s.disabled; }"""
+            )
+        )
+
+
+@contextmanager
+def technician(
+    browser: Browser, service: ServiceProcess, language: str = "en", size: str = "1280", **more: Any
+) -> Iterator[Technician]:
+    """A browser of its own, with its own cookies."""
+    width, height = SIZES[size]
+    locale = {"en": "en-GB", "de": "de-DE"}[language]
+    context = browser.new_context(viewport={"width": width, "height": height}, locale=locale, timezone_id="UTC", **more)
+    try:
+        yield Technician(context.new_page(), service, language)
+    finally:
+        context.close()

@@ -1,0 +1,201 @@
+"""The run's report for every way a run can end: what stands on the first page, and what must never stand there."""
+
+import json
+import re
+
+import pytest
+
+from commissioner.procedure.steps import Findings
+from commissioner.report.run.page import run_page
+
+PLAN = {
+    "axes_deg": [0.0, 60.0], "repeat_first": True, "supervision": {"watchdog_s": 0.5},
+    "limits": {"current_fraction": 1.0, "trip_fraction": 1.4, "flux_fraction": 0.9}, "excitation": {"seconds": 4.6},
+    "acceptance": {
+        "resistance_std_percent": 1.0, "leakage_std_percent": 2.0, "rotor_resistance_std_percent": 3.0,
+        "magnetizing_std_percent": 3.0, "axis_spread_percent": 6.0,
+    },
+}  # fmt: skip
+PLATE = {
+    "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0, "rated_speed_rpm": 1436.0,
+    "power_factor": 0.8, "pole_pairs": 2, "connection": "star",
+}  # fmt: skip
+DRIVE = {
+    "drive_type": "SIM-INV-7A", "serial_number": 7, "firmware_version": "1.2.3", "map_version": 1, "rated_drive_current_a": 7.0,
+    "control_period_s": 2e-4, "switching_frequency_hz": 5000.0,
+}  # fmt: skip
+VALUES = {
+    "stator_resistance_ohm": (3.716, 0.005, 3.2), "rotor_resistance_ohm": (2.1847, 0.0016, 1.8),
+    "leakage_inductance_h": (0.021486, 0.000013, 0.026), "magnetizing_inductance_h": (0.30908, 0.00026, 0.2),
+}  # fmt: skip
+
+
+def line(kind, record, utc="2026-11-25T10:00:00.000000+00:00"):
+    return {"kind": kind, "utc": utc, "record": record}
+
+
+JOURNAL = [
+    line("run_started", {"person": "operator 1", "host": "panel", "local_time": "2026-11-25 11:00:00+01:00"}),
+    line("job", {"plan": PLAN, "nameplate": PLATE}),
+    line("parameters_written", {"written": [], "is_stored": True}),
+    line("run_ended", {"outcome": "x", "reason": "y"}, "2026-11-25T10:01:05.000000+00:00"),
+]
+
+
+def result(outcome="commissioned", *, written=True, **more):
+    names = list(VALUES)
+    document = {
+        "run": "20261125-100000-x-abcdef", "outcome": outcome, "reason": "every parameter is within its acceptance", "error": None,
+        "energised_s": 46.9, "drive": DRIVE, "before": {name: old for name, (_, _, old) in VALUES.items()},
+        "checks": [{"name": "no fault", "has_passed": True, "value": "none", "limit": "none", "remedy": ""}],
+        "written": [
+            {"name": n, "field": n, "register": 576 + 2 * k, "before": VALUES[n][2], "after": VALUES[n][0], "read_back": VALUES[n][0]}
+            for k, n in enumerate(names)
+        ] if written else [],
+        "objections": [], "parameters": {n: {"value": v, "std": s} for n, (v, s, _) in VALUES.items()}, "remarks": [],
+        "diagnosis": None, "flux_guard": {"peak_fraction": 0.915, "limit_wb": 0.877, "acted": False},
+        "holds_for_stator_flux_wb": 0.716, "rated_flux_wb": {"stator_rms": 0.689, "stator_peak": 0.974},
+        "magnetizing_curve": [
+            {"stator_flux_wb": 0.04, "magnetizing_inductance_h": {"value": 0.318, "std": 0.0004}},
+            {"stator_flux_wb": 0.802, "magnetizing_inductance_h": {"value": 0.29877, "std": 0.0003}},
+        ],
+        "dispersion": {"stator_resistance_ohm": 0.0031}, "gaps": {"count": 0, "lost_samples": 0},
+        "t_model": {"assumption": "equal leakage (L_s = L_r)"} | {
+            n: {"value": 1.0, "std": 0.0}
+            for n in ("stator_resistance_ohm", "rotor_resistance_ohm", "stator_leakage_h", "rotor_leakage_h", "magnetizing_inductance_h")
+        },
+    }  # fmt: skip
+    return document | more
+
+
+def first_page(document, journal=JOURNAL, request=None):
+    page = run_page(document, journal, Findings(), request, "ab" * 32)
+    return re.search(r'<section class="pg" id="result">.*?</section><section class="pg', page, re.S).group(0), page
+
+
+def words(markup):
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", markup))
+
+
+def test_a_good_run_shows_value_interval_old_change_register_and_what_to_do_next():
+    first, page = first_page(result())
+    text = words(first)
+    assert "Commissioned: four values accepted, written and read back" in text
+    assert "3.7160 ± 0.0098 Ω" in text
+    assert "± 0.26 %" in text
+    assert "+16.1 %" in text
+    assert "commissioner restore 20261125-100000-x-abcdef" in text
+    assert "stator flux of 0.716 Wb peak, 74 % of rated" in text
+    assert "1.77 A rms" in text  # 0.802 Wb / (298.77 + 21.486 mH) / sqrt 2
+    assert 'content: "SHA-256 of result.json: abababababababababab' in page
+
+
+def test_what_a_person_told_is_shown_and_what_nobody_told_is_a_line_to_write_on():
+    said = {"origin": {"motor_tag": "P-17", "motor_serial": "0471", "place": "hall 3"}}
+    first, page = first_page(result(), request=said)
+    assert "P-17" in words(first)
+    assert "operator 1, hall 3" in words(first)
+    assert "Commissioning report, motor P-17" in page
+    assert first_page(result())[0].count('class="fill"') == 3
+    later = [*JOURNAL, line("motor_named", {"motor_tag": "P-18"})]
+    assert "P-18" in words(first_page(result(), later, said)[0])
+
+
+def test_a_simulated_run_says_so_on_every_printed_page_and_a_real_one_does_not():
+    assert '@top-center { content: "Simulated drive and motor" }' in first_page(result())[1]
+    real = result(drive=DRIVE | {"drive_type": "ACME-1"})
+    assert "Simulated drive" not in first_page(real)[1]
+
+
+def test_an_accepted_run_that_wrote_nothing_does_not_say_written():
+    text = words(first_page(result(written=False))[0])
+    assert "Accepted, not written: the drive holds its old values" in text
+    assert "commissioner write-back" in text
+    assert "not written" in text
+
+
+def test_a_rejected_run_says_what_to_do_before_anything_else_and_no_value_looks_usable():
+    objection = {
+        "what": "rotor_resistance_ohm is too uncertain", "value": "4.0 % standard error", "limit": "3 %", "remedy": "lengthen the test",
+    }  # fmt: skip
+    first, _ = first_page(
+        result("rejected", written=False, objections=[objection], reason="rotor_resistance_ohm is too uncertain")
+    )
+    text = words(first)
+    assert "Not good enough: nothing written" in text
+    assert text.index("Do this") < text.index("Why") < text.index("Motor")
+    assert "Lengthen the test." in text
+    assert "not to be used" in text
+    assert 'class="val"' not in first
+
+
+@pytest.mark.parametrize(
+    ("outcome", "title"),
+    [("aborted", "Aborted: nothing written"), ("faulted", "Broken off by a fault: nothing written")],
+)
+def test_a_run_that_ended_early_names_step_value_limit_and_remedy(outcome, title):
+    error = {
+        "what": "the flux reached its limit",
+        "step": "flux guard",
+        "value": 0.884,
+        "limit": 0.877,
+        "remedy": "compare the connection with the plate",
+    }
+    bare = result(outcome, written=False, error=error, parameters={}, reason="the flux reached its limit")
+    for name in ("magnetizing_curve", "t_model", "rated_flux_wb", "holds_for_stator_flux_wb", "dispersion", "gaps"):
+        del bare[name]
+    text = words(first_page(bare)[0])
+    assert title in text
+    for told in ("flux guard", "0.884", "0.877", "Compare the connection with the plate."):
+        assert told in text
+
+
+def test_a_fault_after_writing_says_how_to_get_the_old_values_back():
+    text = words(first_page(result("faulted", error={"what": "x", "remedy": "look"}))[0])
+    assert "nothing written" not in text
+    assert "commissioner restore" in text
+
+
+def test_a_value_that_the_drive_holds_otherwise_is_marked():
+    document = result()
+    document["written"][0]["read_back"] = 3.7
+    assert "not 3.716" in words(first_page(document)[0])
+
+
+def test_a_diagnosis_is_told_with_its_sizes_and_one_that_was_stopped_is_not():
+    diagnosis = {
+        "verdict": "explained", "reason": "r", "moved": [], "remarks": [], "is_complete": True,
+        "gain": {"rmse_before_a": 0.285, "rmse_after_a": 0.0125, "noise_floor_a": 0.0104, "held_out": 0.9994},
+        "causes": [{
+            "name": "dead_time", "title": "Dead time of the legs", "equivalent": ["device_drop"], "confidence": 0.99989, "strength_over_noise": 27.0,
+            "parameters": {"voltage_v": {"value": 7.7626, "std": 0.0257, "unit": "V"}, "unequal_v": {"value": 0.0002, "std": 3e-5, "unit": "1"}},
+        }],
+        "parameters_before": {"stator_resistance_ohm": {"value": 9.5, "std": 1e-4}},
+        "parameters_after": {"stator_resistance_ohm": {"value": 3.737, "std": 0.019}},
+        "detection_limits": {"iron_loss": {"conductance_ms": {"value": 0.22, "unit": "mS"}}, "dead_time": {"v": {"value": 1.0, "unit": "V"}}},
+        "cannot_tell": ["a | b"],
+        "next_experiment": {"steps": ["Halve it.", "Read both together:"], "command": "commissioner diagnose a b", "changes_values": "No."},
+    }  # fmt: skip
+    text = words(run_page(result(diagnosis=diagnosis), JOURNAL, Findings()))
+    for told in (
+        "7.763 ± 0.050 V",
+        "unequal v 0.0200 ± 0.0059 %",
+        "99.9 %",
+        "+156 %",
+        "0.22 mS",
+        "commissioner diagnose a b",
+        "285 mA",
+    ):
+        assert told in text, told
+    assert "Dead time 1" not in text  # found, so no limit is told
+    stopped = words(run_page(result(diagnosis=diagnosis | {"is_complete": False}), JOURNAL, Findings()))
+    assert "was stopped" in stopped
+    assert "7.763" not in stopped
+
+
+def test_text_from_drive_plate_and_person_is_escaped():
+    evil = "<img src=x onerror=alert(1)>"
+    document = result(drive=DRIVE | {"drive_type": evil, "firmware_version": evil}, reason=evil)
+    page = run_page(document, JOURNAL, Findings(), {"origin": {"motor_tag": evil, "place": evil, "cable": evil}})
+    assert "<img" not in page
+    assert json.dumps(evil)[1:-1] not in page

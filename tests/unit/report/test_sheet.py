@@ -1,0 +1,113 @@
+"""A sheet's numbers, drawings and form."""
+
+import re
+
+import numpy as np
+import pytest
+from markupsafe import Markup
+
+from commissioner.report.sheet import marks
+from commissioner.report.sheet.document import Margins, Page, document
+from commissioner.report.sheet.drawing import Panel, envelope, padded, ticks
+from commissioner.report.sheet.numbers import digits, fixed, held, interval, like, signed, with_interval
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "shown"),
+    [
+        (3.71598, 0.0098, "3.7160 ± 0.0098"),
+        (309.08, 0.50, "309.08 ± 0.50"),
+        (309.08, 0.0996, "309.08 ± 0.10"),
+        (309.08, 12.3, "309 ± 12"),
+        (-0.4886, 0.0049, "−0.4886 ± 0.0049"),
+        (21.486, 0.0, "21.5"),
+    ],
+)
+def test_an_interval_has_two_digits_and_the_value_ends_where_it_ends(value, half, shown):
+    assert with_interval(value, half) == shown
+
+
+def test_an_old_value_takes_the_places_of_the_new_one():
+    assert like(3.2, 0.0098) == "3.2000"
+    assert interval(1.0, float("nan")) == ("1.00", "")
+
+
+def test_no_minus_before_nothing_and_a_true_minus_elsewhere():
+    assert fixed(-0.0001, 2) == "0.00"
+    assert signed(-2.5, 2) == "−2.5"
+    assert signed(2.5, 2) == "+2.5"
+
+
+def test_two_neighbouring_floats_of_32_bits_are_told_apart_and_one_is_itself():
+    one = np.float32(3.7159)
+    other = np.nextafter(one, np.float32(4))
+    assert held(float(one)) != held(float(other))
+    assert held(float(np.float32(3.71596157))) == held(float(np.float32(3.71596146)))
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(0.0, "0"), (1234.5, "1234"), (0.00012, "0.000120"), (float("inf"), "not finite")]
+)
+def test_digits_without_an_exponent(value, shown):
+    assert digits(value, 3) == shown
+
+
+def test_ticks_are_round_and_inside():
+    assert ticks(0.0, 12.2, 3) == [0.0, 5.0, 10.0]
+    assert ticks(-11.7, 11.7, 5) == [-10.0, -5.0, 0.0, 5.0, 10.0]
+    assert ticks(1.0, 1.0) == [1.0]
+
+
+def test_a_range_is_never_empty():
+    assert padded([2.0, 2.0])[0] < 2.0 < padded([2.0, 2.0])[1]
+    assert padded([]) == (-1.0, 1.0)
+
+
+def test_an_envelope_keeps_the_extremes_of_each_window():
+    time = np.arange(1000) * 1e-3
+    value = np.sin(2 * np.pi * 50 * time)
+    _, low, high = envelope(time, value, 0.02)
+    assert low.min() == value.min()
+    assert high.max() == value.max()
+    assert low.size == 50
+
+
+def test_a_panel_draws_its_limit_where_the_scale_has_it():
+    panel = Panel(100, 50, (0.0, 1.0), (0.0, 10.0), "x", left=0, right=0, top=0, bottom=0).level(7.5)
+    assert 'd="M0 12.50H100"' in str(panel.drawn())
+
+
+def test_values_that_are_not_finite_interrupt_a_line():
+    panel = Panel(100, 50, (0.0, 3.0), (0.0, 1.0), "x").line([0, 1, 2, 3], [0.0, float("nan"), 1.0, 1.0])
+    assert str(panel.drawn()).count("M") == 2
+
+
+def test_text_is_escaped_wherever_it_stands():
+    evil = "<img src=x onerror=alert(1)>\"'</style>"
+    margins = Margins(evil, evil, evil, evil, evil)
+    body = (
+        marks.facts([(evil, evil)])
+        + marks.table([marks.Column(evil), marks.Column("b")], [(evil, evil)])
+        + marks.coded(evil)
+    )
+    body += (
+        marks.actions([evil])
+        + marks.unchecked([evil])
+        + marks.strip([(evil, evil, evil)])
+        + marks.figure(evil, Markup(""), evil)
+    )
+    body += Panel(9, 9, (0, 1), (0, 1), evil).text(1, 1, evil).drawn()
+    text = document(evil, margins, [Page("a", evil, body)])
+    assert "<img" not in text
+    assert text.count("</style>") == 1
+
+
+def test_nothing_is_loaded_from_elsewhere():
+    text = document("t", Margins("s", "m", "r", "", ""), [Page("a", "A", Markup("<p>x</p>"))])
+    assert "http" not in text
+    assert all(
+        source.startswith("data:")
+        for source in re.findall(r"url\(([^)]*)\)", text)
+        if source.startswith(("data", "h", "/"))
+    )
+    assert 'counter(page) " of " counter(pages)' in text
