@@ -46,7 +46,7 @@ NOT_REALTIME = (
 TOGETHER = ("integration/service",)
 """Folders whose tests share a costly fixture of a whole session: one worker has them all."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
-"""CPU seconds of the tests that take one or more, as `tests/support/durations.py` writes them."""
+"""CPU seconds of the tests that take one or more, as `tests/support/suite/durations.py` writes them."""
 USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 """What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from commissioner.errors import RequestRefused
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.checks import DriveLimits, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.procedure.verdict import PARAMETERS
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
+from commissioner.run.acting import CHANNELS
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
 
@@ -24,6 +27,8 @@ LOST_SAMPLES_S = 0.05
 FLUX_FRACTION = 1.1
 """Of the guard's own limit: the guard acts first, the watch is the second line."""
 LATENCY_PROBES = 20
+PACE_PROBES = 5
+"""Only a link whose fastest answer is too slow is surely too slow: the others of a busy host are none of its own."""
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
 
@@ -53,7 +58,24 @@ def make_job(
         parameter_factors=factors,
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
+        pace=_pace(profile, port),
     )
+
+
+def _pace(profile: DriveProfile, port: ModbusPort) -> StreamPace | None:
+    """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now."""
+    layout = profile.window
+    if layout is None:
+        return None
+    times_s = []
+    for _ in range(PACE_PROBES):
+        began_s = time.monotonic()
+        try:
+            port.read(layout.address, layout.words)
+        except RequestRefused:
+            return None
+        times_s.append(time.monotonic() - began_s)
+    return StreamPace(min(times_s), layout.data_registers // len(CHANNELS), layout.words)
 
 
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:

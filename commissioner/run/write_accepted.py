@@ -18,8 +18,8 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import ParameterSnapshot
-from commissioner.registers.convention import drive_values
+from commissioner.records import ParameterSnapshot, drive_words
+from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
@@ -28,7 +28,6 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
-from commissioner.run.job import parameter_names
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -96,9 +95,9 @@ def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, f
     ready = _ready(run, url)
     with _drive(ready) as inverter:
         snapshot = inverter.snapshot()
-    names = parameter_names(ready.profile)
-    held = {names[name]: value for name, value in snapshot.in_use.items() if name in names}
-    return f"{snapshot.identity.drive_type} #{snapshot.identity.serial_number}", held
+    ours = our_values(ready.profile, snapshot.in_use, ready.plate)
+    held = {one.field: one.value for one in ours.values()}
+    return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:

@@ -301,3 +301,31 @@ def test_a_sweep_and_a_square_wave_are_not_one_tone():
 def test_noise_of_a_third_of_the_current_is_no_unbalanced_sum():
     result = identify(recording(noise=0.3))
     assert np.all(np.abs(np.array(result.parameters.as_tuple()) - TRUTH) < 4.0 * np.array(result.std))
+
+
+def two_tests(seed=1):
+    """One axis after the other in one recording."""
+    first, second = recording(axis_deg=0.0, seed=seed), recording(axis_deg=60.0, seed=seed + 1)
+    last = first.time_s[-1] + PERIOD_S
+    columns = ("axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
+    return first, dataclasses.replace(
+        first,
+        time_s=np.concatenate([first.time_s, last + second.time_s]),
+        segment=np.concatenate([first.segment, second.segment + 1]),
+        **{name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in columns},
+    )
+
+
+def test_a_fit_of_the_same_samples_is_taken_over_and_changes_no_bit():
+    first, whole = two_tests()
+    look = identify(first, estimator="nls", is_final=False)
+    anew, taken_over = identify(whole), identify(whole, earlier=look)
+    assert taken_over.fits[0] is look.fits[0]
+    assert anew.parameters == taken_over.parameters
+    assert np.array_equal(anew.covariance, taken_over.covariance)
+
+
+def test_a_fit_of_other_samples_is_not_taken_over():
+    _, whole = two_tests()
+    look = identify(recording(axis_deg=0.0, seed=7), estimator="nls", is_final=False)
+    assert identify(whole, earlier=look).parameters == identify(whole).parameters

@@ -7,7 +7,9 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.bound import cramer_rao
+from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.foresight import Foresight
 from commissioner.identify.batch.model import SHARED, ModelChoice, start_theta
 from commissioner.identify.batch.problem import Problem
 from commissioner.identify.batch.segments import Segment
@@ -183,3 +185,43 @@ def test_white_noise_is_white_and_a_missing_cause_is_not():
     assert np.mean(statistics) == pytest.approx(8.0, abs=4 * 4 / np.sqrt(200))
     wave = 0.5 * np.sin(np.arange(20000) / 40)
     assert not whiteness([rng.standard_normal(20000) + wave]).is_white
+
+
+def two_late_segments():
+    """Two stretches with an offset each, the current 60 us late and noisy."""
+    voltage = multitone(TONES, 6.0, PERIOD_S)
+    late = np.concatenate([np.zeros(3), np.repeat(voltage, 10)[:-3]])
+    current = linear_response(TRUTH, late, PERIOD_S / 10)[0][::10]
+    current = current + 0.02 * np.random.default_rng(5).standard_normal(current.size)
+    return [
+        Segment(voltage[:15000], current[:15000] + 0.05, 0.0, False),
+        Segment(voltage[15000:], current[15000:] - 0.05, 0.0, False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("have", "other"),
+    [
+        (ModelChoice(with_delay=False, with_drift=True), ModelChoice(with_delay=True, with_drift=True)),
+        (ModelChoice(with_delay=True, with_drift=False), ModelChoice(with_delay=True, with_drift=True)),
+        (ModelChoice(with_delay=True, with_drift=True), ModelChoice(with_delay=False, with_drift=True)),
+        (ModelChoice(with_delay=True, with_drift=True), ModelChoice(with_delay=True, with_drift=False)),
+        (ModelChoice(with_delay=True), ModelChoice(extra_powers=1, with_delay=True)),
+    ],
+    ids=["delay", "drift", "no delay", "no drift", "iron"],
+)
+def test_what_another_model_will_come_to_is_foreseen_from_one_evaluation(have, other):
+    """Its gain or loss in the criterion, beside what fitting it gives; thousands for the delay, none for the iron."""
+    parts = two_late_segments()
+    fit = fit_segments(parts, PERIOD_S, START, have)
+    everything = ModelChoice(extra_powers=other.extra_powers, with_delay=True, with_drift=True)
+    theta = np.append(fit.theta, np.zeros(everything.size - fit.theta.size))
+    seen = Foresight.at(Problem(parts, PERIOD_S, everything), theta, fit.own)
+    assert seen.criterion(have) == pytest.approx(fit.criterion(), abs=0.1)
+    gained = fit_segments(parts, PERIOD_S, START, other).criterion() - fit.criterion()
+    assert seen.criterion(other) - seen.criterion(have) == pytest.approx(gained, rel=0.15, abs=0.5)
+
+
+def test_the_model_that_made_the_samples_is_chosen():
+    chosen = select_model(two_late_segments(), PERIOD_S, [START, InverseGamma(*TRUTH)], None).model
+    assert (chosen.with_delay, chosen.with_drift, chosen.extra_powers, chosen.leg) == (True, True, 0, None)

@@ -1,4 +1,4 @@
-"""Compile the kernels once, before several workers would each compile them: `python -m tests.support.warm`.
+"""Compile the kernels once, before several workers would each compile them: `python -m tests.support.suite.warm`.
 
 Two processes side by side: one diagnoses a short blind recording, the other identifies, monitors and starts the simulator.
 A kernel that only a few tests need is left to them.
@@ -43,7 +43,7 @@ PARTS: dict[str, Callable[[], None]] = {"diagnosing": diagnosing, "running": run
 
 
 def main() -> int:
-    children = [subprocess.Popen([sys.executable, "-m", "tests.support.warm", name]) for name in PARTS]
+    children = [subprocess.Popen([sys.executable, "-m", "tests.support.suite.warm", name]) for name in PARTS]
     return max(child.wait() for child in children)
 
 

@@ -1,7 +1,7 @@
-"""What each test costs: `pytest -p tests.support.durations --costs FILE` writes CPU seconds, children's included.
+"""What each test costs: `pytest -p tests.support.suite.durations --costs FILE` writes CPU seconds, children's included.
 
 CPU seconds also hold on a busy host. `tests/conftest.py` begins the costliest first, from the table kept under `.ci/`; of
-several workers each adds what it ran. `python -m tests.support.durations` makes that table anew, from a whole run.
+several workers each adds what it ran. `python -m tests.support.suite.durations` makes that table anew, from a whole run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pytest
 from filelock import FileLock
 
 KEPT_FROM_S = 1.0
-TABLE = Path(__file__).parents[2] / ".ci" / "costs.json"
+TABLE = Path(__file__).parents[3] / ".ci" / "costs.json"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -53,4 +53,4 @@ def _cpu_s() -> float:
 
 if __name__ == "__main__":
     TABLE.unlink(missing_ok=True)
-    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.durations", "--costs", TABLE]))
+    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.suite.durations", "--costs", TABLE]))
