@@ -215,7 +215,10 @@ def tune(
 @app.command()
 def identify(
     files: Annotated[
-        list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")
+        list[Path],
+        typer.Argument(
+            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE."
+        ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
@@ -276,7 +279,7 @@ def diagnose(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Standstill recordings of one motor, or tables of locked-rotor or no-load points: columns frequency_hz, "
+            help="Recordings of one motor, at standstill or running (a start tells most), or tables of locked-rotor or no-load points: columns frequency_hz, "
             "voltage_line_v, current_line_a, power_w, and winding_resistance_uv_ohm where it is known."
         ),
     ],
