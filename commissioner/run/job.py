@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import DriveLimits
@@ -37,9 +38,7 @@ def open_drive(url: str, profile: DriveProfile, plan: ProcedurePlan) -> Iterator
         port.close()
 
 
-def make_job(
-    profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, port: ModbusPort, *, write_back: bool
-) -> Job:
+def make_job(profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, port: Port, *, write_back: bool) -> Job:
     """The job with the link's measured latency: what the guard predicts across."""
     inverter = Inverter(port, profile)
     for _ in range(LATENCY_PROBES):
