@@ -47,7 +47,8 @@ TOGETHER = ("integration/service",)
 """Folders whose tests share a costly fixture of a whole session: one worker has them all."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
 """CPU seconds of the tests that take one or more, as `tests/support/durations.py` writes them."""
-USUAL_S = 0.1
+USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
+"""What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -71,7 +72,8 @@ def _costliest_first(items: list[pytest.Item]) -> None:
         mark = item.get_closest_marker("xdist_group")
         group = str(mark.args[0]) if mark else item.nodeid
         groups[group].append(item)
-        cost[group] += costs.get(item.nodeid, USUAL_S)
+        is_whole = item.path.is_relative_to(TESTS / "hidden_effects")
+        cost[group] += costs.get(item.nodeid, WHOLE_DIAGNOSIS_S if is_whole else USUAL_S)
     items[:] = [item for group in sorted(groups, key=cost.__getitem__, reverse=True) for item in groups[group]]
 
 

@@ -21,7 +21,9 @@ app = typer.Typer(
     rich_markup_mode="rich",
     help="Commission an induction motor at standstill: identify it through its drive, judge the result, write it back.",
 )
-runs_app = typer.Typer(no_args_is_help=True, help="The archive of runs: list, show, compare, report, export.")
+runs_app = typer.Typer(
+    no_args_is_help=True, help="The archive of runs: list, find, show, compare, motors, trend, report, export."
+)
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
 app.add_typer(recordings_app, name="recordings")
@@ -149,6 +151,10 @@ def run(
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
     seal: Seal = None,
+    tag: Annotated[str, typer.Option("--tag", help="Which motor this is: its tag, kept with the run.")] = "",
+    motor_serial: Annotated[
+        str, typer.Option("--motor-serial", help="The motor's serial number, kept with the run.")
+    ] = "",
     dead_man: Annotated[
         bool,
         typer.Option(
@@ -164,8 +170,9 @@ def run(
     from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
 
     request = CommissionRequest(
-        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal
-    )
+        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal,
+        tag, motor_serial,
+    )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
 
 
@@ -272,13 +279,16 @@ def diagnose(
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
     mapping: Map = None,
+    why: Annotated[
+        bool, typer.Option("--why", help="Show every step of the search, with what was gained and wanted.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
     from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json, why=why)
 
 
 @app.command()
@@ -339,7 +349,7 @@ def runs_find(
 ) -> None:
     """The runs that hold all of these words."""
     from commissioner.cli.verbs.archived.runs import SHOWN, list_runs
-    from commissioner.operations.runs import Wanted
+    from commissioner.operations.history.runs import Wanted
 
     most = limit if limit is not None else 0 if json else SHOWN
     wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
@@ -397,11 +407,94 @@ def runs_export(
 
 
 @runs_app.command("compare")
-def runs_compare(before: Run, after: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
-    """Two runs: same motor, changed (which parameter, how significant), or another motor."""
-    from commissioner.cli.verbs.archived.comparing import compare_runs
+def runs_compare(
+    before: Run,
+    after: Run = "last",
+    recording: Annotated[
+        list[Path] | None, typer.Option("--recording", help="Instead of a second run: a recording; repeatable.")
+    ] = None,
+    motor: Annotated[str | None, typer.Option("--motor", help="Nameplate of the recordings.")] = None,
+    held: Annotated[
+        bool, typer.Option("--held", help="Instead of a second run: what the run's drive holds now.")
+    ] = False,
+    drive: Annotated[
+        str | None, typer.Option("--drive", help="Drive URL for --held; the run's own if not given.")
+    ] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Two runs, or a run and recordings, or a run and its drive: which parameter moved, how surely, what explains it."""
+    from commissioner.cli.verbs.archived.comparing import compare_drive, compare_runs
 
-    compare_runs(runs, before, after, as_json=json)
+    if held:
+        compare_drive(runs, before, drive, as_json=json)
+    else:
+        compare_runs(runs, before, after, as_json=json, recordings=tuple(recording or ()), motor=motor)
+
+
+@runs_app.command("motors")
+def runs_motors(
+    run: Annotated[
+        str | None, typer.Argument(help="Run id: on which of the known motors can it have been made?")
+    ] = None,
+    tag: Annotated[str, typer.Option("--tag", help="The run was made on the motor with this tag.")] = "",
+    motor_serial: Annotated[str, typer.Option("--motor-serial", help="The motor's serial number.")] = "",
+    confirm: Annotated[
+        bool, typer.Option("--confirm", help="It is the same motor, though its parameters say another.")
+    ] = False,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """The motors of the archive; which of them a run was made on, by its parameters; or saying so."""
+    from commissioner.cli.verbs.archived.motors import motors
+    from commissioner.operations.history.runs import Archive
+
+    motors(Archive(runs, archive), run, tag=tag, serial=motor_serial, confirm=confirm, as_json=json)
+
+
+@runs_app.command("trend")
+def runs_trend(
+    motor: Annotated[str | None, typer.Argument(help="The motor's tag or serial number.")] = None,
+    baseline: Annotated[
+        Path | None, typer.Option("--baseline", help="Indicators of this baseline of `monitor`.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .svg or .png.")] = None,
+    archive: Database = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """A motor over the years at one flux and temperature: intervals, drift, steps, alarms at a stated false-alarm rate."""
+    from commissioner.cli.verbs.archived.motors import show_trend
+    from commissioner.operations.history.runs import Archive
+
+    show_trend(Archive(runs, archive), motor, baseline, out, as_json=json)
+
+
+@runs_app.command("push")
+def runs_push(
+    target: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Run folders to another archive, proved by their chain; goes on where it broke off."""
+    from commissioner.cli.verbs.archived.moving import move
+
+    move(runs, target, run or (), to_it=True, as_json=json)
+
+
+@runs_app.command("pull")
+def runs_pull(
+    source: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """Run folders from another archive, proved by their chain; goes on where it broke off."""
+    from commissioner.cli.verbs.archived.moving import move
+
+    move(runs, source, run or (), to_it=False, as_json=json)
 
 
 @runs_app.command("verify")

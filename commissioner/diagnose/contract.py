@@ -73,7 +73,10 @@ class UncertainName(TypedDict):
 
 
 class DiagnosisDocument(TypedDict):
-    """Of recordings (`kind` recording) or of a table of test points (`points`); of several tables each one under `tables`."""
+    """Of recordings (`kind` recording) or of a table of test points (`points`); of several tables each one under `tables`.
+
+    `search`: every record of the search (`search.journal`), from which its choices follow again.
+    """
 
     verdict: str
     reason: str
@@ -97,6 +100,7 @@ class DiagnosisDocument(TypedDict):
     points: NotRequired[list[dict[str, float | None]]]
     uncertain: NotRequired[list[UncertainName]]
     dc_link_v: NotRequired[float | None]
+    search: NotRequired[list[dict[str, Any]]]
     next_experiment: dict[str, Any] | None
     model_file: str | None
     tables: NotRequired[dict[str, DiagnosisDocument]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.journal import Said, Step, followed
 from commissioner.diagnose.search.search import Found, search
 from commissioner.diagnose.verdict.causes import (
     Cause,
@@ -73,13 +75,15 @@ class Diagnosis:
     unsure: tuple[Cause, ...] = ()
     """Fitted, and more likely wrong than right as names: what they explain counts as left."""
     refusal: DataRefused | None = None
+    steps: tuple[Step, ...] = ()
+    """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
 
 
 def diagnose(
     recordings: Sequence[StandstillRecording],
     *,
     excluded: Sequence[str] = (),
-    report: Callable[[str], None] = lambda _: None,
+    report: Callable[[Step], None] = lambda _: None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about the recordings of one motor.
@@ -94,21 +98,16 @@ def diagnose(
     if audit.step_a:
         noise = noise.with_converter_step(np.array(audit.step_a), resting_share(record))
     rms_a = noise.rms_a(max(s.count for s in record.segments), record.facts.sample_period_s)
-    report(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
+    measured = Said(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
+    report(measured)
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
-        found = search(
-            record,
-            noise,
-            excluded=excluded,
-            report=report,
-            check=lambda f, r: check_before_search(f, r, noise),
-            go_on=go_on,
-        )
+        check = partial(check_before_search, noise=noise)
+        found, steps = followed(search(record, noise, excluded=excluded, check=check, go_on=go_on), report)
         check_one_state(found.fit, found.record)
     except DataRefused as refusal:
         return _refused(refusal, audit, noise)
-    return _conclude(found, audit, noise, excluded)
+    return replace(_conclude(found, audit, noise, excluded), steps=(measured, *steps))
 
 
 def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> Diagnosis:

@@ -89,7 +89,10 @@ class Rules:
     hopeful: float = rule(1.3, "factor by which a group's refit may gain more than promised", source="time")
     nearly_share: float = rule(0.05, "of the gain: a group that lacks no more may get there with closer time constants")
     closer_loops_share: float = rule(0.5, "of the unexplained: loops of closer radii make so much of it")
-    finer_curve_share: float = rule(2e-3, "of the unexplained: finer knots make so much of it")
+    finer_curve_share: float = rule(
+        2e-3,
+        "of the unexplained: finer knots make so much of it; beside a cause that lacks, no curve need be right to the last digit",
+    )
     faster_speed_share: float = rule(
         0.2, "of the unexplained: a faster speed makes so much of it, else another cause does"
     )
@@ -108,7 +111,7 @@ class Rules:
     least_confidence: float = rule(
         0.5, "below it a name is not given", source="definition: more likely wrong than right"
     )
-    tie_chi2: float = rule(10.0, "a rival that loses less fits as well")
+    tie_chi2: float = rule(10.0, "a rival that loses less fits as well, and the test that parts them is asked for")
     nearly_all_share: float = rule(0.001, "of a cause's gain: a rival that loses less is as good where much is unknown")
     left_tie_share: float = rule(0.1, "of what no cause makes: the same")
     alternative_share: float = rule(
@@ -126,7 +129,9 @@ class Rules:
     weak_sigma: float = rule(0.1, "what such weak causes make at most")
     much_left_sigma: float = rule(0.3, "a rest above this was not among what confidence learned from")
     dominant_share: float = rule(
-        0.99, "of what is not another's: a cause that takes so much is there, whatever else is"
+        0.99,
+        "of what is not another's: a cause that takes so much is there, whatever else is",
+        without="real dead times, with ripple and a current that stops at zero, leave some thousandths of the power",
     )
     dominant_confidence: float = rule(0.9, "how sure such a cause is")
     rival_loss_share: float = rule(0.2, "unless a rival that takes its place loses less than this part of its gain")

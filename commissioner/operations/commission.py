@@ -20,7 +20,8 @@ DIAGNOSIS_S = 60.0
 
 @dataclass(frozen=True)
 class CommissionRequest:
-    """`axes_deg`: None takes the procedure's own. `diagnosis_s` 0 leaves the closing diagnosis out. `seal`: a key file."""
+    """`axes_deg`: None takes the procedure's own. `diagnosis_s` 0 leaves the closing diagnosis out. `seal`: a key file.
+    `motor_tag`, `motor_serial`: which motor it is, as a person says."""
 
     drive: str
     profile: str
@@ -31,6 +32,8 @@ class CommissionRequest:
     write_back: bool = False
     diagnosis_s: float = DIAGNOSIS_S
     seal: Path | None = None
+    motor_tag: str = ""
+    motor_serial: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,5 +77,11 @@ def commission(
         key=key,
         stop=stop,
         begun=origin.begun,
-        origin=origin.facts,
+        origin=dict(origin.facts or {}) | _identity(request),
     )
+
+
+def _identity(request: CommissionRequest) -> dict[str, str]:
+    """What a person said of the motor, where anything was said."""
+    said = {"motor_tag": request.motor_tag.strip(), "motor_serial": request.motor_serial.strip()}
+    return {name: value for name, value in said.items() if value}

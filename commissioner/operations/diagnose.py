@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,17 +14,16 @@ from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
 from commissioner.diagnose.points.table import Points, is_points_table, read_points
+from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
-from commissioner.operations.events import GoOn, Observe, SearchSaid, always, nobody
+from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
 
-KEPT = re.compile(r"^accepted (\w+):")
-"""How the search says that it takes a cause in."""
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
@@ -57,21 +55,10 @@ class Diagnosed:
         return "refused" in {self.document["verdict"], *(one["verdict"] for one in tables.values())}
 
 
-@dataclass
-class _Search:
-    """Hears the search: passes every line on, and remembers what was taken in."""
-
-    observe: Observe
-    kept: list[str] = field(default_factory=list)
-
-    def __call__(self, sentence: str) -> None:
-        if found := KEPT.match(sentence):
-            self.kept.append(found[1])
-        self.observe(SearchSaid(sentence))
-
-    def withdrawn(self, left: Collection[str]) -> list[str]:
-        """Named on the way and not among those that are `left`."""
-        return [name for name in dict.fromkeys(self.kept) if name not in left]
+def withdrawn(steps: Iterable[Step], left: Collection[str]) -> list[str]:
+    """Named on the way and not among those that are `left`."""
+    kept = (step.name for step in steps if isinstance(step, Accepted))
+    return [name for name in dict.fromkeys(kept) if name not in left]
 
 
 def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = always) -> Diagnosed:
@@ -95,11 +82,10 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     recordings, remarks = standstill(tables, request.motor)
     require_one_motor(recordings)
     recordings, copies = without_copies(recordings)
-    search = _Search(observe)
-    seen = analyse(recordings, excluded=request.excluded, report=search, go_on=go_on)
+    seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     document = as_document(seen, None)
     document["audit"] = [*remarks, *copies, *document["audit"]]
-    document["uncertain"] = uncertain(seen, search.withdrawn({c.name for c in (*seen.causes, *seen.unsure)}))
+    document["uncertain"] = uncertain(seen, withdrawn(seen.steps, {c.name for c in (*seen.causes, *seen.unsure)}))
     document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if request.out is not None:
         _write_recordings(request.out, seen, document, tables)

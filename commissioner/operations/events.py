@@ -1,4 +1,4 @@
-"""Progress as records, beside those of a run (`procedure.findings`)."""
+"""Progress as records, beside those of a run (`procedure.findings`) and of a search for causes (`diagnose.search.journal`)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,6 @@ class Began:
     """Something that takes longer than a moment has begun."""
 
     doing: str
-
-
-@dataclass(frozen=True)
-class SearchSaid:
-    """A line of the search for causes."""
-
-    sentence: str
 
 
 Observe = Callable[[object], None]

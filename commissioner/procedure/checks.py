@@ -45,6 +45,18 @@ class DriveLimits:
     winding_max_degc: float
 
 
+@dataclass(frozen=True)
+class StreamPace:
+    """What the link carries: the fastest of a few reads of a whole sample window, made before anything is energised, and the
+    samples and registers of one window."""
+
+    round_trip_s: float
+    samples: int
+    registers: int
+
+
+BITS_PER_REGISTER, OVERHEAD_BITS = 22, 430
+"""On a serial line of 11 bits a character: of a window and of the request, answer head and silences around it."""
 SMALLEST_DRIVE = 0.9
 """Peak rated current of the drive, of the test current: on a smaller drive tests aim lower (`Findings.test_current_a`)."""
 
@@ -66,8 +78,10 @@ def judge_drive(
     nameplate: Nameplate,
     limits: DriveLimits,
     test_current_a: float,
+    pace: StreamPace | None = None,
 ) -> tuple[CheckResult, ...]:
-    """All checks that need no write. `statuses` are readings spread over the standstill dwell time, oldest first."""
+    """All checks that need no write. `statuses` are readings spread over the standstill dwell time, oldest first; `pace`
+    None where it was not measured."""
     last = statuses[-1]
     return (
         *_stopped(last),
@@ -83,6 +97,7 @@ def judge_drive(
             f"at least {SMALLEST_DRIVE * test_current_a:.3g} A peak",
             "lower limits.current_fraction or use a larger drive",
         ),
+        *_keeps_up(pace, identity.control_period_s),
         *_same_motor(drive_nameplate, nameplate),
     )
 
@@ -147,6 +162,21 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
         f"{change:.2%}",
         f"at most {DC_LINK_RIPPLE:.0%}",
         "wait until the link has charged",
+    )
+
+
+def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckResult]:
+    """One window is asked for at a time: where it takes longer than its samples last, the drive's memory overruns."""
+    if pace is None:
+        return
+    window_s = pace.samples * sample_period_s
+    baud = (BITS_PER_REGISTER * pace.registers + OVERHEAD_BITS) / window_s
+    yield CheckResult(
+        "the link keeps up with the samples",
+        pace.round_trip_s <= window_s,
+        f"{1e3 * pace.round_trip_s:.3g} ms for {pace.samples} samples",
+        f"at most {1e3 * window_s:.3g} ms: the drive takes {1.0 / sample_period_s:.0f} samples a second",
+        f"use a link that answers sooner: a cable in place of radio, VPN or gateway; a serial line of {baud:.0f} Bd or more",
     )
 
 

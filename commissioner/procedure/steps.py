@@ -18,7 +18,7 @@ from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, In
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.procedure.assembly import assemble
-from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed, judge_drive
+from commissioner.procedure.checks import CheckResult, DriveLimits, StreamPace, check_failed, judge_drive
 from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
@@ -58,6 +58,7 @@ class Job:
     link_latency_s: float
     parameter_factors: dict[str, float] = field(default_factory=dict)
     """By what the drive multiplies a contract's SI value, where that is not 1: 2 for a line-to-line resistance."""
+    pace: StreamPace | None = None
 
     @property
     def scale_ramp_per_s(self) -> float:
@@ -181,7 +182,9 @@ def check(job: Job, findings: Findings) -> Step:
     for _ in range(DWELL_READINGS - 1):
         yield Wait(job.plan.supervision.standstill_dwell_s / (DWELL_READINGS - 1))
         statuses.append((yield ReadStatus()))
-    results = judge_drive(findings.identity, statuses, plate, job.nameplate, job.drive_limits, job.test_current_a)
+    results = judge_drive(
+        findings.identity, statuses, plate, job.nameplate, job.drive_limits, job.test_current_a, job.pace
+    )
     findings.checks = results
     winding_degc = statuses[-1].winding_degc
     findings.winding_degc = winding_degc if math.isfinite(winding_degc) else None

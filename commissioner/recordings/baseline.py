@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ def update(path: Path, entry: Entry, learn: bool) -> tuple[Verdict, History]:
     the trend. The file is replaced whole or not at all.
     """
     is_new = not path.exists()
+    entry = replace(entry, utc=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"))
     history = History() if is_new else read(path)
     verdict = judge(entry, history)
     if is_new or learn:
@@ -72,4 +74,5 @@ def _entry(raw: dict[str, Any]) -> Entry:
         float(raw["torque_nm"]),
         float(raw["supply_hz"]),
         {str(name): (float(value), float(std)) for name, (value, std) in raw["indicators"].items()},
+        str(raw.get("utc", "")),
     )

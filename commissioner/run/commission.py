@@ -109,6 +109,7 @@ def commission(
             with suppress(Abandoned), asked.computing():
                 warm_up(nameplate)
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
+            lock.release()  # the drive is let go: what follows is the archive's
             result = close_run(order, folder, findings, ended)
             if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
                 _tell(folder, present, Diagnosing(diagnosis_s))
@@ -189,7 +190,7 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
         metadata["winding_temperature_degc"] = findings.winding_degc
     folder.write_recording(metadata)
     result: RunDocument = plain(summarise(findings, ended, folder.path.name, *names_of(order.profile)))
-    _report(folder, result, findings)
+    write_report(folder, result, findings)
     folder.cover()
     return result
 
@@ -207,11 +208,11 @@ def _with_diagnosis(
     diagnosis = diagnose_run(folder, go_on)
     remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
     completed: RunDocument = {**result, "diagnosis": diagnosis, "remarks": remarks}
-    _report(folder, completed, findings)
+    write_report(folder, completed, findings)
     return completed
 
 
-def _report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
+def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
     """`result.json`, and the page that names its digest."""
     digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
     journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")

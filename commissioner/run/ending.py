@@ -5,11 +5,14 @@ from __future__ import annotations
 import traceback
 from contextlib import suppress
 
-from commissioner.errors import CommissionerError, DriveFault, UsageError, WriteBackFailed
+from commissioner.errors import CommissionerError, DriveError, DriveFault, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder, archive_lost
+
+LATE_SHARE = 0.5
+"""Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
 
 
 def let_go(inverter: Inverter) -> DisarmReport:
@@ -49,6 +52,15 @@ def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
         f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
         remedy="please report it with the run folder",
     )  # fmt: skip
+
+
+def with_host(error: CommissionerError, gap_s: float, watchdog_s: float | None) -> CommissionerError:
+    """What broke while energised, and that this host was late: `gap_s` between an answer and its own next request is a good
+    part of what the drive's watchdog grants."""
+    if isinstance(error, DriveError) and watchdog_s is not None and gap_s >= LATE_SHARE * watchdog_s:
+        error.what += f"; this host was late: {gap_s:.2g} s passed between an answer and its next request"
+        error.remedy = f"end other programs on this host, or use one that is less busy; {error.remedy}"
+    return error
 
 
 def write_lost(failure: OSError, folder: RunFolder) -> WriteBackFailed:

@@ -51,7 +51,7 @@ def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: Proce
         job = None
         if "excite" in profile.capabilities:
             job = make_job(profile, nameplate, plan, port, write_back=False)
-            checks = judge_drive(identity, statuses, plate, nameplate, job.drive_limits, job.test_current_a)
+            checks = judge_drive(identity, statuses, plate, nameplate, job.drive_limits, job.test_current_a, job.pace)
         else:
             checks = judge_idle(_shown(profile, statuses[-1]), plate, nameplate)
         parameters = inverter.snapshot().in_use

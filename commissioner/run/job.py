@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from commissioner.errors import RequestRefused
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.checks import DriveLimits, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.procedure.verdict import PARAMETERS
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
+from commissioner.run.acting import CHANNELS
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
 
@@ -25,6 +28,8 @@ LOST_SAMPLES_S = 0.05
 FLUX_FRACTION = 1.1
 """Of the guard's own limit: the guard acts first, the watch is the second line."""
 LATENCY_PROBES = 20
+PACE_PROBES = 5
+"""Only a link whose fastest answer is too slow is surely too slow: the others of a busy host are none of its own."""
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
 
@@ -38,7 +43,15 @@ def open_drive(url: str, profile: DriveProfile, plan: ProcedurePlan) -> Iterator
         port.close()
 
 
-def make_job(profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, port: Port, *, write_back: bool) -> Job:
+def make_job(
+    profile: DriveProfile,
+    nameplate: Nameplate,
+    plan: ProcedurePlan,
+    port: Port,
+    *,
+    write_back: bool,
+    now_s: Callable[[], float] = time.monotonic,
+) -> Job:
     """The job with the link's measured latency: what the guard predicts across."""
     inverter = Inverter(port, profile)
     for _ in range(LATENCY_PROBES):
@@ -52,7 +65,24 @@ def make_job(profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, p
         parameter_factors=factors,
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
+        pace=_pace(profile, port, now_s),
     )
+
+
+def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> StreamPace | None:
+    """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now."""
+    layout = profile.window
+    if layout is None:
+        return None
+    times_s = []
+    for _ in range(PACE_PROBES):
+        began_s = now_s()
+        try:
+            port.read(layout.address, layout.words)
+        except RequestRefused:
+            return None
+        times_s.append(now_s() - began_s)
+    return StreamPace(min(times_s), layout.data_registers // len(CHANNELS), layout.words)
 
 
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:

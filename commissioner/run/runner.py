@@ -18,7 +18,8 @@ from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, Param
 from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, write_lost
+from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, with_host, write_lost
+from commissioner.run.holding.priority import raised_priority
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
 from commissioner.run.stream import Stream, stop_if
 from commissioner.safety import commands as ask
@@ -84,11 +85,11 @@ class Runner:
         """Run the course to its end. Faults, guards and the operator end it as a value; the drive is disarmed."""
         error: CommissionerError | None = None
         ended: RunEnded | None = None
-        with self._stop:
+        with self._stop, raised_priority():
             try:
                 ended = self._drive(course)
             except CommissionerError as failure:
-                error = failure
+                error = self._with_host(failure)
             except Exception as surprise:  # must not leave a motor energised or a run without an end
                 error = as_error(surprise, self._folder)
             finally:
@@ -208,8 +209,13 @@ class Runner:
         limits = progress.facts.drive_limits
         began_s = self._inverter.now_s()
         cursor = self._inverter.enable()
+        self._inverter.port.stats.longest_gap_s = 0.0
         sensors = SensorWatch(limits.current_a if limits else math.inf)
         self._stream = Stream(self._inverter, cursor, began_s, sensors, self._watch)
+
+    def _with_host(self, error: CommissionerError) -> CommissionerError:
+        facts = self._progress.facts
+        return with_host(error, self._inverter.port.stats.longest_gap_s, facts.watchdog_s) if facts.energised else error
 
     def _fetch(self) -> SampleBlock | None:
         """The next block, archived and judged; None once the drive has ended the session."""

@@ -18,8 +18,8 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import ParameterSnapshot
-from commissioner.registers.convention import drive_values
+from commissioner.records import ParameterSnapshot, drive_words
+from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
@@ -88,6 +88,16 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
     ready = _ready(run, url)
     with _drive(ready) as inverter:
         return _plan(run, ready, inverter, "restore", ready.snapshot.in_use)
+
+
+def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    ready = _ready(run, url)
+    with _drive(ready) as inverter:
+        snapshot = inverter.snapshot()
+    ours = our_values(ready.profile, snapshot.in_use, ready.plate)
+    held = {one.field: one.value for one in ours.values()}
+    return drive_words(snapshot.identity.drive_type, snapshot.identity.serial_number), held
 
 
 def write_accepted(run: RunSummary, url: str | None, token: str) -> WriteReport:

@@ -17,6 +17,7 @@ from starlette.types import Scope
 from commissioner.service import problems
 from commissioner.service.access.gate import Gate
 from commissioner.service.page import views
+from commissioner.service.page.frame import prepare
 from commissioner.service.parts import Parts
 from commissioner.service.routes import all_routers
 
@@ -29,6 +30,7 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     @contextlib.asynccontextmanager
     async def lifetime(_app: FastAPI) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(parts.desk.look_around()), asyncio.create_task(parts.warm.work())]
+        tasks.append(asyncio.create_task(asyncio.to_thread(prepare)))
         tell = asyncio.get_running_loop().call_later(0.0, ready)
         try:
             yield

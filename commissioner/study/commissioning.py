@@ -68,7 +68,7 @@ def _carried_out(drawn: Drawn, plate: Nameplate, plan: ProcedurePlan, findings: 
     port = InProcessPort(station)
     inverter = Inverter(port, profile, sleep=station.pass_time, clock=lambda: station.now_s)
     try:
-        job = make_job(profile, plate, plan, port, write_back=True)
+        job = make_job(profile, plate, plan, port, write_back=True, now_s=inverter.now_s)
         runner = Runner(inverter, archive, bounds(job), watch_limits(job), lambda _record: None)
         return runner.perform(course(job, findings))
     except CommissionerError as error:

@@ -1,4 +1,4 @@
-"""The 27 named effects, each continuous with zero = none: unit, shapes, and how it enters the machine or the sensors.
+"""The 28 named effects, each continuous with zero = none: unit, shapes, and how it enters the machine or the sensors.
 
 At least one shape of each is outside the usual textbook family (clamped or capacitive dead time, closed-slot leakage,
 diffusion ladder, vector plays, warm-up drift, kinked sensor ...).
@@ -32,6 +32,8 @@ class Kind:
 
 
 CATALOGUE: dict[str, Kind] = {}
+SINCE = ("sensor_switch_on",)
+"""Effects that joined the catalogue later: drawn alone only, so that a seed's mixture stays what it was."""
 RESAMPLED = ("sampling_delay", "clock_drift", "lost_samples")
 """Effects of the sampling clock, which a recording applies when it samples and not in the machine."""
 
@@ -228,6 +230,12 @@ def _sensor_offset(effect, plant, p, s):
 def _sensor_drift(effect, plant, p, s):
     s[at.S_DRIFT_U : at.S_DRIFT_W + 1] = _per_phase(effect, (1.0, 0.4, -0.7))
     s[at.S_DRIFT_TAU], s[at.S_DRIFT_SHAPE] = effect.details.get("time_s", 60.0), _shape(effect)
+
+
+@_entry("sensor_switch_on", "A", "largest offset at the first sample, gone later", ("slow", "fast"), 0.01, 0.5)
+def _sensor_switch_on(effect, plant, p, s):
+    s[at.S_START_U : at.S_START_W + 1] = _per_phase(effect, (0.7, -0.4, 1.0))
+    s[at.S_START_TAU] = effect.details.get("time_s", (0.06, 0.015)[_shape(effect)])
 
 
 @_entry(

@@ -143,8 +143,12 @@ E_COUNT = 36
     S_CABLE_SHAPE,
     S_LINK_NOISE_V,
     S_LINK_LSB_V,
-) = range(31)
-S_COUNT = 31
+    S_START_U,
+    S_START_V,
+    S_START_W,
+    S_START_TAU,
+) = range(35)
+S_COUNT = 35
 
 # counters of a live session (int64) -----------------------------------------------------------------------------
 C_PERIOD, C_PRODUCED, C_DECIMATION, C_IN_MEAN, C_STOP, C_CLIPPED, C_CLAMPED = range(7)

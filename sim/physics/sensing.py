@@ -46,6 +46,14 @@ def _drift(t, phase, s):
 
 
 @kernel
+def _start(t, phase, s):
+    """Offset (A) of a sensor whose supply was switched on with the recording."""
+    if s[at.S_START_U + phase] == 0.0:
+        return 0.0
+    return s[at.S_START_U + phase] * math.exp(-t / s[at.S_START_TAU])
+
+
+@kernel
 def _pickup(t, phase, s):
     """Mains pickup (A) in one phase's sensor wire."""
     if s[at.S_PICKUP_U + phase] == 0.0:
@@ -73,6 +81,7 @@ def _bend(i, s):
 def sense(i, t, phase, white, s):
     """What the drive knows (A) of a phase current: everything up to but without the converter."""
     v = _bend(i, s) * s[at.S_GAIN_U + phase] + s[at.S_OFFSET_U + phase]
+    v += _start(t, phase, s)
     v += _drift(t, phase, s) + _pickup(t, phase, s) + s[at.S_NOISE_A] * white
     limit = s[at.S_CLIP_A]
     if s[at.S_CLIP_SHAPE] == 1.0:

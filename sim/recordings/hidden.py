@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.physics.effects import CATALOGUE
+from sim.physics.effects import CATALOGUE, SINCE
 from sim.physics.machine import Machine
 from sim.physics.packing import pack
 from sim.recordings.standstill import record
@@ -134,7 +134,7 @@ def _causes(stratum: str, plate: dict[str, Any], random: np.random.Generator, on
     if stratum == "tie":
         return _tied(plate, random)
     count = {"one": 1, "two": 2, "three": 3, "four": 4, "wrong_form": int(random.integers(1, 3))}[stratum]
-    pool = sorted(UNUSUAL if stratum == "wrong_form" else CATALOGUE)
+    pool = sorted(UNUSUAL if stratum == "wrong_form" else CATALOGUE.keys() - SINCE)
     if count > 1:
         pool = [name for name in pool if name not in HARMLESS]
     names = random.choice(pool, count, replace=False)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.support.synthetic_archive import make_run
+from tests.support.archive.synthetic import make_run
 
 HEAVY = (
     "numpy",

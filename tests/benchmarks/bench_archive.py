@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from commissioner.run.index.store import NAME
-from tests.support.synthetic_archive import make_archive
+from tests.support.archive.synthetic import make_archive
 
 
 def cold(*arguments: str) -> tuple[float, float, float]:

@@ -627,7 +627,13 @@ LATER = (
         "cm_crc16(0xFFFF, &drive->image[CM_IN_USE], 2 * CM_PARAMETERS)",
         "the-check-sum-covers-every-value",
     ),
-    _defect("quick stop does nothing", STATES, " || !(word & QUICK_STOP_OFF))", ")", "quick-stop-blocks-at-once"),
+    _defect(
+        "quick stop is heard at rest only",
+        STATES,
+        " || !(word & QUICK_STOP_OFF))",
+        " || (!(word & QUICK_STOP_OFF) && drive->state != CM_ENABLED))",
+        "quick-stop-blocks-at-once",
+    ),
     _defect(
         "the bias is never applied",
         EXCITATION,
@@ -643,10 +649,10 @@ LATER = (
         "phase-currents-sum-to-nothing",
     ),
     _defect(
-        "one sample is left out between two windows",
+        "the first window is called an overrun",
         RING,
-        "uint32_t first = wanted < oldest ? oldest : wanted;",
-        "uint32_t first = wanted < oldest ? oldest : wanted + (wanted > 500);",
+        "flags |= wanted < oldest ?",
+        "flags |= wanted <= oldest ?",
         "windows-join-without-gap",
     ),
     _defect(

@@ -23,6 +23,7 @@ BOUND_TO_THE_RECORDING = frozenset(
         "mains_pickup",
         "dc_link_ripple",
         "sensor_drift",
+        "sensor_switch_on",
         "remanence",
         "shaft_motion",
         "lost_samples",

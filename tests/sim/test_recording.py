@@ -47,6 +47,7 @@ NAMES = [
     "inductance_anisotropy",
     "resistance_anisotropy",
     "cable_capacitance",
+    "sensor_switch_on",
 ]
 SHORT = {
     "axis_deg": 20.0,

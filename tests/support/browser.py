@@ -21,7 +21,7 @@ from tests.support.service_process import ServiceProcess
 CHROMIUM = "/usr/bin/chromium"
 AXE = Path(__file__).parent.parent / "data" / "axe_core" / "axe.min.js"
 SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
-SLOW_MS = 60_000
+SLOW_MS = 240_000
 """A simulated drive beside other work on the host."""
 WORDS = {
     "en": {"try": "Try it without a drive", "check": "Check the drive", "what": "What will happen", "see": "See what would be written",

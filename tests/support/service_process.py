@@ -88,20 +88,20 @@ class ServiceProcess:
         assert answer.status_code == 201, answer.text
         return str(answer.json()["id"])
 
-    def wait_for(self, run: str, reached: Any, timeout_s: float = 60.0) -> dict[str, Any]:
+    def wait_for(self, run: str, reached: Any, timeout_s: float = 200.0) -> dict[str, Any]:
         """The run's document as soon as `reached` says so of it."""
         end = time.monotonic() + timeout_s
         while time.monotonic() < end:
             document = self.client.get(f"/api/runs/{run}").json()
             if reached(document):
                 return document
-            time.sleep(0.02)
+            time.sleep(0.03)
         raise AssertionError(f"not reached within {timeout_s} s: {document}")
 
     def wait_energised(self, run: str) -> None:
         self.wait_for(run, lambda document: (document.get("live") or {}).get("output") == "on")
 
-    def wait_over(self, run: str, timeout_s: float = 90.0) -> dict[str, Any]:
+    def wait_over(self, run: str, timeout_s: float = 300.0) -> dict[str, Any]:
         """The result, once its process has gone."""
         self.wait_for(run, lambda document: document.get("outcome") is not None, timeout_s)
         end = time.monotonic() + timeout_s

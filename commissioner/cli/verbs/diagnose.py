@@ -5,17 +5,20 @@ from __future__ import annotations
 from commissioner.cli.screens.diagnosis import show
 from commissioner.cli.screens.diagnosis_progress import Progress
 from commissioner.cli.screens.screen import emit
+from commissioner.cli.screens.search import show as show_search
 from commissioner.errors import DataRefused
 from commissioner.operations.diagnose import DiagnoseRequest
 from commissioner.operations.diagnose import diagnose as carry_out
 
 
-def diagnose(request: DiagnoseRequest, *, as_json: bool) -> None:
-    """Shows the diagnosis; exit code 3 where the data cannot carry an answer."""
+def diagnose(request: DiagnoseRequest, *, as_json: bool, why: bool = False) -> None:
+    """Shows the diagnosis, and `why` how the search came to it; exit code 3 where the data cannot carry an answer."""
     done = carry_out(request, Progress(is_quiet=as_json))
     if as_json:
         emit(done.document)
     else:
         show(done.document, done.out)
+        if why:
+            show_search(done.document)
     if done.is_refused:
         raise SystemExit(DataRefused.exit_code)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Facts, Record
 from commissioner.diagnose.plant.model import Layout, Model, Term
@@ -164,11 +164,15 @@ class Cause:
     """What it does in a table of test points."""
 
     # what it is in the model
+    def regressors(self, record: Record) -> Mapping[str, Sequence[Array]]:
+        """Known functions of time of its own that its numbers multiply: by name, (n,) of every segment."""
+        return {}
+
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         """Its numbers; empty: these data cannot show it."""
         raise NotImplementedError
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """What a person reads: engineering values with units, the first one decides the sign."""
         raise NotImplementedError
 
@@ -264,8 +268,6 @@ class Cause:
         """What settles the name in these data: nobody is asked to record what is recorded."""
         return self.decides
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """Its entry in a scenario of the simulated inverter, in that catalogue's units; empty: that one has no such cause."""
         return {}

@@ -60,7 +60,7 @@ def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[
     record = _with(record, _phase_patterns(record))
     record = _with(record, _heat(record, rotor_current_a))
     record = _with(record, _sag(record))
-    return with_lines(_with(record, _speed_splines(record, SPEED_SPLINE)), lines)
+    return with_lines(_with(_with(record, _own(record)), _speed_splines(record, SPEED_SPLINE)), lines)
 
 
 def with_fine_speed_splines(record: Record, lines: Mapping[str, float]) -> Record:
@@ -70,6 +70,14 @@ def with_fine_speed_splines(record: Record, lines: Mapping[str, float]) -> Recor
 
 def _with(record: Record, named: Named) -> Record:
     return record.with_channels(named[0], tuple(np.ascontiguousarray(c) for c in named[1]))
+
+
+def _own(record: Record) -> Named:
+    """What causes bring themselves, in the catalogue's order."""
+    from commissioner.diagnose.causes import CATALOGUE
+
+    named = {name: of for cause in CATALOGUE.values() for name, of in cause.regressors(record).items()}
+    return tuple(named), [np.column_stack(columns) for columns in zip(*named.values(), strict=True)]
 
 
 def _phase_patterns(record: Record) -> Named:

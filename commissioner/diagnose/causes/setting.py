@@ -13,6 +13,7 @@ from commissioner.diagnose.intake.record import Facts, Record
 from commissioner.diagnose.plant.model import Layout
 
 Array = NDArray[np.float64]
+Numbers = Mapping[str, float]
 Sizes = Mapping[str, tuple[float, str]]
 """Engineering values by name, each with its unit; the first one decides the sign."""
 PHASES = ("u", "v", "w")

@@ -17,14 +17,23 @@ ALIKE_ON_ALL_AXES = frozenset({"linear", "axis"})
 """What a linear cause leaves is the same on every axis: nothing that an anisotropy or gains would take."""
 
 
-def guard(losses: Mapping[str, float], name: str, *, ripple_meets_tones: bool = False, rules: Rules = RULES) -> float:
-    """What the forms of the accepted causes (with what chi2 loses without them) may leave behind for a later one to take.
+def guards(
+    losses: Mapping[str, float], name: str, *, ripple_meets_tones: bool = False, rules: Rules = RULES
+) -> tuple[float, str]:
+    """What the forms of the accepted causes (with what chi2 loses without them) may leave behind for a later one to take, and whose it is.
 
     A ripple whose side lines fall from tone to tone changes impedances as linear causes do.
     """
     share = rules.tone_to_tone_guard if CATALOGUE[name].meets_tones and ripple_meets_tones else 0.0
-    left = [_share_left(accepted, name, rules) * loss for accepted, loss in losses.items()]
-    return max([*left, *(share * losses[n] for n in LINEAR if n in losses)], default=0.0)
+    left = {accepted: _share_left(accepted, name, rules) * loss for accepted, loss in losses.items()}
+    for linear in (n for n in LINEAR if n in losses):
+        left[linear] = max(left[linear], share * losses[linear])
+    by = max(left, key=lambda n: left[n], default="")
+    return left.get(by, 0.0), by and f"what {by} may leave"
+
+
+def guard(losses: Mapping[str, float], name: str, *, ripple_meets_tones: bool = False, rules: Rules = RULES) -> float:
+    return guards(losses, name, ripple_meets_tones=ripple_meets_tones, rules=rules)[0]
 
 
 def guard_of_lost_samples(fitted: Fit, rules: Rules = RULES) -> float:

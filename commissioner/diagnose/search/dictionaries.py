@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +19,7 @@ from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, even_vectors, odd_vectors, with_halved_intervals
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.rules import RULES
+from commissioner.diagnose.search.journal import Refined
 from commissioner.diagnose.search.nominal import largest_fluxes, leak_ratio, legs_slack_v, with_ranges
 from commissioner.diagnose.search.refinement import CLOSER, with_closer_loops, without_curves, without_springs
 
@@ -50,7 +50,7 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
     model, there = respread(current.model, setting)
     if there is setting:
         return current, setting
-    again = begun(model, there, noise)
+    again = begun_with(model, there, noise)
     return (again, there) if np.isfinite(again.chi2) else (current, setting)
 
 
@@ -103,7 +103,7 @@ def with_closer_branches(model: Model, setting: Setting) -> tuple[Model, Setting
     return model, there
 
 
-def begun(model: Model, setting: Setting, noise: Noise) -> Fit:
+def begun_with(model: Model, setting: Setting, noise: Noise) -> Fit:
     """The fit that begins with the model's curves and loops as they are or at zero, whichever is nearer."""
     starts = [model] if (flat := without_curves(model)).values == model.values else [model, flat]
     if len(starts) > 1:
@@ -139,8 +139,8 @@ def _splines(vectors: Array, top: float) -> tuple[BSpline, float]:
 
 
 def with_faster_speed(
-    current: Fit, full: Record, setting: Setting, noise: Noise, report: Callable[[str], None]
-) -> tuple[Fit, Record, Setting]:
+    current: Fit, full: Record, setting: Setting, noise: Noise
+) -> tuple[Fit, Record, Setting, Refined] | None:
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz. Not tried where less than that
 
     is left across the axes, along which no speed moves anything to first order.
@@ -150,15 +150,15 @@ def with_faster_speed(
     turning = dict.fromkeys(t.effect for t in current.model.terms if t.kind == kinds.OMEGA)
     speed = [t for name in turning for t in CATALOGUE[name].terms(there) if t.kind == kinds.OMEGA]
     model = current.model.without_kind(kinds.OMEGA).on_channels(record.channel_names).with_terms(speed)
-    wanted = current.chi2 - max(
+    least = max(
         RULES.required_chi2(len(model.terms) - len(current.model.terms)),
         RULES.faster_speed_share * current.normal.unexplained,
     )
-    if left_across(current.model, setting, noise) < current.chi2 - wanted:
-        return current, full, setting
-    faster = fit(model, there.record, there.layout, noise, wanted_chi2=wanted)
-    report(f"  a speed on closer knots: gained {current.chi2 - faster.chi2:.4g}")
-    return (faster, record, there) if faster.chi2 < wanted else (current, full, setting)
+    if left_across(current.model, setting, noise) < least:
+        return None
+    faster = fit(model, there.record, there.layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - faster.chi2
+    return faster, record, there, Refined("a speed on closer knots", gained, least, is_taken=gained > least)
 
 
 def left_across(model: Model, setting: Setting, noise: Noise) -> float:
@@ -177,42 +177,36 @@ def left_across(model: Model, setting: Setting, noise: Noise) -> float:
     return sum(each_segment(of_segment, record))
 
 
-def with_finer_curves(
-    current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None], of: Collection[int] = tuple(CURVES)
-) -> tuple[Fit, Setting]:
-    """Curves of the kinds `of` with a knot between every two, as long as that gains what its numbers cost: iron with a sharp
+def finer_curve(current: Fit, setting: Setting, noise: Noise, kind: int) -> tuple[Fit, Setting, Refined] | None:
+    """Curves of a kind with a knot between every two, if that gains what its numbers cost: iron with a sharp knee leaves 1e-3 of its gain
 
-    knee leaves 1e-3 of its gain on ten intervals.
+    on ten intervals. None: there is no such curve, or it is fine already.
     """
-    for kind, (name, make) in CURVES.items():
-        while kind in of and current.model.has_kind(kind) and len(getattr(setting.layout, name)) <= MOST_KNOTS:
-            finer = make(2 * (getattr(setting.layout, name).shape[1] - 3))
-            layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
-            there = replace(setting, layout=layout)
-            model = _on_finer(current.model, kind, getattr(setting.layout, name), finer, there)
-            wanted = current.chi2 - _least_gain(current, len(model.terms))
-            trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
-            report(f"  {name} on twice the knots: gained {current.chi2 - trial.chi2:.4g}")
-            if trial.chi2 > wanted:
-                break
-            current, setting = trial, there
-    return current, setting
+    name, make = CURVES[kind]
+    vectors = getattr(setting.layout, name)
+    if not current.model.has_kind(kind) or len(vectors) > MOST_KNOTS:
+        return None
+    finer = make(2 * (vectors.shape[1] - 3))
+    layout: Layout = replace(setting.layout, **{name: finer})  # type: ignore[arg-type]
+    there = replace(setting, layout=layout)
+    model = _on_finer(current.model, kind, vectors, finer, there)
+    least = _least_gain(current, len(model.terms))
+    trial = fit(model, setting.record, layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - trial.chi2
+    return trial, there, Refined(f"{name} on twice the knots", gained, least, is_taken=gained > least)
 
 
-def with_closer_radii(
-    current: Fit, setting: Setting, noise: Noise, report: Callable[[str], None]
-) -> tuple[Fit, Setting]:
+def with_closer_radii(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Setting, Refined]:
     """Loops of radii beside those that act, if they make most of what is left: iron of one radius between two of the
 
     dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])
-    wanted = current.chi2 - max(
-        _least_gain(current, len(model.terms)), RULES.closer_loops_share * current.normal.unexplained
-    )
-    trial = fit(model, setting.record, layout, noise, wanted_chi2=wanted)
-    report(f"  loops of closer radii: gained {current.chi2 - trial.chi2:.4g}")
-    return (trial, replace(setting, layout=layout)) if trial.chi2 <= wanted else (current, setting)
+    least = max(_least_gain(current, len(model.terms)), RULES.closer_loops_share * current.normal.unexplained)
+    trial = fit(model, setting.record, layout, noise, wanted_chi2=current.chi2 - least)
+    gained = current.chi2 - trial.chi2
+    refined = Refined("loops of closer radii", gained, least, is_taken=gained > least)
+    return (trial, replace(setting, layout=layout), refined) if refined.is_taken else (current, setting, refined)
 
 
 def _least_gain(current: Fit, numbers: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,8 +15,11 @@ from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, Term
+from commissioner.diagnose.rules import RULES, Rules
 from commissioner.diagnose.search.acceptance import LINES_OF_THEIR_OWN, guard_of_lost_samples, losses_of
-from commissioner.diagnose.search.dictionaries import begun, carried_over, respread
+from commissioner.diagnose.search.adjust import with_new_dictionaries
+from commissioner.diagnose.search.dictionaries import begun_with, carried_over, respread
+from commissioner.diagnose.search.journal import Began, Nominal, RuledOut, Said, Step
 from commissioner.diagnose.search.nominal import (
     bare_layout,
     from_segment_to_segment,
@@ -26,20 +29,21 @@ from commissioner.diagnose.search.nominal import (
 )
 from commissioner.diagnose.search.refinement import refined
 from commissioner.diagnose.search.screening import Screening
-from commissioner.diagnose.search.stepwise import Report, RuledOut, Steps, surely_left
+from commissioner.diagnose.search.state import (
+    Problem,
+    State,
+    Steps,
+    begun,
+    material_chi2,
+    surely_left,
+    with_new_flux_before,
+)
+from commissioner.diagnose.search.stepwise import stepwise
 
 EXPLORED = (45_000, 180_000)
 """Parts on which causes are sought before the whole: a cause tried on a million samples costs twenty seconds."""
 MENDING_ROUNDS = 3
 """Of putting lost samples right and fitting again."""
-MENDED_AT_ONCE = 0.5
-"""A round that leaves more of the misfit than this is the last: what remains is not made by lost samples."""
-MENDED_SHARE, MENDED_LEAST_SHARE = 0.7, 0.3
-"""Of the misfit that the noise's own uncertainty cannot make, and at the least of all of it, so much must be gone with them."""
-UNKNOWN_SIGMA, UNKNOWN_SHARE = 0.1, 0.05
-"""Where so much of the noise's rms is left, and of the error there was to explain, no cause makes it: settling the others gains nothing."""
-HOPELESS_SIGMA = 0.3
-"""Where a part's search ends with so much, and that share, the whole finds no more."""
 
 
 @dataclass(frozen=True)
@@ -67,95 +71,77 @@ class Found:
     """False: the time allowed was over before nothing more passed the rules."""
 
 
+Search = Generator[Step, None, Found]
+
+
 def search(
     record: Record,
     noise: Noise,
     *,
     excluded: Sequence[str] = (),
-    report: Report = lambda _: None,
     check: Callable[[Fit, Record], None] | None = None,
     go_on: Callable[[], bool] = lambda: True,
-) -> Found:
+    rules: Rules = RULES,
+) -> Search:
     """Accepted causes of the whole record. Where lost samples were put right first and much is left, another cause may have looked
 
     like them: sought again in the data as they came.
 
     `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
     """
-    found = _searched(record, noise, excluded, report, check, go_on)
-    if not found.losses or not _leaves(UNKNOWN_SIGMA, found.fit, found.nominal, noise):
+    problem = Problem(noise, tuple(name for name in CATALOGUE if name not in excluded), go_on, rules)
+    found = yield from _searched(record, problem, check)
+    if not found.losses or not _leaves(rules.unknown_sigma, found.fit, found.nominal, problem):
         return found
-    report("much is left beside lost samples: sought again in the data as they came")
-    other = _searched(record, noise, (*excluded, *MENDED), report, None, go_on)
-    return other if other.fit.normal.unexplained < found.fit.normal.unexplained else found
+    yield Said("much is left beside lost samples: sought again in the data as they came")
+    as_it_came = replace(problem, names=tuple(n for n in problem.names if n not in MENDED))
+    other = yield from _searched(record, as_it_came, None)
+    if other.fit.normal.unexplained < found.fit.normal.unexplained:
+        return other
+    yield Began(found.accepted, found.record.samples)
+    return found
 
 
-def _searched(
-    record: Record,
-    noise: Noise,
-    excluded: Sequence[str],
-    report: Report,
-    check: Callable[[Fit, Record], None] | None,
-    go_on: Callable[[], bool],
-) -> Found:
+def _searched(record: Record, problem: Problem, check: Callable[[Fit, Record], None] | None) -> Search:
     """Explored on a part, confirmed and completed on all of the record."""
+    noise, mends = problem.noise, not MENDED.isdisjoint(problem.names)
     part, bare = record.beginning(EXPLORED[0]), bare_layout(record)
     record, nominal = from_segment_to_segment(record, nominal_fit(part, noise).model, bare, noise)
     raw = record.segments
     losses: tuple[Loss, ...] = ()
-    if not set(excluded) >= MENDED:
-        record, nominal, losses = _mended(record, nominal, bare, noise, report)
+    if mends:
+        record, nominal, losses = yield from _mended(record, nominal, bare, problem)
     if check is not None:
         check(nominal, record)
-    report(f"nominal fit: {np.sqrt(nominal.chi2 / nominal.normal.count.sum()):.3g} times the noise")
+    yield Nominal(float(np.sqrt(nominal.chi2 / nominal.normal.count.sum())))
     record, _, setting = set_up(record, noise, nominal)
-    names = [name for name in CATALOGUE if name not in excluded]
-    reached, first = _explored(nominal, Steps(setting, noise, names, report, record, go_on))
-    leakage_side = reached.steps.leakage_side
-    if reached.accepted and losses:
-        reached, losses = _losses_doubted(reached, raw, losses)
-    if reached.accepted and not set(excluded) >= MENDED:
-        reached, losses = _losses_completed(reached, losses)
-    return _refined(reached, nominal, first, losses, has_leakage_side=_has_leakage_side(leakage_side, reached.accepted))
+    state = yield from _explored(nominal, begun(setting, record, nominal), problem)
+    first, leakage_side = state.first, state.leakage_side
+    if state.accepted and losses:
+        state, losses = yield from _losses_doubted(state, problem, raw, losses)
+    if state.accepted and mends:
+        state, losses = yield from _losses_completed(state, problem, losses)
+    has_side = _has_leakage_side(leakage_side, state.accepted)
+    return _refined(replace(state, first=first), problem, nominal, losses, has_leakage_side=has_side)
 
 
-@dataclass(frozen=True)
-class _Reached:
-    """Where a search stands: its record and dictionaries (in `steps`), the fit, the accepted causes, the last screening."""
-
-    steps: Steps
-    fit: Fit
-    accepted: tuple[str, ...]
-    screening: Screening
-
-    def again_on(self, record: Record, start: Fit) -> _Reached:
-        """Searched once more on the whole of another record, from these causes."""
-        steps = self.steps.on(record)
-        return _Reached(steps, *steps.run(start, self.accepted))
-
-
-def _explored(nominal: Fit, steps: Steps) -> tuple[_Reached, Screening]:
-    """Searched on growing parts of the record and on all of it; with the first screening. `steps`: nothing tried yet."""
-    base, noise, whole = steps.setting, steps.noise, steps.full.samples
-    reached: _Reached | None = None
-    first: Screening | None = None
+def _explored(nominal: Fit, state: State, problem: Problem) -> Steps:
+    """Searched on growing parts of the record and on all of it; with the first screening. `state`: nothing tried yet."""
+    base, whole, first, is_begun = state.setting, state.full.samples, None, False
     for samples in (*(n for n in EXPLORED if n < 0.7 * whole), whole):
-        part = steps.full if samples == whole else steps.full.beginning(samples)
-        base = replace(base, record=part, lines_hz=steps.setting.lines_hz)
-        start, here, accepted = _start_on(base, reached, nominal, noise)
-        steps = steps.continued(here)
+        part = state.full if samples == whole else state.full.beginning(samples)
+        base = replace(base, record=part, lines_hz=state.setting.lines_hz)
+        is_hopeless = is_begun and _leaves(problem.rules.hopeless_sigma, state.fit, nominal, problem)
+        start, here, accepted = _start_on(base, state if is_begun else None, nominal, problem.noise)
+        state = replace(state.on_more(here), fit=start, accepted=accepted)
         if accepted or samples == whole:
-            start = steps.with_new_flux_before(steps.with_new_dictionaries(start))
-        is_hopeless = reached is not None and _leaves(HOPELESS_SIGMA, reached.fit, nominal, noise)
-        reached = _Reached(steps, *steps.run(start, accepted, adds=not is_hopeless))
-        first = first or steps.first
-    assert reached is not None and first is not None, "the whole record is the last part"
-    return reached, first
+            state = with_new_flux_before(with_new_dictionaries(state, problem), problem)
+        state = yield from stepwise(state, problem, adds=not is_hopeless)
+        first, is_begun = first or state.first, True
+    return replace(state, first=first)
 
 
-def _start_on(
-    base: Setting, reached: _Reached | None, nominal: Fit, noise: Noise
-) -> tuple[Fit, Setting, tuple[str, ...]]:
+def _start_on(base: Setting, reached: State | None, nominal: Fit, noise: Noise) -> tuple[Fit, Setting, tuple[str, ...]]:
     """The fit on more of the record from which a search goes on, with its dictionaries and the causes it keeps."""
     part, layout = base.record, base.layout
     if reached is None or not reached.accepted:
@@ -169,63 +155,65 @@ def _start_on(
     return (again, base, reached.accepted) if again.chi2 < start.chi2 else (start, base, ())
 
 
+Losses = tuple[Loss, ...]
+
+
 def _losses_doubted(
-    reached: _Reached, raw: Sequence[Segment], losses: tuple[Loss, ...]
-) -> tuple[_Reached, tuple[Loss, ...]]:
+    state: State, problem: Problem, raw: Sequence[Segment], losses: Losses
+) -> Generator[Step, None, tuple[State, Losses]]:
     """Searched again in the data as they came, where the causes named since explain what looked like lost samples."""
-    steps = reached.steps
-    unmended = _with_the_losses(steps.record, raw, reached.fit, steps.layout, steps.noise)
+    unmended = _with_the_losses(state, problem, raw)
     if unmended is None:
-        return reached, losses
-    steps.report("what looked like lost samples were the causes named since")
-    return reached.again_on(*unmended), ()
+        return state, losses
+    yield Said("what looked like lost samples were the causes named since")
+    return (yield from _again_on(*unmended, state, problem)), ()
 
 
-def _losses_completed(reached: _Reached, losses: tuple[Loss, ...]) -> tuple[_Reached, tuple[Loss, ...]]:
+def _losses_completed(state: State, problem: Problem, losses: Losses) -> Generator[Step, None, tuple[State, Losses]]:
     """Searched again where the named causes make further lost samples visible."""
-    steps, least = reached.steps, guard_of_lost_samples(reached.fit)
-    mended, better, more = _mended(steps.record, reached.fit, steps.layout, steps.noise, steps.report, least)
-    return (reached.again_on(mended, better), losses + more) if more else (reached, losses)
+    least = guard_of_lost_samples(state.fit, problem.rules)
+    mended, better, more = yield from _mended(state.record, state.fit, state.layout, problem, least)
+    return ((yield from _again_on(mended, better, state, problem)), losses + more) if more else (state, losses)
 
 
-def _refined(
-    reached: _Reached, nominal: Fit, first: Screening, losses: tuple[Loss, ...], *, has_leakage_side: bool
-) -> Found:
+def _again_on(record: Record, start: Fit, state: State, problem: Problem) -> Steps:
+    """Searched once more on the whole of another record, from these causes, with what is known of the machine so far."""
+    fresh = begun(replace(state.setting, record=record), record, start, state.accepted)
+    return (yield from stepwise(fresh, problem))
+
+
+def _refined(state: State, problem: Problem, nominal: Fit, losses: Losses, *, has_leakage_side: bool) -> Found:
     """The last fit's sides and loops refined, unless too much is left; with all that was seen on the way."""
-    steps, fitted, noise, layout = reached.steps, reached.fit, reached.steps.noise, reached.steps.layout
-    ruled_out = steps.ruled_out
-    much_is_ruled_out = ruled_out.chi2 > UNKNOWN_SHARE * (nominal.chi2 - fitted.chi2 + ruled_out.chi2)
-    if not (much_is_ruled_out or _leaves(UNKNOWN_SIGMA, fitted, nominal, noise)):
-        fitted, layout = refined(fitted, steps.record, layout, noise, has_leakage_side=has_leakage_side)
-    iron_wb, leakage_wb = largest_fluxes(steps.record, fitted.model, layout)
+    fitted, layout, ruled_out, rules = state.fit, state.layout, state.ruled_out, problem.rules
+    much_is_ruled_out = ruled_out.chi2 > rules.unknown_share * (nominal.chi2 - fitted.chi2 + ruled_out.chi2)
+    if not (much_is_ruled_out or _leaves(rules.unknown_sigma, fitted, nominal, problem)):
+        fitted, layout = refined(fitted, state.record, layout, problem.noise, has_leakage_side=has_leakage_side)
+    iron_wb, leakage_wb = largest_fluxes(state.record, fitted.model, layout)
     setting = replace(
-        steps.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
+        state.setting, layout=layout, iron_flux_wb=iron_wb, leakage_flux_wb=leakage_wb, nominal=fitted.model.nominal
     )
     # no cause gains more than all together: where numbers have run far, a loss to first order says so
     most = max(nominal.chi2 - fitted.chi2, 0.0)
-    gains = {name: min(loss, most) for name, loss in losses_of(fitted, reached.accepted).items()}
-    # what settling gained may be the same
-    ruled_out = (
-        replace(ruled_out, chi2=max(ruled_out.chi2 - (reached.fit.chi2 - fitted.chi2), 0.0))
-        if ruled_out.chi2
-        else ruled_out
-    )
+    if ruled_out.chi2:
+        # what refining gained may be the same
+        ruled_out = ruled_out._replace(chi2=max(ruled_out.chi2 - (state.fit.chi2 - fitted.chi2), 0.0))
+    assert state.screening is not None and state.first is not None, "the whole record is the last part"
     return Found(
         nominal,
         fitted,
-        reached.accepted,
-        steps.record,
+        state.accepted,
+        state.record,
         layout,
         setting,
-        reached.screening,
-        first,
-        steps.below,
-        gains,
+        state.screening,
+        state.first,
+        dict(state.below),
+        {name: min(loss, most) for name, loss in losses_of(fitted, state.accepted).items()},
         tuple(x for x in losses if not x.is_spike),
         tuple(x for x in losses if x.is_spike),
-        steps.material_chi2,
+        material_chi2(state, problem),
         ruled_out,
-        steps.go_on(),
+        problem.go_on(),
     )
 
 
@@ -238,20 +226,22 @@ def _has_leakage_side(leakage_side: frozenset[str], accepted: Sequence[str]) -> 
     )
 
 
-def _leaves(sigma: float, fitted: Fit, nominal: Fit, noise: Noise) -> bool:
+def _leaves(sigma: float, fitted: Fit, nominal: Fit, problem: Problem) -> bool:
     """Whether more than so many `sigma` of the noise, and more than a right model leaves, is surely not explained."""
-    return surely_left(fitted, noise) > max(sigma**2, UNKNOWN_SHARE * surely_left(nominal, noise))
+    noise, rules = problem.noise, problem.rules
+    share = rules.unknown_share * surely_left(nominal, noise, rules)
+    return surely_left(fitted, noise, rules) > max(sigma**2, share)
 
 
 def _mended(
-    record: Record, current: Fit, layout: Layout, noise: Noise, report: Report, least: float = 0.0
-) -> tuple[Record, Fit, tuple[Loss, ...]]:
+    record: Record, current: Fit, layout: Layout, problem: Problem, least: float = 0.0
+) -> Generator[Step, None, tuple[Record, Fit, Losses]]:
     """Unmarked losses put right, and spikes left out, until a better fit shows no more; none where most of the misfit stays, or where they
 
     gain less than `least`. A cause that is not in the model yet, like the kinks of a dead time, can look like many small losses.
     """
-    losses: tuple[Loss, ...] = ()
-    mended, better = record, current
+    losses: Losses = ()
+    mended, better, noise, rules = record, current, problem.noise, problem.rules
     for _ in range(MENDING_ROUNDS):
         # from the data as they came: the better model places what the worse one misplaced
         again, seen = mend(record, better.model, layout, noise, is_first=not losses)
@@ -260,41 +250,41 @@ def _mended(
         trial = fit(better.model, again, layout, noise, rounds=6, tolerance=1.0)
         if trial.chi2 >= better.chi2:
             break
-        is_slow = trial.normal.unexplained > MENDED_AT_ONCE * better.normal.unexplained
+        is_slow = trial.normal.unexplained > rules.mended_at_once * better.normal.unexplained
         mended, better, losses = again, trial, seen
         if is_slow:
             break
     excess, left = current.normal.unexplained, better.normal.unexplained
     # what a noise measured too low adds to both
     by_the_noise = noise.uncertainty * float(current.normal.count.sum())
-    stays = max(left - by_the_noise, 0.0) > (1.0 - MENDED_SHARE) * max(excess - by_the_noise, 0.0)
-    if not losses or stays or excess - left < max(least, MENDED_LEAST_SHARE * excess):
+    stays = max(left - by_the_noise, 0.0) > (1.0 - rules.mended_share) * max(excess - by_the_noise, 0.0)
+    if not losses or stays or excess - left < max(least, rules.mended_least_share * excess):
         return record, current, ()
     spikes = sum(x.is_spike for x in losses)
-    report(f"{sum(x.samples for x in losses) - spikes} unmarked lost samples put right, {spikes} spikes left out")
+    lost = sum(x.samples for x in losses) - spikes
+    yield Said(f"{lost} unmarked lost samples put right, {spikes} spikes left out")
     return mended, better, losses
 
 
-def _with_the_losses(
-    mended: Record, raw: Sequence[Segment], fitted: Fit, layout: Layout, noise: Noise
-) -> tuple[Record, Fit] | None:
+def _with_the_losses(state: State, problem: Problem, raw: Sequence[Segment]) -> tuple[Record, Fit] | None:
     """The data as they came and the fit of all accepted causes to them, where that is hardly worse: then nothing was lost."""
+    mended, fitted = state.record, state.fit
     segments = tuple(replace(r, flux_before_wb=m.flux_before_wb) for r, m in zip(raw, mended.segments, strict=True))
     record = replace(mended, segments=segments)
-    trial = fit(fitted.model, record, layout, noise)
+    trial = fit(fitted.model, record, state.layout, problem.noise)
     masked = float(trial.normal.count.sum() - fitted.normal.count.sum())
     gain = trial.chi2 - fitted.chi2 - 3.0 * max(masked, 0.0)
-    return (record, trial) if gain < guard_of_lost_samples(fitted) else None
+    return (record, trial) if gain < guard_of_lost_samples(fitted, problem.rules) else None
 
 
-def _on_more(reached: _Reached, setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
+def _on_more(reached: State, setting: Setting, noise: Noise) -> tuple[Fit, Setting]:
     """The accepted causes of a part fitted to more of the record, in dictionaries spread over the fluxes reached there."""
-    seen, model = reached.steps, reached.fit.model
-    there = replace(setting, layout=seen.layout, iron_flux_wb=seen.setting.iron_flux_wb)
-    fluxes = largest_fluxes(seen.record, model, seen.layout)
-    completed = _without_unseen_speed(_completed(model, reached.accepted, there), seen.record, setting.record)
-    wider, there = respread(carried_over(completed, seen.layout, fluxes, seen.layout), there)
-    return begun(wider, there, noise), there
+    seen, model = reached.layout, reached.model
+    there = replace(setting, layout=seen, iron_flux_wb=reached.setting.iron_flux_wb)
+    fluxes = largest_fluxes(reached.record, model, seen)
+    completed = _without_unseen_speed(_completed(model, reached.accepted, there), reached.record, setting.record)
+    wider, there = respread(carried_over(completed, seen, fluxes, seen), there)
+    return begun_with(wider, there, noise), there
 
 
 def _without_unseen_speed(model: Model, part: Record, record: Record) -> Model:

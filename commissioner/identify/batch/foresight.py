@@ -42,7 +42,7 @@ class Foresight:
         scale = np.sqrt(np.maximum(np.diag(reduced), 1e-300))
         normal = reduced / np.outer(scale, scale) + 1e-12 * np.eye(scale.size)
         gain = np.linalg.solve(normal, free.T @ left / scale) / scale
-        squares = self.seen.squares - 2.0 * moved @ score + moved @ information @ moved - gain @ (free.T @ left)
+        squares = float(self.seen.squares - 2.0 * moved @ score + moved @ information @ moved - gain @ (free.T @ left))
         n = self.problem.samples
         return float(n * math.log(max(float(squares), 1e-9 * self.seen.squares) / n + 1e-300) + PRICE * free.shape[1])
 

@@ -1,8 +1,9 @@
-"""Two results brought to one flux and one temperature, so that what differs between them is the motor."""
+"""Results brought to one flux and one temperature, so that what differs between them is the motor."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,24 +38,27 @@ class CommonGround:
 
 def brought_together(old: Result, new: Result) -> tuple[Combined, Combined, CommonGround]:
     """Both results at the lower of their flux levels, and at the first one's winding temperature where both are known."""
-    (one, other), flux_wb, of_flux = _at_one_flux(old, new)
-    (one, other), degc, of_heat = _at_one_temperature(one, other)
-    return one.combined, other.combined, CommonGround(flux_wb, degc, (*of_flux, *of_heat))
+    (one, other), ground = on_common_ground((old, new))
+    return one, other, ground
 
 
-def _at_one_flux(old: Result, new: Result) -> tuple[tuple[Result, Result], float | None, list[str]]:
-    if old.flux_wb is None or new.flux_wb is None:
-        return (old, new), None, ["the flux of one result is not known: L_M is compared as it was measured"]
-    flux_wb = min(old.flux_wb, new.flux_wb)
-    sentences: list[str] = []
-    moved = []
-    for result in (old, new):
-        at, sentence = _at_flux(result, flux_wb)
-        moved.append(at)
-        sentences += [sentence] if sentence else []
+def on_common_ground(results: Sequence[Result]) -> tuple[tuple[Combined, ...], CommonGround]:
+    """All results at the lowest of their flux levels, and at the first one's winding temperature where all are known."""
+    moved, flux_wb, of_flux = at_one_flux(results)
+    moved, degc, of_heat = _at_one_temperature(moved)
+    return tuple(result.combined for result in moved), CommonGround(flux_wb, degc, (*of_flux, *of_heat))
+
+
+def at_one_flux(results: Sequence[Result]) -> tuple[Sequence[Result], float | None, list[str]]:
+    known = [result.flux_wb for result in results if result.flux_wb is not None]
+    if len(known) < len(results):
+        return results, None, ["the flux of one result is not known: L_M is compared as it was measured"]
+    flux_wb = min(known)
+    moved = [_at_flux(result, flux_wb) for result in results]
+    sentences = [sentence for _, sentence in moved if sentence]
     if not sentences:
-        sentences = [f"both L_M hold at {flux_wb:.3g} Wb peak stator flux"]
-    return (moved[0], moved[1]), flux_wb, sentences
+        sentences = [f"{'both' if len(results) == 2 else 'all'} L_M hold at {flux_wb:.3g} Wb peak stator flux"]
+    return [result for result, _ in moved], flux_wb, sentences
 
 
 def _at_flux(result: Result, flux_wb: float) -> tuple[Result, str]:
@@ -91,10 +95,17 @@ def _with_inductance(combined: Combined, machine: InverseGamma, relative_std: fl
     return replace(combined, parameters=machine, covariance=covariance)
 
 
-def _at_one_temperature(old: Result, new: Result) -> tuple[tuple[Result, Result], float | None, list[str]]:
-    if old.winding_degc is None or new.winding_degc is None:
-        return (old, new), None, ["a winding temperature is not known: resistances may differ by what 25 K make"]
-    factor = (old.winding_degc - COPPER_ZERO_DEGC) / (new.winding_degc - COPPER_ZERO_DEGC)
+def _at_one_temperature(results: Sequence[Result]) -> tuple[Sequence[Result], float | None, list[str]]:
+    degc = results[0].winding_degc
+    if degc is None or any(result.winding_degc is None for result in results):
+        return results, None, ["a winding temperature is not known: resistances may differ by what 25 K make"]
+    moved = [at_temperature(result, degc, results[0].name) for result in results[1:]]
+    return [results[0], *(result for result, _ in moved)], degc, [sentence for _, sentence in moved]
+
+
+def at_temperature(new: Result, degc: float, of: str) -> tuple[Result, str]:
+    assert new.winding_degc is not None
+    factor = (degc - COPPER_ZERO_DEGC) / (new.winding_degc - COPPER_ZERO_DEGC)
     before, scale = new.combined.parameters, np.array([factor, factor, 1.0, 1.0])
     after = replace(
         before,
@@ -103,8 +114,8 @@ def _at_one_temperature(old: Result, new: Result) -> tuple[tuple[Result, Result]
     )
     combined = replace(new.combined, parameters=after, covariance=new.combined.covariance * np.outer(scale, scale))
     sentence = (
-        f"resistances of {new.name}, measured at {new.winding_degc:.3g} °C, are compared at the {old.winding_degc:.3g} °C of "
-        f"{old.name} (R_s {before.stator_resistance_ohm:.4g} -> {after.stator_resistance_ohm:.4g} ohm); the rotor is taken to be "
+        f"resistances of {new.name}, measured at {new.winding_degc:.3g} °C, are compared at the {degc:.3g} °C of "
+        f"{of} (R_s {before.stator_resistance_ohm:.4g} -> {after.stator_resistance_ohm:.4g} ohm); the rotor is taken to be "
         "as warm as the winding"
     )
-    return (old, replace(new, combined=combined)), old.winding_degc, [sentence]
+    return replace(new, combined=combined), sentence

@@ -33,13 +33,15 @@ class State(Enum):
 
 @dataclass(frozen=True)
 class Entry:
-    """One recording in the history: where the machine ran, and its indicators as (value, noise std)."""
+    """One recording in the history: where the machine ran, and its indicators as (value, noise std). `utc`: when it was kept;
+    empty in baselines of before."""
 
     source: str
     speed_rad_per_s: float
     torque_nm: float
     supply_hz: float
     indicators: Mapping[str, tuple[float, float]]
+    utc: str = ""
 
 
 @dataclass(frozen=True)

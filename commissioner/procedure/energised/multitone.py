@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from commissioner.errors import Aborted
+from commissioner.errors import Aborted, DataRefused
+from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.model import ModelChoice
+from commissioner.identify.batch.segments import Segment
 from commissioner.identify.excite.flux_guard import FluxAdvice, FluxGuard, FluxReading
-from commissioner.identify.excite.tones import DesignedExcitation, Excitation, Tone
+from commissioner.identify.excite.tones import DesignedExcitation, Excitation, ExcitationLimits, Tone, design
 from commissioner.identify.inverter.compensation import Compensation
+from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
 from commissioner.identify.observer.convergence import Settling, settled
 from commissioner.identify.observer.coordinates import PRIOR_LOG_STD
@@ -30,7 +35,7 @@ KNEES, EXCITED = 8.0, 0.3
 """The observer adapts once the current reaches this many knees of the inverter's error, or this share of the designed
 peak: below, the dead band takes most of the command and the samples tell about its shape, not about the motor."""
 COMPENSATION_ROWS = 1025
-WARM_UP_SAMPLES = 6000
+WARM_UP_SAMPLES, FITTED_SAMPLES = 6000, 600
 
 
 class UnderTest:
@@ -178,7 +183,8 @@ def plate_machine(job: Job, findings: Findings) -> InverseGamma:
 
 
 def warm_up(nameplate: Nameplate) -> None:
-    """Run observer and guard once on made-up samples: what has to be compiled is compiled before anything is energised."""
+    """Run observer, guard, design and fit once on made-up samples: what has to be compiled is compiled before anything is
+    energised, and the motor does not wait for it between two tests."""
     period_s = 2e-4
     time_s = np.arange(WARM_UP_SAMPLES) * period_s
     signal = np.cos(2.0 * np.pi * time_s)
@@ -189,6 +195,15 @@ def warm_up(nameplate: Nameplate) -> None:
     guard = FluxGuard(1.0, 0.01, tone, period_s, 1.0)
     for part in np.array_split(signal, 4):
         guard.advance(part, part, observer.advance(part, part, 1), 0.1)
+    design(
+        prior(nameplate).typical,
+        ExcitationLimits(1.0, nameplate.rated_current_peak_a, nameplate.rated_voltage_v),
+        period_s,
+    )
+    cut = [Segment(signal[:FITTED_SAMPLES], signal[:FITTED_SAMPLES], 0.0, starts_at_rest=False)]
+    for model in (ModelChoice(), ModelChoice(extra_powers=1, leg=LegLaw(1.0), with_delay=True)):
+        with suppress(DataRefused):
+            fit_segments(cut, period_s, prior(nameplate).typical, model, max_iterations=1)
 
 
 def _compensation(inverter: InverterError, axis_deg: float, span_a: float) -> Compensation:

@@ -12,7 +12,7 @@ from commissioner.report.run.certificate import certificate
 from commissioner.report.run.evidence import evidence
 from commissioner.report.run.plain_simulation import plain_simulation
 from commissioner.report.run.subject import Subject
-from commissioner.report.run.tuning import tuning
+from commissioner.report.run.tuned import tuned_sheet
 from commissioner.report.sheet.document import Margins, Page, document
 
 
@@ -25,9 +25,9 @@ def run_page(
 ) -> str:
     """The whole report as one self-contained HTML text, for every way a run can end. `digest`: SHA-256 of result.json."""
     subject = Subject(result, journal, findings, request or {})
+    first = tuned_sheet(subject) if result.get("tune") else certificate(subject)
     pages = [
-        Page("result", "Result", certificate(subject)),
-        Page("tuning", "Tuning", tuning(subject)),
+        Page("result", "Result", first),
         Page("evidence", "Evidence", evidence(subject)),
         Page("simulation", "Plain simulation", plain_simulation(subject)),
         Page("a", "A Checks", checks_and_course(subject), is_appendix=True),

@@ -14,7 +14,7 @@ from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
 from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.checks import DriveLimits, StreamPace
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
@@ -244,6 +244,7 @@ def _job(record: Mapping[str, Any]) -> Job:
         write_back=record["write_back"],
         link_latency_s=record["link_latency_s"],
         parameter_factors=record.get("parameter_factors", {}),
+        pace=StreamPace(**record["pace"]) if record.get("pace") else None,
     )  # fmt: skip
 
 

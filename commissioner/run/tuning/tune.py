@@ -26,11 +26,9 @@ from commissioner.procedure.tuned import TuneVerdict, judge_tunings
 from commissioner.records import ParameterSnapshot
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
-from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import summarise
-from commissioner.run.archive.folder import RunFolder, read_journal
-from commissioner.run.archive.summary import read_file
-from commissioner.run.commission import Commissioned, Order
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.commission import Commissioned, Order, write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -361,9 +359,7 @@ def _save(order: Order, folder: RunFolder, found: TuneFindings, ended: RunEnded)
     document["objections"] = found.verdict.objections if found.verdict else ()
     document["remarks"] = [f"tuning: {tuning.proof}", *found.remarks]
     result = plain(document)
-    folder.save("result.json", result)
-    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
-    folder.save_text("report.html", run_page(result, journal, found.common, request))
+    write_report(folder, result, found.common)
     folder.cover()
     return result
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -36,21 +37,36 @@ class View:
 
 
 @cache
-def environment(language: str) -> Environment:
-    """Templates with the words of one language; everything that is not marked safe is escaped."""
-    made = Environment(
+def environment() -> Environment:
+    """The templates, for every language; everything that is not marked safe is escaped."""
+    return Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=select_autoescape(["html"]),
         undefined=ChainableUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        auto_reload=False,
         extensions=["jinja2.ext.i18n"],
     )
+
+
+@cache
+def words_of(language: str) -> Mapping[str, Any]:
+    """What templates say and write numbers with, in one language."""
     texts = Texts(language)
-    made.install_gettext_callables(texts.gettext, texts.ngettext, newstyle=True)  # type: ignore[attr-defined]
-    made.globals |= {"t": texts, "w": Words(texts), "n": texts.number, "signed": texts.signed, "short": texts.short}
-    made.globals |= {"tell": texts.tell}
-    return made
+    scratch = Environment(extensions=["jinja2.ext.i18n"])
+    scratch.install_gettext_callables(texts.gettext, texts.ngettext, newstyle=True)  # type: ignore[attr-defined]
+    gettext = scratch.globals["gettext"]
+    said = {"gettext": gettext, "_": gettext, "tell": texts.tell, "t": texts, "w": Words(texts)}
+    return said | {"n": texts.number, "signed": texts.signed, "short": texts.short}
+
+
+def prepare() -> None:
+    """Compile every template and read every catalogue: in a thread, so that the first page does not hold up a run's beat."""
+    for name in environment().list_templates(extensions=["html"]):
+        environment().get_template(name)
+    for language in LANGUAGES:
+        words_of(language)
 
 
 def render(request: Request, view: View, place: Place = NOWHERE, *, status: int = 200, **context: Any) -> Response:
@@ -63,9 +79,10 @@ def render(request: Request, view: View, place: Place = NOWHERE, *, status: int 
     band = band_of(parts, who, place, texts)
     theme = request.cookies.get("theme", "")
     html = (
-        environment(texts.language)
+        environment()
         .get_template(view.template)
         .render(
+            **words_of(texts.language),
             view=view,
             place=place,
             band=band,

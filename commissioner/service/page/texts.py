@@ -42,7 +42,7 @@ def catalogue(language: str) -> Catalogue:
         found = [m for m in read_po(file, locale=language) if m.id and m.string]
     messages = {str(m.id): str(m.string) for m in found}
     gaps = [m for m in found if m.context == CORE and "%(" in str(m.id)]
-    gaps.sort(key=lambda m: -len(str(m.id)))
+    gaps.sort(key=lambda m: -len(re.sub(r"%\(\w+\)s", "", str(m.id))))  # the most particular first
     return Catalogue(messages, tuple((_pattern(str(m.id)), str(m.string)) for m in gaps))
 
 

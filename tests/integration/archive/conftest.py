@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support import postgres
+from tests.support.archive import postgres
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
 from commissioner.run.index.rows import CREATE, Row, Wanted
 from commissioner.run.index.store import NAME, check_url
-from tests.support.synthetic_archive import make_archive, make_run
+from tests.support.archive.synthetic import make_archive, make_run
 
 
 @pytest.fixture

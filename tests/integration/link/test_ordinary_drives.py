@@ -297,3 +297,39 @@ def test_labels_that_are_not_in_the_registers_named_make_no_drive_file(tmp_path)
         answer = ask_new(drive, out, *LABELS[:4], "p. 1", "y", "1240", "7.3", "p. 1", "n", "n", "n", "n")
     assert isinstance(answer.exception, CheckFailed | SystemExit) and not out.exists()
     assert not [r for r in drive.truth["requests"] if r[0] in (5, 6, 16)]
+
+
+def test_a_drive_that_gives_one_register_at_a_time_is_read_and_written_so():
+    profile = variant("yaskawa_a1000", link__max_read_registers=1, link__max_write_registers=1)
+    with LibmodbusDrive(*YASKAWA, "--max-read", "1", "--max-write", "1") as drive, inverter(drive, profile) as yaskawa:
+        yaskawa.write_circuit(NEW, PLATE, yaskawa.snapshot())
+    assert {r[2] for r in drive.truth["requests"]} == {1}
+    assert drive.truth["registers"][str(0x312)] == 7400
+
+
+def test_a_block_across_a_gap_is_an_exception_and_no_zeros():
+    from commissioner.errors import RequestRefused
+
+    with (
+        LibmodbusDrive(*YASKAWA) as drive,
+        closing(open_port(parse_url(drive.url), load_profile("yaskawa_a1000"))) as port,
+        pytest.raises(RequestRefused) as refused,
+    ):
+        port.read(0x311, 3)
+    assert refused.value.value == 2
+
+
+def test_an_ordinary_drive_is_checked_written_and_restored_over_a_serial_line():
+    from tests.conformance.test_independent_peers import null_modem
+
+    profile = load_profile("danfoss_fc302")
+    with (
+        null_modem() as (theirs, ours),
+        LibmodbusDrive(*DANFOSS, line=("--rtu", theirs)) as drive,
+        closing(open_port(parse_url(f"rtu://{ours}?parity=N&stop=1&baud=115200"), profile)) as port,
+    ):
+        danfoss = Inverter(port, profile, sleep=lambda _: None)
+        found = danfoss.snapshot()
+        assert danfoss.write_circuit(NEW, PLATE, found).written
+        danfoss.restore(found)
+    assert drive.truth["registers"]["1300"] == 36000

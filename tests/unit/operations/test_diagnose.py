@@ -1,17 +1,10 @@
 """A diagnosis as an operation: what it hears of the search."""
 
-from commissioner.operations.diagnose import _Search
-from commissioner.operations.events import SearchSaid
+from commissioner.diagnose.search.journal import Accepted, Dropped
+from commissioner.operations.diagnose import withdrawn
 
 
 def test_what_was_named_and_taken_back_is_remembered():
-    heard = []
-    search = _Search(heard.append)
-    for line in (
-        "accepted dead_time: 2 times the noise",
-        "accepted remanence: 1 times the noise",
-        "  dropped remanence",
-    ):
-        search(line)
-    assert search.withdrawn({"dead_time"}) == ["remanence"]
-    assert heard[-1] == SearchSaid("  dropped remanence")
+    dropped = Dropped("remanence", 3.0, 50.0, "materiality", is_sound=True, is_taken=True)
+    steps = (Accepted("dead_time", 2.0), Accepted("remanence", 1.0), dropped)
+    assert withdrawn(steps, {"dead_time"}) == ["remanence"]

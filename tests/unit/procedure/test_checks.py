@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, judge_drive
+from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, StreamPace, judge_drive
 from commissioner.records import DriveIdentity, DriveStatus
 
 PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
@@ -84,3 +84,13 @@ def test_a_drive_too_small_for_the_test_current_fails():
 def test_a_drive_set_up_for_another_motor_fails_and_an_empty_plate_does_not():
     assert _failed(plate={"rated_current_a": 5.2, "rated_voltage_v": 0.0}) == []
     assert _failed(plate={"rated_current_a": 8.0}) == ["rated_current_a in the drive"]
+
+
+@pytest.mark.parametrize(("round_trip_s", "passes"), [(0.0057, True), (0.0059, False), (0.03, False), (0.1, False)])
+def test_a_link_that_cannot_carry_the_samples_is_refused_with_the_figure_that_would_do(round_trip_s, passes):
+    """29 samples of 0.2 ms a window; 125 registers of it take 22 bits each on a serial line."""
+    identity = replace(IDENTITY, control_period_s=2e-4)
+    results = judge_drive(identity, (STATUS, STATUS), {}, PLATE, LIMITS, 6.4, StreamPace(round_trip_s, 29, 125))
+    (pace,) = [result for result in results if result.name == "the link keeps up with the samples"]
+    assert pace.has_passed is passes
+    assert "5.8 ms" in pace.limit and f"{(125 * 22 + 430) / 5.8e-3:.0f} Bd" in pace.remedy

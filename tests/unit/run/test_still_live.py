@@ -1,5 +1,6 @@
 """A drive that was told to switch off and does not say that it has: no run ends well on that."""
 
+import sys
 import time
 from types import SimpleNamespace
 
@@ -7,9 +8,11 @@ import pytest
 
 from commissioner.errors import Aborted, DriveFault, ReplyTimeout
 from commissioner.link.drive.facts import DisarmReport, WriteReport
+from commissioner.link.wire.port import LinkStats
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder
+from commissioner.run.holding.priority import raised_priority
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.run.stream import Stream
@@ -23,6 +26,7 @@ class Drive:
 
     def __init__(self, live_from):
         self.live_from, self.disarmed = live_from, 0
+        self.port = SimpleNamespace(stats=LinkStats())
 
     def disarm(self):
         self.disarmed += 1
@@ -161,3 +165,49 @@ def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
     with pytest.raises(DriveFault, match="no samples"):
         stream.next_block(0.05)
     assert time.monotonic() - began < 1.0
+
+
+@pytest.mark.parametrize(("gap_s", "is_named"), [(0.4, True), (0.1, False)])
+def test_a_fault_in_a_session_whose_host_was_late_says_so_with_its_longest_gap(folder, gap_s, is_named):
+    def course():
+        raise DriveFault("the drive tripped: watchdog expired", step="watch", remedy="start again")
+        yield
+
+    drive = Drive(live_from=9)
+    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
+    runner._progress.has_touched = True
+    runner._progress.facts = SafetyFacts(energised=True, watchdog_s=0.5)
+    drive.port.stats.longest_gap_s = gap_s
+    ended = runner.perform(course())
+    assert ended.outcome == "faulted"
+    assert ("this host was late: 0.4 s" in ended.reason) is is_named
+    assert ("less busy" in ended.error["remedy"]) is is_named
+
+
+def test_a_gap_between_two_sessions_is_no_lateness(folder):
+    def course():
+        yield ask.Wait(0.0)
+        raise DriveFault("the drive does not follow", step="enable", remedy="start again")
+
+    drive = Drive(live_from=9)
+    drive.port.stats.longest_gap_s = 3.0
+    runner = Runner(drive, folder, bounds=None, watch=None, present=lambda record: None)
+    runner._progress.facts = SafetyFacts(energised=False, watchdog_s=0.5)
+    assert "late" not in runner.perform(course()).reason
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nice values are POSIX's")
+@pytest.mark.parametrize("refuses", [False, True])
+def test_priority_is_asked_for_and_given_back(monkeypatch, refuses):
+    asked = []
+
+    def set_it(which, who, value):
+        asked.append(value)
+        if refuses:
+            raise PermissionError
+
+    monkeypatch.setattr("os.getpriority", lambda which, who: 5)
+    monkeypatch.setattr("os.setpriority", set_it)
+    with raised_priority():
+        assert asked == [-5]
+    assert asked == [-5, 5]

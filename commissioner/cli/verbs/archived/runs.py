@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.operations.runs import Archive, Wanted, find_runs, index_runs
-from commissioner.operations.runs import show_run as look_up
+from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs
+from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.catalogue import RunSummary
 
 SHOWN = 50

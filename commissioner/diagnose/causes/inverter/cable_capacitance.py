@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from commissioner.diagnose.causes.cause import NO_FAULT, Cause, Entry, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import CABLE
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -37,12 +35,10 @@ class CableCapacitance(Cause):
             Term(self.name, when, "F", CABLE, k, 1e-9, 0.0, MOST_F) for k, when in enumerate(("at", "before", "after"))
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {"capacitance_nf": (sum(values.values()) * 1e9, "nF")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": 1e-9 * sizes["capacitance_nf"]}
 
 

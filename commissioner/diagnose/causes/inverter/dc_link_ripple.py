@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import NO_FAULT, Entry, Form, Words
 from commissioner.diagnose.causes.inverter.link import COLUMN, OfTheLink
 from commissioner.diagnose.causes.mains_lines import line_entry
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import VOLTAGE_MOD
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -46,7 +44,7 @@ class DcLinkRipple(OfTheLink):
             for n in names
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         sizes: dict[str, tuple[float, str]] = {}
         for base in (100, 120, 300, 360):
             parts = [v for k, v in values.items() if k.startswith(f"ripple_{base}_")]
@@ -54,9 +52,7 @@ class DcLinkRipple(OfTheLink):
                 sizes[f"amplitude_{base}_hz"] = (float(np.sqrt(2.0 * np.mean(np.square(parts)))), "1")
         return sizes
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return line_entry(self.line, sizes, setting.lines_hz)
 
 

@@ -21,7 +21,7 @@ from commissioner.diagnose.causes.regressors import (
     behind_rectifier,
     power_of,
 )
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes, as_much_of, nearest_course
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, as_much_of, nearest_course
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels.kinds import VOLTAGE_MOD
 from commissioner.diagnose.plant.model import Model, Term
@@ -81,7 +81,7 @@ class DcLinkSag(OfTheLink):
             Term(self.name, n, "1", VOLTAGE_MOD, record.channel(n), *bounds, channel=n) for n, bounds in most.items()
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """The sag at rated power; of a recorded link whose course the motor's own power hardly makes, the part that reaches the motor,
 
         where that is most of what is lost: in a link that is recorded coarsely the sag may be hidden.
@@ -111,9 +111,7 @@ class DcLinkSag(OfTheLink):
     def words_for(self, sizes: Mapping[str, float]) -> Words:
         return self.of_the_recorded_swing if "of_the_recorded_swing" in sizes else self.words
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """All of the sag through the one lag that comes nearest."""
         size, lag = sagging(setting, values)
         return {"size": size, "time_constant_s": lag}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.diagnose.causes.cause import NO_FAULT, SAME, AsOne, Cause, Entry, Form, Procedure, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes, listed, spline_value
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes, listed, spline_value
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, Term
@@ -48,7 +48,7 @@ class LegLoss(Cause):
         )
         return (*(Term(self.name, f"leg_{k}", "V", kind, k, 0.1, 0.0, np.inf) for k in range(count)), *shares)
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         layout = setting.layout
         weights = listed(values, "leg", layout.legs_vectors.shape[0])
         top = spline_value(layout.legs_vectors, weights, layout.legs_top, layout.legs_top)
@@ -68,9 +68,7 @@ class LegLoss(Cause):
     def unknown_form(self, model: Model, layout: Layout) -> Mapping[str, float]:
         return {"voltage_v": tail_of_legs(model, layout)[0]}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": sizes["voltage_v"], "knee_a": max(sizes["half_current_a"], 1e-6) / self.half_over_knee}
 
 

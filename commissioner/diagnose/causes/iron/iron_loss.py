@@ -11,7 +11,7 @@ import numpy as np
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Procedure, Proposal, Standing, Words
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.sampling.sampling_delay import EARLY, SamplingDelay
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.kernels.kinds import BRANCH, CABLE, IRON_LOSS
 from commissioner.diagnose.plant.model import Model, Term
@@ -85,7 +85,7 @@ class IronLoss(Cause):
         )
         return (Term(self.name, "conductance", "S", IRON_LOSS, 0, 1e-4, 0.0, 0.2), *paths)
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """At low frequency, where eddy currents fill the sheet."""
         return {"conductance_ms": (sum(v for k, v in values.items() if k != EDGE.symbol) * 1e3, "mS")}
 
@@ -127,9 +127,7 @@ class IronLoss(Cause):
         if EDGE.symbol in model.of(self.name) and SamplingDelay.name in absent:
             yield SamplingDelay.name, read_late(model, model.nominal[2])
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": 1e-3 * sizes["conductance_ms"]}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.in_points import InPoints
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes, listed, spline_value
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed, spline_value
 from commissioner.diagnose.kernels.kinds import LEAK_SPLIT, LEAKAGE_CURVE
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -67,7 +67,7 @@ class LeakageSaturation(Cause):
         curve = tuple(Term(self.name, f"curve_{k}", "1/H", LEAKAGE_CURVE, k, step, 0.0, np.inf) for k in range(count))
         return (*curve, Term(self.name, "split", "1", LEAK_SPLIT, 0, 0.1, -0.7, 0.7))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Drop of the inductance (flux over current) from no current to the largest that the leakage path carries.
 
         The path's own inductance is L_sigma with the stator current's leakage, (1 + L_sigma/L_M) L_sigma with the rotor's.
@@ -78,9 +78,7 @@ class LeakageSaturation(Cause):
         growth = own_h * spline_value(layout.leak_vectors, weights, layout.leak_top_wb, flux)
         return {"inductance_drop": (growth / (1.0 + growth), "1"), "at_current_a": (flux / own_h * (1.0 + growth), "A")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """The simulator states the drop at twice the rated current: first order in the square of the current."""
         reach = min(2.0 * setting.facts.rated_current_peak_a / sizes["at_current_a"], 3.0)
         gain = reach**2 * sizes["inductance_drop"] / max(1.0 - sizes["inductance_drop"], 0.1)

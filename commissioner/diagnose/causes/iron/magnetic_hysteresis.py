@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.iron.side import split
-from commissioner.diagnose.causes.setting import Setting, Sizes, listed
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes, listed
 from commissioner.diagnose.kernels.kinds import MEMORY, STOP
 from commissioner.diagnose.kernels.memory import loop_width
 from commissioner.diagnose.plant.model import Model, Term
@@ -53,7 +51,7 @@ class MagneticHysteresis(Cause):
         )
         return (*loops, split(self.name))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Largest current of the memory, and the flux at which it is, of those reached."""
         rates = setting.layout.stop_radius_wb[:, 1]
         fluxes = np.linspace(setting.iron_flux_wb, 0.0, 21)
@@ -63,9 +61,7 @@ class MagneticHysteresis(Cause):
         widest = int(np.argmax(currents))
         return {"coercive_current_a": (float(currents[widest]), "A"), "at_flux_wb": (float(fluxes[widest]), "Wb")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": sizes["coercive_current_a"], "shape": "plays"}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.iron.side import split
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes, listed, spline_value
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed, spline_value
 from commissioner.diagnose.kernels.kinds import IRON_CURVE
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -70,7 +70,7 @@ class MagnetizingSaturation(Cause):
         )
         return (*curve, split(self.name))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Extra current against the iron at its most permeable (that of sheet at small flux is lower) where it is largest: at the
 
         largest flux, of iron that is only hard to magnetize at first below it.
@@ -83,9 +83,7 @@ class MagnetizingSaturation(Cause):
         most = int(np.argmax(extra))
         return {"extra_current_a": (float(extra[most]), "A"), "at_flux_wb": (float(grid[most]), "Wb")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """Power law through the curve at the flux reached and at 0.8 of it."""
         layout, flux = setting.layout, sizes["at_flux_wb"]
         weights = listed(values, "curve", layout.iron_vectors.shape[0])

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import NO_FAULT, Cause, Confounder, Entry, Form, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import INITIAL_FLUX
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -44,7 +42,7 @@ class Remanence(Cause):
             for c, axis in enumerate(("alpha", "beta"))
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """The one flux that is left before every segment (their mean), or the largest."""
         pairs: dict[str, list[float]] = {}
         for name, value in values.items():
@@ -56,9 +54,7 @@ class Remanence(Cause):
         size = np.linalg.norm(mean) if is_one else np.linalg.norm(vectors, axis=1).max(initial=0.0)
         return {"flux_wb": (float(size), "Wb")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         first = setting.record.segments[0].uid
         flux = complex(values.get(f"alpha_{first}", 0.0), values.get(f"beta_{first}", 0.0))
         return {"size": abs(flux), "angle_deg": float(np.degrees(np.angle(flux)))}

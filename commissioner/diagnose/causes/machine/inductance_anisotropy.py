@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.machine.axes import larger, tilt
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import ANISOTROPY_SPLIT, LEAKAGE_ANISOTROPY, MAGNETIZING_ANISOTROPY
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -46,7 +44,7 @@ class InductanceAnisotropy(Cause):
         )
         return (*tilts, Term(self.name, "split", "1", ANISOTROPY_SPLIT, 0, 0.1, -0.5, 0.5))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         parts = {p: [values.get(f"{p}_{c}", 0.0) for c in ("cos", "sin")] for p in ("leakage", "magnetizing")}
         return {
             f"{p}_anisotropy": (float(np.linalg.norm(pair)), "1")
@@ -54,9 +52,7 @@ class InductanceAnisotropy(Cause):
             if any(pair) or p == "leakage"
         }
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """The Gamma circuit's tensors of 1/L_leak and 1/L_s that tilt 1/L_sigma and 1/L_M as found."""
         leakage, main = tilt(values, "leakage"), tilt(values, "magnetizing")
         ratio = model.nominal[2] / model.nominal[3]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.machine.axes import larger, on_other_axes, tilt
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import PHASE_RESISTANCE, ROTOR_ANISOTROPY
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -49,16 +47,14 @@ class ResistanceAnisotropy(Cause):
         )
         return stator + rotor
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {
             f"{p}_anisotropy": (float(np.hypot(values.get(f"{p}_cos", 0.0), values.get(f"{p}_sin", 0.0))), "1")
             for p in ("stator", "rotor")
             if f"{p}_cos" in values
         }
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """Phase resistances that differ by 2 e over direction make a tensor of half that."""
         return larger(0.5 * tilt(values, "stator"), tilt(values, "rotor"), ("phases", "cage"))
 

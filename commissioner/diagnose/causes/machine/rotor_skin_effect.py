@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.in_points import InPoints
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes, listed
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed
 from commissioner.diagnose.kernels.kinds import BRANCH
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -67,7 +67,7 @@ class RotorSkinEffect(Cause):
             if time > 0.0
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """R_R(f_N) / R_R(0) - 1 of the branches beside R_R."""
         rated = float(setting.facts.metadata.get("rated_frequency_hz", 50.0))
         branches = listed(values, "branch", setting.layout.branch_time_s.size)
@@ -75,9 +75,7 @@ class RotorSkinEffect(Cause):
         fast = 1.0 / setting.nominal[1] + (branches / (1.0 + 2j * np.pi * rated * setting.layout.branch_time_s)).sum()
         return {"resistance_rise_at_rated_frequency": (float((1.0 / fast).real * slow - 1.0), "1")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """The rise at rated frequency, and the corner that carries most of it."""
         rated = float(setting.facts.metadata.get("rated_frequency_hz", 50.0))
         times = setting.layout.branch_time_s

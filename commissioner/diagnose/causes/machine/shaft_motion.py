@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.regressors import FINE_SPEED_SPLINE, SPEED_SPLINE
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels.kinds import CARRY, OMEGA
 from commissioner.diagnose.plant.model import Model, Term
@@ -54,7 +53,7 @@ class ShaftMotion(Cause):
         )
         return (*speed, *carried)
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Root mean square over the time in which the command would show it: without flux a speed leaves no trace."""
         power, weight = 0.0, 0.0
         for segment, channels in zip(setting.record.segments, setting.record.channels, strict=True):
@@ -66,9 +65,7 @@ class ShaftMotion(Cause):
                     power, weight = power + mine * value**2, weight + mine
         return {"speed_rad_per_s": (float(np.sqrt(power / weight)) if weight else 0.0, "rad/s")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": sizes["speed_rad_per_s"]}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Entry
 from commissioner.diagnose.causes.regressors import CAGE_HEAT, HEAT_LEAKS_S
-from commissioner.diagnose.causes.setting import Array, Setting, Sizes, nearest_course
+from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, nearest_course
 from commissioner.diagnose.plant.model import Model
 
 ADIABATIC_S = 1e6
@@ -74,12 +74,10 @@ class Warming(Cause):
     family = "drifting"
     sign = 1
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {"rise_per_minute_at_rated_current": (warming(setting, values)[0], "1/min")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """All of the heat with the one leak that bends its course as they do together."""
         rise, leak = warming(setting, values)
         return {"size": rise, "time_constant_s": 1.0 / max(leak, 1.0 / ADIABATIC_S)}

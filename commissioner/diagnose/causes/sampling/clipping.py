@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Words
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes, listed
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes, listed
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels.kinds import END
@@ -51,7 +50,7 @@ class Clipping(Cause):
             for k in range(COUNT)
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Of the channel that bends most, where it comes to the largest current it reports: slope lost, current not reported."""
         ends_a = setting.layout.channel_ends_a
         shares = np.stack([listed(values, f"end_{p}", COUNT) for p in PHASES[: ends_a.size]])
@@ -73,9 +72,7 @@ class Clipping(Cause):
         at = audit.clipped
         return {"limit_a": (at["limit_a"], "A"), "samples": (at["samples"], "1")} if at else None
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": 0.1, "limit_a": sizes["limit_a"], "shape": "soft" if "slope_lost" in sizes else "hard"}
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels.kinds import CLOCK
 from commissioner.diagnose.plant.model import Model, Term
@@ -49,7 +49,7 @@ class ClockDrift(Cause):
         symbols = RESTARTS + (RUNS_ON if setting.spans_segments else ())
         return tuple(Term(self.name, symbol, "ppm", CLOCK, k, 0.01, -2e4, 2e4) for k, symbol in enumerate(symbols))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         wander = float(np.hypot(values.get("wander_cos", 0.0), values.get("wander_sin", 0.0)))
         drift = values.get("drift", 0.0) + values.get("running", 0.0)
         sizes = {"drift_ppm": (drift, "ppm"), "wander_ppm": (wander, "ppm")}
@@ -59,9 +59,7 @@ class ClockDrift(Cause):
         """Its delay grows: one that jumps to a value in each segment and stays there is a delay in disguise."""
         return not _is_a_delay(model.of(self.name), setting.record)
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         wander = values.get("wander_sin", 0.0)
         if abs(wander) > abs(sizes["drift_ppm"]):
             return {"size": -wander, "shape": "wandering"}

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.model import Model, Term
@@ -35,7 +34,7 @@ class LostSamples(Cause):
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return ()
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {}
 
     def seen_in(self, audit: Audit, record: Record, noise: Noise, unmarked: float) -> Sizes | None:
@@ -44,9 +43,7 @@ class LostSamples(Cause):
         marked = sum(h[2] for h in audit.holes)
         return {"samples": (float(marked + unmarked), "1"), "without_gap_in_time": (float(unmarked), "1")}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": sizes["samples"]}
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Entry, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.model import Model, Term
@@ -41,7 +40,7 @@ class Quantization(Cause):
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return ()
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {}
 
     def seen_in(self, audit: Audit, record: Record, noise: Noise, unmarked: float) -> Sizes | None:
@@ -51,9 +50,7 @@ class Quantization(Cause):
             {"step_a": (step, "A")} if is_coarse and step / np.sqrt(12.0) > COARSE_STEP_NOISE * noise.floor_a else None
         )
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return {"size": sizes["step_a"]}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Form, Words
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import DELAY
 from commissioner.diagnose.plant.impedance import impedance_starts
 from commissioner.diagnose.plant.model import Model, Term
@@ -56,7 +56,7 @@ class SamplingDelay(Cause):
             Term(self.name, "alternating", "s", DELAY, 1, 1e-6, -0.02, 0.02),
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         delay = values.get("delay", 0.0) + values.get(EARLY.symbol, 0.0)
         return {"delay_us": (delay * 1e6, "us"), "alternating_us": (abs(values.get("alternating", 0.0)) * 1e6, "us")}
 
@@ -74,9 +74,7 @@ class SamplingDelay(Cause):
     def words_for(self, sizes: Mapping[str, float]) -> Words:
         return self.read_late if sizes.get("delay_us", 0.0) < 0.0 else self.words
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """The simulator cannot read ahead: a current that is read late is read at its instant there."""
         return {"size": max(1e-6 * sizes["delay_us"], 0.0)}
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.mains_lines import line_entry
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import TONE
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -45,7 +43,7 @@ class MainsPickup(Cause):
             for k in range(record.facts.phases)
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         out: dict[str, tuple[float, str]] = {}
         for base in (50, 60):
             parts = np.array([v for k, v in values.items() if k.startswith(f"mains_{base}_")])
@@ -53,9 +51,7 @@ class MainsPickup(Cause):
                 out[f"amplitude_{base}_hz_a"] = (float(np.sqrt(2.0 * np.mean(parts**2))), "A")
         return out
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return line_entry(self.line, sizes, setting.lines_hz)
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Procedure, Words
 from commissioner.diagnose.causes.sensors.per_phase import weighted
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.kernels.kinds import DRIFT
 from commissioner.diagnose.plant.model import Model, Term
@@ -69,16 +67,14 @@ class SensorDrift(Cause):
             for k in range(setting.facts.phases)
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {
             f"drift_{p}_a_per_min": (float(sum(share * values.get(p + k, 0.0) for k, share in DRIFTS.items())), "A/min")
             for p in PHASES
             if p in values
         }
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return weighted(values)
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.machine.axes import on_other_axes
 from commissioner.diagnose.causes.sensors.per_phase import weighted
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import GAIN
 from commissioner.diagnose.plant.model import Model, Term
 
@@ -43,12 +41,10 @@ class SensorGainMismatch(Cause):
             return ()
         return tuple(Term(self.name, PHASES[k], "1", GAIN, k, 1e-3, -0.5, 0.5) for k in range(1, setting.facts.phases))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {f"gain_{p}_over_u": (values[p], "1") for p in PHASES if p in values}
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return weighted(values, about_their_mean=True)
 
 

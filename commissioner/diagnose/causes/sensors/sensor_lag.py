@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from commissioner.diagnose.causes.cause import (
 )
 from commissioner.diagnose.causes.sampling.sampling_delay import CAUSE as DELAYED
 from commissioner.diagnose.causes.sampling.sampling_delay import LATE
-from commissioner.diagnose.causes.setting import Setting, Sizes
+from commissioner.diagnose.causes.setting import Numbers, Setting, Sizes
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.kernels.kinds import DELAY, LAG
 from commissioner.diagnose.plant.model import Model, Term
@@ -88,7 +88,7 @@ class SensorLag(Cause):
             Term(self.name, "rippled", "s", LAG, RIPPLED, 1e-6, 0.0, 0.02, start=rippled),
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """The sum, and how much of it a delay before a lag of first order may be, whose second order is the same."""
         lag = values.get("lag", 0.0) + values.get("rippled", 0.0)
         sizes = {"time_constant_us": (lag * 1e6, "us")}
@@ -161,9 +161,7 @@ class SensorLag(Cause):
         most = float(np.log(here.samples))
         yield (Proposal(model, (self.name,), (DELAYED.name,), most, says, lambda _: True),)
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         """One time constant, or from half of the shape of two equal ones on, those; none that sees a ripple, which the simulator has not."""
         if values.get("rippled"):
             return {}

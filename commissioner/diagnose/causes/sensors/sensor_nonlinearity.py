@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Words
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.kernels.kinds import EVEN, ODD
 from commissioner.diagnose.plant import sensor_curve
 from commissioner.diagnose.plant.model import Model, Term
@@ -50,7 +48,7 @@ class SensorNonlinearity(Cause):
             for k in range(setting.facts.phases)
         )
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Mean of the sensors, at full scale of the square and the cubic that err as much as theirs do at the largest current reported."""
         peak = setting.layout.channel_ends_a / setting.layout.nonlinearity_scale_a
         out: Sizes = {}
@@ -62,9 +60,7 @@ class SensorNonlinearity(Cause):
             out = {**out, f"{part}_at_full_scale": (mean, "1")}
         return out
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         odd, even = sizes["odd_at_full_scale"] * SIM_RANGE**2, sizes["even_at_full_scale"] * SIM_RANGE
         return {"size": odd, "shape": "cubic", "even": even}
 

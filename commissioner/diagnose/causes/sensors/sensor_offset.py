@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import FINE, Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.sensors.per_phase import weighted
-from commissioner.diagnose.causes.setting import PHASES, Setting, Sizes
+from commissioner.diagnose.causes.setting import PHASES, Numbers, Setting, Sizes
 from commissioner.diagnose.intake.audit import Audit
 from commissioner.diagnose.kernels.kinds import OFFSET
 from commissioner.diagnose.plant.model import Model, Term
@@ -42,7 +42,7 @@ class SensorOffset(Cause):
     def terms(self, setting: Setting) -> tuple[Term, ...]:
         return tuple(Term(self.name, PHASES[k], "A", OFFSET, k, 1e-3) for k in range(setting.facts.phases))
 
-    def sizes(self, setting: Setting, values: Mapping[str, float]) -> Sizes:
+    def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         return {f"offset_{p}_a": (values[p], "A") for p in PHASES if p in values}
 
     def in_truth(self, values: Sequence[float], audit: Audit) -> tuple[str, Sizes] | None:
@@ -54,9 +54,7 @@ class SensorOffset(Cause):
         is_cut_off = np.all(np.abs(np.abs(ratio) - 1.0) < TRUNCATION_SLACK) and np.all(ratio * ratio[0] > 0.0)
         return ("quantization", {"step_a": (float(halves.max()) * 2.0, "A")}) if is_cut_off else None
 
-    def to_scenario(
-        self, sizes: Mapping[str, float], values: Mapping[str, float], setting: Setting, model: Model
-    ) -> Entry:
+    def to_scenario(self, sizes: Numbers, values: Numbers, setting: Setting, model: Model) -> Entry:
         return weighted(values)
 
 

@@ -55,6 +55,47 @@ class Tuned:
     seconds: float
 
 
+class _Awaited:
+    """What one awaited item has shown so far; `before`: as it stood before the start, None where nothing was started."""
+
+    def __init__(self, step: Step, before: int | None, start_s: float) -> None:
+        self._step, self._before, self._start_s = step, before, start_s
+        self._has_begun = before is None
+        self._first: int | None = None
+
+    def is_over(self, seen: int, now_s: float) -> bool:
+        """True: done. DriveFault: failed or too long. Aborted: it did not begin, or shows what nobody listed."""
+        step, waited_s = self._step, now_s - self._start_s
+        self._first = seen if self._first is None else self._first
+        if seen in step.failed:
+            raise DriveFault(
+                f"the drive says that it failed: {step.failed[seen]}", step="tune: await", value=seen,
+                limit=f"{step.item} one of {list(step.done)}", remedy="see the drive's manual for this failure; check plate and wiring",
+            )  # fmt: skip
+        if seen in step.done and (self._has_begun or seen != self._before):
+            return True
+        if seen in step.busy:
+            self._has_begun = True
+        elif not self._has_begun and seen == self._before:
+            if waited_s > BEGIN_S:
+                raise Aborted(
+                    "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s",
+                    remedy="the start is not repeated: look at the drive, then tune again",
+                )  # fmt: skip
+        elif step.busy or seen != self._first:
+            raise Aborted(
+                f"{step.item} is {seen}, which nobody listed: it was ended at the drive, or is another drive than its file says",
+                step="tune: await", value=seen, limit=f"one of {sorted({*step.done, *step.busy})}",
+                remedy="look at the drive's display; then tune again",
+            )  # fmt: skip
+        if waited_s > step.within_s:
+            raise DriveFault(
+                f"{step.item} did not come to an end", step="tune: await", value=seen,
+                limit=f"one of {list(step.done)} within {step.within_s:g} s", remedy="look at the drive's display",
+            )  # fmt: skip
+        return False
+
+
 class Tuner:
     """Lets one drive tune itself, once a call."""
 
@@ -138,12 +179,10 @@ class Tuner:
         self._check_stop()
 
     def _await(self, step: Step) -> None:
-        start = self._clock()
-        before, self._before = self._before, None
-        has_begun, lost = before is None, 0
-        first: int | None = None
+        """Until the item is done. A value that stood there before the start means nothing until another was seen."""
+        watched = _Awaited(step, self._before, self._clock())
+        self._before, lost = None, 0
         while True:
-            waited = self._clock() - start
             try:
                 seen = self._raw(step.item) & step.mask
                 self._look_around()
@@ -153,34 +192,8 @@ class Tuner:
                 if lost >= LOST_ANSWERS:
                     raise
                 continue
-            first = seen if first is None else first
-            if seen in step.failed:
-                raise DriveFault(
-                    f"the drive says that it failed: {step.failed[seen]}", step="tune: await", value=seen,
-                    limit=f"{step.item} one of {list(step.done)}", remedy="see the drive's manual for this failure; check plate and wiring",
-                )  # fmt: skip
-            if seen in step.done and (has_begun or seen != before):
+            if watched.is_over(seen, self._clock()):
                 return
-            if seen in step.busy:
-                has_begun = True
-            elif has_begun and before is None and seen == first and not step.busy:
-                pass  # a state that has not changed yet
-            elif has_begun or seen != before:
-                raise Aborted(
-                    f"{step.item} is {seen}, which nobody listed: it was ended at the drive, or is another drive than its file says",
-                    step="tune: await", value=seen, limit=f"one of {sorted({*step.done, *step.busy})}",
-                    remedy="look at the drive's display; then tune again",
-                )  # fmt: skip
-            elif waited > BEGIN_S:
-                raise Aborted(
-                    "the drive did not begin to tune", step="tune: await", value=seen, limit=f"another status within {BEGIN_S:g} s",
-                    remedy="the start is not repeated: look at the drive, then tune again",
-                )  # fmt: skip
-            if waited > step.within_s:
-                raise DriveFault(
-                    f"{step.item} did not come to an end", step="tune: await", value=seen,
-                    limit=f"one of {list(step.done)} within {step.within_s:g} s", remedy="look at the drive's display",
-                )  # fmt: skip
             self._check_stop()
             self._sleep(step.every_s)
 

@@ -30,6 +30,7 @@ VALUES = {
     "rotor_heating": {"rotor_heat": 4.0},
     "sensor_offset": {"u": 0.03, "v": -0.02, "w": 0.01},
     "sensor_drift": {"u": 0.4, "v": -0.2, "w": 0.1},
+    "sensor_switch_on": {"switch_on_30ms_u": 0.3, "switch_on_30ms_w": -0.2},
     "sensor_gain_mismatch": {"v": 0.01, "w": -0.02},
     "sensor_nonlinearity": {f"{p}_{k}": 0.01 for p in ("odd", "even") for k in "uvw"},
     "clock_drift": {"drift": 40.0},
@@ -44,6 +45,7 @@ VALUES = {
     "cable_capacitance": {"at": 3e-8},
 }
 EQUAL = {
+    "sensor_switch_on",
     "sensor_drift",
     "sensor_offset",
     "sampling_delay",

@@ -11,7 +11,9 @@ from commissioner.diagnose.fit.lost_samples import _delay_step, mend
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.noise import measure_noise
 from commissioner.diagnose.plant.prediction import predict
+from commissioner.diagnose.search.journal import followed
 from commissioner.diagnose.search.search import _mended
+from commissioner.diagnose.search.state import Problem
 from tests.unit.diagnose.conftest import recording
 
 NOISE_A = 2e-3
@@ -101,9 +103,9 @@ def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, s
     excess = true.chi2 / float(true.normal.count.sum()) - 1.0
     low = replace(noise, sigma_a=noise.sigma_a / np.sqrt(1.0 + excess), uncertainty=excess)
     current = fit(nominal, record, setting.layout, low)
-    losses = _mended(record, current, setting.layout, low, lambda _: None)[2]
+    losses = followed(_mended(record, current, setting.layout, Problem(low, ())))[0][2]
     assert sum(x.samples for x in losses) == held.size
-    assert _mended(record, current, setting.layout, replace(low, uncertainty=0.0), lambda _: None)[2] == ()
+    assert followed(_mended(record, current, setting.layout, Problem(replace(low, uncertainty=0.0), ())))[0][2] == ()
 
 
 def with_spikes(rows, random):

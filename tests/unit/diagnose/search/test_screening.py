@@ -11,8 +11,9 @@ from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.acceptance import guard
+from commissioner.diagnose.search.journal import Beside, RuledOut, Screened, Tried, chosen, ruled_out
 from commissioner.diagnose.search.screening import joint_net, screen
-from commissioner.diagnose.search.stepwise import RuledOut, Steps
+from commissioner.diagnose.search.state import Problem, begun, material_chi2
 
 WHITE = Noise(np.full(3, 0.01), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
 
@@ -53,20 +54,20 @@ def test_a_group_promises_at_least_what_each_of_it_does(late, setting, nominal):
     assert both + 30.0 >= delay.net * (1.0 - 1e-9)
 
 
-def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_form(setting):
-    steps = Steps(setting, WHITE, ["inductance_anisotropy"], print, setting.record, lambda: True)
-    losses = {"shaft_motion": 1e8}
-    large, small = 0.05 * steps.count, 0.005 * steps.count
-    asked = [steps._guard(losses, "inductance_anisotropy", rest) for rest in (large, small, 1e9)]
-    assert asked == pytest.approx(
-        [RULES.entirely_share * large, guard(losses, "inductance_anisotropy"), guard(losses, "inductance_anisotropy")]
-    )
+def test_a_cause_that_takes_nearly_all_of_a_large_rest_is_no_part_of_anothers_form():
+    losses, samples = {"shaft_motion": 1e8}, 1e6
+    large, small = 0.05 * samples, 0.005 * samples
+    asked = [
+        Beside(losses, rest, samples, 0.0).guard("inductance_anisotropy", RULES)[0] for rest in (large, small, 1e9)
+    ]
+    own = guard(losses, "inductance_anisotropy")
+    assert asked == pytest.approx([RULES.entirely_share * large, own, own])
 
 
-def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
+def test_what_samples_left_out_might_hold_is_not_asked_for(setting, nominal):
     def asked(record):
-        steps = Steps(replace(setting, record=record), WHITE, [], print, record, lambda: True)
-        return steps.count, steps.material_chi2
+        state = begun(replace(setting, record=record), record, None)
+        return state.samples, material_chi2(state, Problem(WHITE, ()))
 
     record = setting.record
     half = tuple(replace(s, is_good=np.arange(s.count) % 2 == 0) for s in record.segments)
@@ -74,20 +75,18 @@ def test_what_samples_left_out_might_hold_is_not_asked_for(setting):
     assert left_out == pytest.approx([0.5 * x for x in whole], rel=1e-3)
 
 
-def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_not_named(late, setting, nominal):
+def test_beside_what_a_cause_that_was_ruled_out_would_take_a_weak_one_is_not_named():
     """A sag of a link that stands still takes ten times what any other does: it is real, and six weak causes are not its name."""
-    steps = Steps(replace(setting, record=late), WHITE, ["sampling_delay", "iron_loss"], print, late, lambda: True)
-    screening = promised(nominal, late, setting, steps.names)
-    guards = dict.fromkeys(steps.names, 100.0)
-    assert steps._most_ruled_out(screening, guards) == RuledOut()
-    steps.kept_of_ruled_out["sampling_delay"] = 0.5
-    ruled_out = steps.ruled_out = steps._most_ruled_out(screening, guards)
-    assert (
-        ruled_out.chi2 == pytest.approx(0.5 * screening.scores["sampling_delay"].delta_chi2)
-        and ruled_out.chi2 > steps.material_chi2
-    )
-    assert steps._least_chi2_of_rest(0.0) == RULES.least_share_of_rest * ruled_out.chi2
-    assert steps._most_ruled_out(screening, guards | {"sampling_delay": 2.0 * ruled_out.chi2}) == RuledOut()
-    small, large = 0.005 * steps.count, 0.05 * steps.count
-    steps.ruled_out = RuledOut()
-    assert [steps._least_chi2_of_rest(rest) for rest in (small, large)] == [0.0, RULES.least_share_of_rest * large]
+    promised = {"dc_link_sag": (2e5, 6), "iron_loss": (2e3, 4)}
+
+    def seen(kept, rest=0.0, losses=()):
+        return Screened(promised, Beside(dict(losses), rest, 1e6, 10.0), (), kept)
+
+    weak = [Tried("iron_loss", 2e3, 4, 2e3, 80.0, "")]
+    out = [Tried("dc_link_sag", 2e5, 6, 1e5, 100.0, "", is_sound=False, kept=0.5)]
+    assert ruled_out(seen({}), weak) == RuledOut() and chosen(seen({}), weak) == "iron_loss"
+    for screened, tried in ((seen({"dc_link_sag": 0.5}), weak), (seen({}), [*out, *weak])):
+        assert ruled_out(screened, tried) == RuledOut("dc_link_sag", 1e5) and chosen(screened, tried) is None
+    hidden = seen({"dc_link_sag": 0.5}, losses={"dead_time": 1e10}.items())
+    assert ruled_out(hidden, weak) == RuledOut()
+    assert [chosen(seen({}, rest), weak) for rest in (0.005e6, 0.05e6)] == ["iron_loss", None]

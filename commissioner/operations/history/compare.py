@@ -1,0 +1,120 @@
+"""A run beside another one, beside recordings, beside what the drive holds: which parameter moved, how surely, and by what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.history.explain import Array, Explanation, explain
+from commissioner.identify.estimate.axes import Combined, Comparison, compare
+from commissioner.identify.estimate.common_ground import CommonGround, Result, brought_together
+from commissioner.operations.history.results import result_from, result_of
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.run.archive.catalogue import find_run
+
+
+@dataclass(frozen=True)
+class Compared:
+    """`common`: the flux at which L_M and the temperature at which resistances were compared, and in words. `explained_by`: causes
+    of which each alone would suffice, the most probable first. `motors`: whose the two are, as far as somebody said."""
+
+    before: str
+    after: str
+    comparison: Comparison
+    common: CommonGround
+    explained_by: tuple[Explanation, ...] = ()
+    motors: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True)
+class HeldRow:
+    """One parameter: of the run, and as the drive holds it, SI. `sigmas`: their difference in the run's standard errors."""
+
+    parameter: str
+    run: float
+    std: float
+    drive: float
+    relative_change: float
+    sigmas: float
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the drive holds beside what a run identified. `holds`: the run's values | other values."""
+
+    run: str
+    drive: str
+    holds: str
+    rows: tuple[HeldRow, ...]
+
+
+SAME_VALUE = 1e-5
+"""Relative: a drive keeps single precision, or fewer digits; nearer values are the same one."""
+
+
+def compare_runs(runs: Path, before: str, after: str) -> Compared:
+    """UsageError: not two runs. DataRefused: one of them identified nothing."""
+    first, second = find_run(runs, before), find_run(runs, after)
+    if first.run == second.run:
+        raise UsageError(
+            "a run cannot be compared with itself", step="compare", value=first.run, limit="two runs",
+            remedy=f"`commissioner runs list --runs {runs}` shows the ids",
+        )  # fmt: skip
+    done = beside(result_of(first), result_of(second))
+    return replace(done, motors=(first.motor_id, second.motor_id))
+
+
+def compare_with_recordings(runs: Path, run: str, files: tuple[Path, ...], motor: str | None = None) -> Compared:
+    """A run beside what `identify` makes of recordings of the same motor, which come after it."""
+    from commissioner.operations.identify import IdentifyRequest, identify
+
+    first = find_run(runs, run)
+    before = result_of(first)
+    document = identify(IdentifyRequest(files, motor)).document
+    return replace(
+        beside(before, result_from(document, ", ".join(file.name for file in files))), motors=(first.motor_id, "")
+    )
+
+
+def compare_with_drive(runs: Path, run: str, drive: str | None = None) -> Held:
+    """Reads the drive, changes nothing. DataRefused: the drive holds none of the four in the contract's sense."""
+    from commissioner.run.write_accepted import held_by_drive
+
+    summary = find_run(runs, run)
+    result = result_of(summary)
+    identity, held = held_by_drive(summary, drive)
+    values = dict(zip(PARAMETERS, result.combined.parameters.as_tuple(), strict=True))
+    std = dict(zip(PARAMETERS, np.sqrt(np.diag(result.combined.covariance)), strict=True))
+    rows = tuple(
+        HeldRow(name, values[name], float(std[name]), held[name], held[name] / values[name] - 1.0,
+                float(abs(held[name] - values[name]) / std[name]) if std[name] > 0 else 0.0)
+        for name in PARAMETERS
+        if name in held
+    )  # fmt: skip
+    if not rows:
+        raise DataRefused(
+            "the drive holds none of the four parameters as they are named here", step="compare", value=identity,
+            limit="an inverse-Gamma parameter in its file", remedy="`commissioner drives show` says what its file describes",
+        )  # fmt: skip
+    is_same = all(abs(row.relative_change) < SAME_VALUE for row in rows)
+    return Held(summary.run, identity, "the run's values" if is_same else "other values", rows)
+
+
+def beside(first: Result, second: Result) -> Compared:
+    """Two results on common ground."""
+    old, new, common = brought_together(first, second)
+    comparison = compare(old, new, temperature_is_known=common.temperature_degc is not None)
+    moved = _logs(new) - _logs(old), np.hypot(_relative_std(old), _relative_std(new))
+    told = explain(first, second, moved, common, comparison.verdict)
+    return Compared(first.name, second.name, comparison, common, told)
+
+
+def _logs(combined: Combined) -> Array:
+    return np.asarray(np.log(combined.parameters.as_tuple()))
+
+
+def _relative_std(combined: Combined) -> Array:
+    return np.asarray(np.sqrt(np.diag(combined.covariance)) / np.array(combined.parameters.as_tuple()))

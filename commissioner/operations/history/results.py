@@ -1,0 +1,71 @@
+"""What a run identified, as comparisons and trends take it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.identify.estimate.axes import Combined
+from commissioner.identify.estimate.common_ground import Result
+from commissioner.motor.circuit import InverseGamma
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.run.archive.catalogue import RunSummary
+
+
+def has_result(run: RunSummary) -> bool:
+    """True where the run's document has all four parameters, finite and above zero."""
+    parameters = (run.result or {}).get("parameters")
+    return isinstance(parameters, dict) and all(_is_quantity(parameters.get(name)) for name in PARAMETERS)
+
+
+def result_of(run: RunSummary) -> Result:
+    """A run's combined result as its document holds it. DataRefused: it identified nothing."""
+    if not has_result(run):
+        raise DataRefused(
+            f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
+            remedy="compare runs that ended as commissioned or rejected",
+        )  # fmt: skip
+    return result_from(run.result or {}, run.run)
+
+
+def result_from(document: Mapping[str, Any], name: str) -> Result:
+    """Of a document of `run` or `identify` that has parameters."""
+    parameters = document["parameters"]
+    values = [parameters[key]["value"] for key in PARAMETERS]
+    std = np.array([parameters[key]["std"] for key in PARAMETERS])
+    combined = Combined(InverseGamma(*values), np.diag(std**2), (0.0, 0.0, 0.0, 0.0), (), ())
+    return Result(
+        name,
+        combined,
+        _number(document.get("holds_for_stator_flux_wb")),
+        _curve(document),
+        _number(document.get("winding_temperature_degc")),
+    )
+
+
+def _curve(document: Mapping[str, Any]) -> tuple[tuple[float, float, float], ...]:
+    points = document.get("magnetizing_curve") or ()
+    return tuple(
+        (float(point["stator_flux_wb"]), float(point["magnetizing_inductance_h"]["value"]),
+         float(point["magnetizing_inductance_h"]["std"]))
+        for point in points
+        if isinstance(point, dict) and _is_quantity(point.get("magnetizing_inductance_h")) and "stator_flux_wb" in point
+    )  # fmt: skip
+
+
+def _number(value: object) -> float | None:
+    return (
+        float(value)
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        else None
+    )
+
+
+def _is_quantity(found: object) -> bool:
+    """A finite value above zero with a finite standard error."""
+    value, std = (_number(found.get(key)) for key in ("value", "std")) if isinstance(found, dict) else (None, None)
+    return value is not None and std is not None and 0.0 < value < math.inf and 0.0 <= std < math.inf

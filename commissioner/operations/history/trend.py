@@ -1,0 +1,100 @@
+"""How a motor, or a watched machine, does over the years."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.history.motor import Measured, Trends, indicator_trends, motor_trends
+from commissioner.monitor.trend.trend import is_same_point
+from commissioner.operations.history.motors import runs_of
+from commissioner.operations.history.results import has_result, result_of
+from commissioner.operations.history.runs import Archive
+from commissioner.recordings.baseline import read
+from commissioner.run.archive.catalogue import read_run
+
+PICTURES = (".svg", ".png")
+UNITS = {"rad_per_s": "rad/s", "nm": "N m", "percent": "%"}
+
+
+@dataclass(frozen=True)
+class MotorTrend:
+    """`left_out`: runs or recordings that say nothing here, each with why. `picture`: where it was written."""
+
+    motor: str
+    found: Trends
+    left_out: tuple[str, ...]
+    picture: str | None
+
+
+def trend(archive: Archive, motor: str, picture: Path | None = None) -> MotorTrend:
+    """Of every run of the motor that identified it. UsageError: no such motor. DataRefused: none of them did."""
+    _check(picture)
+    measured, left_out = [], []
+    for row in reversed(runs_of(archive, motor)):
+        summary = read_run(Path(row.folder))
+        if has_result(summary):
+            measured.append(Measured(row.run, _seconds(row.started_utc), result_of(summary)))
+        else:
+            left_out.append(f"{row.run}: {summary.outcome}, without parameters")
+    if not measured:
+        raise DataRefused(
+            f"no run of {motor} identified it", step="trend", value=f"{len(left_out)} runs without parameters", limit="one with them",
+            remedy="`commissioner runs list` shows how they ended",
+        )  # fmt: skip
+    found = motor_trends(measured)
+    return MotorTrend(motor, found, tuple(left_out), _draw(motor, found, picture))
+
+
+def trend_of_indicators(baseline: Path, picture: Path | None = None) -> MotorTrend:
+    """Of every recording that `monitor --baseline` kept, at the newest one's operating point, in the order they were kept."""
+    _check(picture)
+    history = read(baseline)
+    entries = sorted((*history.healthy, *history.judged), key=lambda entry: entry.utc)
+    if not entries:
+        raise DataRefused(
+            f"{baseline} holds no recording", step="trend", value=0, limit="at least one",
+            remedy="`commissioner monitor FILE --baseline` adds one",
+        )  # fmt: skip
+    newest = entries[-1]
+    alike = [entry for entry in entries if is_same_point(entry, newest)]
+    left_out = tuple(f"{entry.source}: at another operating point" for entry in entries if entry not in alike)
+    names = [name for name in newest.indicators if all(name in entry.indicators for entry in alike)]
+    series = {
+        name: [
+            (entry.source, _seconds(entry.utc) if entry.utc else float(k), *entry.indicators[name])
+            for k, entry in enumerate(alike)
+        ]
+        for name in names
+    }
+    found = indicator_trends(
+        series, {name: next((unit for end, unit in UNITS.items() if name.endswith(end)), "") for name in names}
+    )
+    return MotorTrend(baseline.stem, found, left_out, _draw(baseline.stem, found, picture))
+
+
+def _draw(title: str, found: Trends, picture: Path | None) -> str | None:
+    if picture is None:
+        return None
+    from commissioner.report.history.figures import over_years
+
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    over_years(title, found).savefig(picture, metadata={"Date": None} if picture.suffix == ".svg" else None)
+    return str(picture)
+
+
+def _check(picture: Path | None) -> None:
+    if picture is not None and picture.suffix not in PICTURES:
+        raise UsageError(
+            "the picture's format is not known", step="trend", value=picture.name, limit=" or ".join(PICTURES),
+            remedy="give --out a name that ends so",
+        )  # fmt: skip
+
+
+def _seconds(utc: str) -> float:
+    try:
+        return dt.datetime.fromisoformat(utc).timestamp()
+    except ValueError:
+        return 0.0

@@ -1,0 +1,1 @@
+"""Pictures of a motor over the years."""

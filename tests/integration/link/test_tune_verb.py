@@ -1,0 +1,72 @@
+"""`tune` as a user calls it: the command line, TCP, an emulated drive in its own process, and its answer key afterwards."""
+
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.command_line import call
+
+
+class Vendor:
+    """`python -m sim.vendors.serve` as a process; `truth` after the block."""
+
+    def __init__(self, *arguments):
+        self._command = [sys.executable, "-m", "sim.vendors.serve", *arguments]
+
+    def __enter__(self):
+        self.process = subprocess.Popen(
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+        )
+        self.url = f"tcp://{self.process.stdout.readline().split()[2]}"
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        out, _ = self.process.communicate(timeout=20)
+        self.truth = json.loads(out.splitlines()[-1])
+
+
+def tune(drive, runs, *more, profile="schneider_atv340"):
+    return call(
+        "tune", "--drive", drive.url, "--profile", profile, "--motor", "motor_2kw2", "--runs", str(runs), "--pause", "0",
+        "--yes", "--json", *more,
+    )  # fmt: skip
+
+
+def test_a_remote_tuning_is_kept_and_taken_back_by_restore(tmp_path):
+    with Vendor("schneider_atv340", "--tuning-s", "0.6") as drive:
+        answer = tune(drive, tmp_path, "--hardwired-stop", "--write-back")
+        restored = call("restore", "last", "--runs", str(tmp_path), "--yes", "--json")
+    assert answer.code == 0, answer.stdout
+    result = answer.json
+    assert result["outcome"] == "commissioned" and len(result["tune"]["repeats"]) == 3
+    assert result["tune"]["in_the_drive"].startswith("new")
+    assert "tuning: proved on no physical drive yet" in result["remarks"]
+    assert restored.code == 0 and restored.json["outcome"] == "restored"
+    assert [t["end"] for t in drive.truth["tunings"]] == ["done"] * 3
+    assert drive.truth["held"]["stator_resistance"] == result["tune"]["rows"][0]["before"]
+    assert "The drive&#39;s own tuning" in (tmp_path / result["run"] / "report.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(("how", "code"), [("fails", 5), ("keypad", 4)])
+def test_a_tuning_that_goes_wrong_ends_with_its_exit_code_and_the_old_values(tmp_path, how, code):
+    with Vendor("schneider_atv340", "--tuning-s", "0.6", "--tuning", how) as drive:
+        answer = tune(drive, tmp_path, "--hardwired-stop")
+    assert answer.code == code
+    assert answer.json["tune"]["in_the_drive"] == "as before, read back"
+    assert drive.truth["is_energised"] is False
+
+
+def test_what_cannot_be_is_one_clear_refusal_before_anything_is_sent(tmp_path):
+    with Vendor("schneider_atv340") as drive:
+        unsupervised = tune(drive, tmp_path)
+        assisted = tune(drive, tmp_path, profile="danfoss_fc302")
+        keypad = tune(drive, tmp_path, profile="siemens_v20")
+    assert (unsupervised.code, assisted.code, keypad.code) == (3, 2, 2)
+    assert "--hardwired-stop" in unsupervised.json["error"]["remedy"]
+    assert "nobody can be asked" in assisted.json["error"]["what"]
+    assert "keypad" in keypad.json["error"]["remedy"]
+    assert drive.truth["tunings"] == []

@@ -1,0 +1,1 @@
+"""Archives for tests: many synthetic runs, a PostgreSQL of the test's own."""

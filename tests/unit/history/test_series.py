@@ -1,0 +1,86 @@
+"""A trend names what has changed, and what has not at most as often as it says."""
+
+import numpy as np
+import pytest
+
+from commissioner.history.series import judge
+
+STATED = 0.03
+"""A rate that 2 000 series can measure; trends promise 0.001 by the same formulas."""
+
+
+def rate(points, scatter, cases=2000):
+    chance = np.random.default_rng(points)
+    wrong = 0
+    for _ in range(cases):
+        claimed = np.exp(chance.normal(0.0, 0.3, points))
+        seen = judge(
+            np.sort(chance.uniform(0, 5, points)),
+            scatter * claimed * chance.standard_normal(points),
+            claimed,
+            false_alarm=STATED,
+        )
+        wrong += bool(seen.steps or (seen.slope and seen.slope.is_significant) or (seen.alarm and seen.alarm.is_raised))
+    return wrong / cases
+
+
+@pytest.mark.parametrize(("points", "scatter"), [(3, 1.0), (6, 1.0), (20, 1.0), (6, 1.5), (20, 1.5)])
+def test_nothing_is_named_more_often_by_chance_than_stated(points, scatter):
+    """Where points scatter more than they claim, at most twice as often."""
+    measured, stated = rate(points, scatter), STATED if scatter == 1.0 else 2 * STATED
+    assert measured <= stated + 3.0 * np.sqrt(stated * (1 - stated) / 2000), measured
+
+
+def series(level, noise=1.0, seed=3):
+    chance = np.random.default_rng(seed)
+    level = np.asarray(level, dtype=float)
+    return judge(
+        np.arange(level.size, dtype=float),
+        level + noise * chance.standard_normal(level.size),
+        np.full(level.size, noise),
+        tests=4,
+    )
+
+
+def test_a_step_is_found_at_its_place_with_its_size():
+    seen = series([0.0] * 6 + [12.0] * 6)
+    (step,) = seen.steps
+    assert step.at == 6
+    assert abs(step.change - 12.0) < 4 * step.std
+    assert step.std == pytest.approx(np.sqrt(2 / 6) * seen.widening, rel=1e-6)
+    assert abs(seen.level - 12.0) < 2.0
+
+
+def test_two_steps_are_found_and_the_level_is_that_of_now():
+    seen = series([0.0] * 6 + [15.0] * 5 + [3.0] * 6)
+    assert [step.at for step in seen.steps] == [6, 11]
+    assert abs(seen.level - 3.0) < 2.0
+
+
+def test_a_drift_is_a_slope_with_its_size():
+    seen = series(2.0 * np.arange(12.0))
+    assert seen.slope is not None and (seen.slope.is_significant or seen.steps)
+
+
+def test_a_slow_drift_is_told_within_its_error():
+    slopes = [series(0.4 * np.arange(12.0), seed=seed).slope for seed in range(40)]
+    error = [(slope.value - 0.4) / slope.std for slope in slopes if slope is not None]
+    assert np.std(error) < 1.3
+    assert abs(np.mean(error)) < 0.6
+
+
+def test_a_newest_value_that_is_off_is_an_alarm():
+    assert series([0.0] * 8 + [14.0]).alarm.is_raised
+    assert not series([0.0] * 9).alarm.is_raised
+
+
+def test_points_that_scatter_more_than_they_claim_widen_every_interval():
+    chance = np.random.default_rng(5)
+    values = 3.0 * chance.standard_normal(30)
+    assert judge(np.arange(30.0), values, np.ones(30)).widening == pytest.approx(3.0, rel=0.35)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_or_two_points_have_a_level_and_no_verdict(count):
+    seen = judge(np.arange(float(count)), np.ones(count), np.ones(count))
+    assert seen.level == 1.0 and seen.alarm is None and seen.slope is None and not seen.steps

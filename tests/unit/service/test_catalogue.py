@@ -1,0 +1,156 @@
+"""The German page: every sentence that a page, a check, a guard or a refusal can show has its translation."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+from babel.messages.pofile import read_po
+from jinja2 import Environment
+from jinja2.ext import extract_from_ast
+
+import commissioner
+from commissioner.service.page import band, frame, texts, words
+from commissioner.service.page.texts import Texts
+from commissioner.service.simulator import SCENARIOS
+
+PRODUCT = Path(commissioner.__file__).parent
+PAGE = PRODUCT / "service" / "page"
+SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py",
+        "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
+        "service/problems.py")  # fmt: skip
+"""Where the core's and the service's own sentences come from that every technician may meet."""
+FACTS = ("what", "title", "remedy")
+NOT_SHOWN = re.compile(r"no such scenario|POST /api|choose one of these$|^7 in the drive$|^$")
+"""Of scripts alone; and the drive's plate, whose checks have a name for each of its keys."""
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    with (PAGE / "catalogues" / "de.po").open("rb") as file:
+        return {m.id: m for m in read_po(file, locale="de") if m.id}
+
+
+def template_messages():
+    environment = Environment(extensions=["jinja2.ext.i18n"], trim_blocks=True, lstrip_blocks=True)
+    environment.newstyle_gettext = True
+    for path in sorted(PAGE.rglob("templates/**/*.html")):
+        for _line, _function, message in extract_from_ast(environment.parse(path.read_text("utf-8")), ("_",)):
+            yield from (m for m in ([message] if isinstance(message, str) else message or ()) if m)
+
+
+def script_messages():
+    """What the scripts ask for by `say("...")`, also where they choose between two."""
+    for path in sorted((PAGE / "static" / "js").glob("*.js")):
+        text = path.read_text("utf-8")
+        for call in re.findall(r"\bsay\(([^;]*?)\)", text):
+            yield from re.findall(r'"((?:[^"\\]|\\.){3,})"', call.partition(", number")[0])
+
+
+def python_messages():
+    for path in sorted(PAGE.glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and node.func.attr in ("gettext", "say")
+                and node.args
+            ):
+                yield from (
+                    c.value for c in ast.walk(node.args[0]) if isinstance(c, ast.Constant) and isinstance(c.value, str)
+                )
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "View":
+                yield node.args[1].value
+
+
+def names():
+    yield from words.SCRIPT_TEXTS
+    yield from frame.STEPS
+    yield from band.PARTS.values()
+    yield from (text for cause in words.CAUSES.values() for text in cause)
+    yield from (quantity.name for quantity in words.QUANTITIES)
+    yield from (scenario.replace("_", " ") for scenario in SCENARIOS)
+    yield from ("commissioned", "rejected", "aborted", "faulted", "cut off", "passed", "not passed")
+
+
+def shown(node):
+    """A literal with its gaps, each as something that a value might be."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return [node.value]
+    if isinstance(node, ast.JoinedStr):
+        return ["".join(part.value if isinstance(part, ast.Constant) else "7" for part in node.values)]
+    if isinstance(node, ast.IfExp):
+        return shown(node.body) + shown(node.orelse)
+    return []
+
+
+def core_sentences():
+    """Every `what` and `remedy` of the places in SAID."""
+    files = [
+        path
+        for place in SAID
+        for path in ([PRODUCT / place] if place.endswith(".py") else sorted((PRODUCT / place).glob("*.py")))
+    ]
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            function = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+            if function in ("CheckResult", "Objection", "StopReason", "_outside", "_below"):
+                found = [text for argument in (*node.args[:1], *node.args[-1:]) for text in shown(argument)]
+            elif {keyword.arg for keyword in node.keywords} & {"remedy"} and function not in ("_refused", "replace"):
+                first = node.args[1:2] if function == "Refusal" else node.args[:1]
+                found = [text for argument in first for text in shown(argument)]
+                found += [text for keyword in node.keywords if keyword.arg in FACTS for text in shown(keyword.value)]
+            else:
+                continue
+            yield from ((path.name, text) for text in found if " " in text and not NOT_SHOWN.search(text))
+
+
+def test_every_message_of_templates_scripts_and_pages_has_its_translation(catalogue):
+    wanted = {*template_messages(), *script_messages(), *python_messages(), *names()}
+    assert len(wanted) > 400
+    assert sorted(wanted - set(catalogue)) == []
+    assert sorted(m for m in wanted if not catalogue[m].string) == []
+
+
+def test_what_scripts_say_is_handed_to_them():
+    asked = {message for message in script_messages() if not message.startswith("#")}
+    assert asked <= set(words.SCRIPT_TEXTS) | {"operator"}
+
+
+def test_every_sentence_of_checks_guards_and_refusals_has_its_translation():
+    german = Texts("de")
+    missing = sorted(
+        {f"{place}: {text}" for place, text in core_sentences() if not german.knows(text.removesuffix(", degC"))}
+    )
+    assert missing == []
+
+
+def test_a_translation_fills_the_gaps_of_its_message(catalogue):
+    for message in catalogue.values():
+        assert set(re.findall(r"%\(\w+\)s", message.id)) >= set(re.findall(r"%\(\w+\)s", message.string)), message.id
+        assert re.findall(r"%[sknab]\b", message.id).sort() == re.findall(r"%[sknab]\b", message.string).sort()
+        assert message.id.count("%%") == message.string.count("%%"), message.id
+        assert sorted(re.findall(r"</?sub>", message.id)) == sorted(re.findall(r"</?sub>", message.string))
+
+
+def test_a_sentence_with_values_is_told_with_them():
+    german = Texts("de")
+    assert german.tell("a connection within 0.25 s") == "eine Verbindung innerhalb von 0,25 s"
+    assert german.tell("no connection to 10.0.0.1:502") == "keine Verbindung zu 10.0.0.1:502"
+    assert german.tell("there is no run %s <b>") == "es gibt keinen Lauf %s <b>"
+    assert german.tell("never heard of") == "never heard of" and not german.knows("never heard of")
+
+
+def test_what_has_no_translation_says_its_language():
+    told = words.Words(Texts("de")).sentence("never <heard> of")
+    assert told == '<span lang="en">Never &lt;heard&gt; of</span>'
+    assert words.Words(Texts("en")).sentence("never <heard> of") == "Never <heard> of"
+
+
+def test_numbers_are_written_as_the_language_writes_them():
+    assert Texts("de").number(-3.14159, 3, "Ω") == "\u22123,142\u00a0Ω"
+    assert Texts("en").number(-0.0001, 2, "A") == "0.00\u00a0A"
+    assert Texts("de").short(0.25, "s") == "0,25\u00a0s"
+    assert texts.LANGUAGES == ("en", "de")
