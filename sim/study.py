@@ -22,7 +22,7 @@ class Drawn:
     """One motor behind its drive, and the truth about it."""
 
     def __init__(self, motor: str, scenario: Scenario, seed: int, faults: Sequence[str]) -> None:
-        self.motor, self.scenario = motor, scenario
+        self.motor, self.scenario, self.document = motor, scenario, scenario.document
         self.station = Station(scenario, seed, tuple(faults))
         self.effects = [effect.name for effect in scenario.plant.effects]
         plate = scenario.plant.nameplate

@@ -17,6 +17,8 @@ class Drawn(Protocol):
 
     motor: str
     plate: Mapping[str, Any]
+    document: Mapping[str, Any]
+    """The scenario, as `python -m sim --scenario FILE.json` reads it under the key `scenario`."""
     effects: Sequence[str]
     station: Simulator
 
