@@ -180,6 +180,26 @@ def run(
 
 
 @app.command()
+def study(
+    file: Annotated[
+        Path, typer.Argument(help="Study file (.toml): kind, runs, motors, spread, effects, links, faults, seed.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for rows, table and page.")] = Path("study"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes of this computer; its cores if not given.")
+    ] = None,
+    scheduler: Annotated[str | None, typer.Option(help="A Dask scheduler instead, as tcp://HOST:8786.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Do only the cases that are missing in --out.")] = False,
+    json: Json = False,
+) -> None:
+    """A campaign of simulated commissionings, or of recordings: a table, a summary and a page."""
+    from commissioner.cli.verbs.study import study as verb
+    from commissioner.study.campaign import StudyRequest
+
+    verb(StudyRequest(file, out, workers, scheduler, resume), as_json=json)
+
+
+@app.command()
 def tune(
     drive: Drive,
     profile: Profile,
