@@ -65,7 +65,8 @@ def test_the_carrier_is_found_and_means_are_the_fundamental(carrier, rate):
     assert finding.code == "carrier_means" and finding.value == pytest.approx(carrier, rel=0.02)
     u = means.voltages_v[0]
     true = 0.8 * 280 * np.sqrt(3) * np.cos(2 * np.pi * 40 * means.time_s + np.pi / 6)
-    assert np.std(u - true) < 0.08 * np.std(true)
+    # instants locked to the carrier see an edge to one sample: a mean is a tenth off at ten a period, and no mean helps
+    assert np.std(u - true) < max(0.08, 1.3 * carrier / rate) * np.std(true)
     assert means.sample_period_s == pytest.approx(np.median(np.diff(means.time_s)))
 
 
