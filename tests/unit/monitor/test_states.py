@@ -58,7 +58,7 @@ def switched(carrier_hz, rate_hz, seconds=1.0, f=40.0, spread=0.0, seed=0):
     return RunningRecording(t, currents, tuple(lines), True, None, 1.0 / rate_hz)
 
 
-@pytest.mark.parametrize(("carrier", "rate"), [(4000, 50e3), (4000, 100e3), (2500, 40e3), (5000, 50e3)])
+@pytest.mark.parametrize(("carrier", "rate"), [(4000, 50e3), (4000, 100e3), (2500, 40e3), (5000, 53e3)])
 def test_the_carrier_is_found_and_means_are_the_fundamental(carrier, rate):
     recording = switched(carrier, rate)
     means, finding = means_over_carrier(recording)
