@@ -1,6 +1,6 @@
 """Plate against data: scale errors that must be named, honest motors that must not.
 
-    python -m tests.campaigns.plate --cases 500
+    python -m tests.campaigns.intake.plate --cases 500
 
 Each motor is a T circuit drawn around a published machine; its plate is what the circuit does at rated load, printed with the
 tolerances of IEC 60034-1 (slip 20 %, current and power factor as a maker rounds them). The operating point is its true one at a

@@ -1,6 +1,6 @@
 """Locked-rotor points of deep bars and double cages: is R_R at running slip within its stated error?
 
-python -m tests.campaigns.bars --draws 200
+python -m tests.campaigns.intake.bars --draws 200
 """
 
 from __future__ import annotations
