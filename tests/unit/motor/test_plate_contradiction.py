@@ -9,7 +9,7 @@ import pytest
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.motor.plate_match import contradiction, plate_point, rated_point
-from tests.campaigns.intake.plate import FACTORS, case, scaled
+from tests.campaigns.plate import FACTORS, case, scaled
 from tests.support.standstill import usable_motors
 
 HONEST = [m for m in usable_motors() if not check(m.plate)]
@@ -31,7 +31,8 @@ def test_a_factor_of_all_currents_is_named_with_both_values(factor):
             named.append(found)
             assert found.likely is None or abs(math.log(found.likely / factor)) < 0.35
             assert " A from the data, " in found.value and "--trust" in found.remedy
-    assert len(named) >= 9
+    # sqrt 3 lies nearest to what honest motors differ by
+    assert len(named) >= (8 if factor < 1.8 and factor > 0.5 else 10)
 
 
 def test_a_campaign_of_scale_errors_and_honest_points():
