@@ -35,6 +35,9 @@ Diagnosed = Annotated[
     bool, typer.Option("--diagnosis/--no-diagnosis", help="End with a diagnosis of the run's own samples.")
 ]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
+Trust = Annotated[
+    str | None, typer.Option("--trust", help="plate | data: which is right where the two contradict each other.")
+]
 Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
 Drive = Annotated[
     str,
@@ -177,6 +180,26 @@ def run(
 
 
 @app.command()
+def study(
+    file: Annotated[
+        Path, typer.Argument(help="Study file (.toml): kind, runs, motors, spread, effects, links, faults, seed.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for rows, table and page.")] = Path("study"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes of this computer; its cores if not given.")
+    ] = None,
+    scheduler: Annotated[str | None, typer.Option(help="A Dask scheduler instead, as tcp://HOST:8786.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Do only the cases that are missing in --out.")] = False,
+    json: Json = False,
+) -> None:
+    """A campaign of simulated commissionings, or of recordings: a table, a summary and a page."""
+    from commissioner.cli.verbs.study import study as verb
+    from commissioner.study.campaign import StudyRequest
+
+    verb(StudyRequest(file, out, workers, scheduler, resume), as_json=json)
+
+
+@app.command()
 def tune(
     drive: Drive,
     profile: Profile,
@@ -228,6 +251,7 @@ def identify(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     mapping: Map = None,
+    trust: Trust = None,
     json: Json = False,
 ) -> None:
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
@@ -235,7 +259,7 @@ def identify(
     from commissioner.cli.verbs.identify import identify_and_write
     from commissioner.operations.identify import IdentifyRequest
 
-    request = IdentifyRequest(tuple(files), motor, estimator, mapping)
+    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust)
     if write_back:
         identify_and_write(request, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs, as_json=json)
     else:
@@ -259,13 +283,15 @@ def monitor(
     ] = None,
     inertia: Annotated[float | None, typer.Option("--inertia", help="Total inertia in kg m2, for load torque.")] = None,
     mapping: Map = None,
+    trust: Trust = None,
     json: Json = False,
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
     from commissioner.cli.verbs.monitor import monitor as verb
     from commissioner.operations.monitor import MonitorRequest
 
-    verb(MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping), as_json=json)
+    request = MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping, trust)
+    verb(request, as_json=json)
 
 
 @app.command()
@@ -282,6 +308,7 @@ def diagnose(
         Path | None, typer.Option("--out", help="Folder for report.html, model.json, diagnosis.json.")
     ] = None,
     mapping: Map = None,
+    trust: Trust = None,
     why: Annotated[
         bool, typer.Option("--why", help="Show every step of the search, with what was gained and wanted.")
     ] = False,
@@ -291,7 +318,7 @@ def diagnose(
     from commissioner.cli.verbs.diagnose import diagnose as verb
     from commissioner.operations.diagnose import DiagnoseRequest
 
-    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping), as_json=json, why=why)
+    verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping, trust=trust), as_json=json, why=why)
 
 
 @app.command()

@@ -9,13 +9,16 @@ with what the batch fit found taken off; agreement and whiteness. Then the axes 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.errors import UsageError
+from commissioner.identify.batch.fit import fit_segments
+from commissioner.identify.batch.segments import BatchFit, extended
+from commissioner.identify.batch.starts import periods_late
 from commissioner.identify.estimate.axes import AxisEstimate, Combined, combine
 from commissioner.identify.estimate.axis import (
     LARGEST_DISAGREEMENT,
@@ -31,18 +34,22 @@ from commissioner.identify.estimate.axis import (
 from commissioner.identify.estimate.leg_family import one_inverter
 from commissioner.identify.estimate.leg_refit import with_known_law
 from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
+from commissioner.identify.intake.alignment import FARTHEST, TimeShift, more_periods, require_near, rows_off, shifted
 from commissioner.identify.intake.audit import Audit, audit
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
-from commissioner.motor.nameplate import Nameplate, RatedFlux, rated_flux
+from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
 from commissioner.records import StandstillRecording
 
 if TYPE_CHECKING:
     from commissioner.identify.contract import IdentificationDocument
 
 COPPER_ZERO_DEGC = -234.5
+MOST_SHIFTS = 6
+TRIAL_STEPS = 3
+"""For the delay of a fit that needed none: from its end it is two steps away."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +66,7 @@ class Identification:
     combined: Combined
     rated_flux: RatedFlux
     inverter: InverterError | None
-    delay_s: tuple[float, float]
+    time_shift: TimeShift
     magnetizing_curve: tuple[tuple[float, float, float], ...]
     gaps: int
     lost_samples: int
@@ -68,6 +75,11 @@ class Identification:
     remarks: tuple[str, ...]
     fits: tuple[AxisFit, ...] = ()
     """Of the tests, each by itself."""
+
+    @property
+    def delay_s(self) -> tuple[float, float]:
+        """How far the currents lie behind the voltage, and the standard error."""
+        return self.time_shift.value_s, self.time_shift.std_s
 
     @property
     def std(self) -> tuple[float, float, float, float]:
@@ -113,11 +125,16 @@ def identify(
     require_volts(examined, plate)
     require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
-    fits: list[AxisFit] = []
-    for stretches in _by_test(examined):
-        like = fits[0] if fits else None
-        done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier and not like else None
-        fits.append(done or fit_axis(stretches, plate, period_s, start, inverter, like))
+    first, *others = _by_test(examined)
+
+    def one(stretches: Sequence[Stretch]) -> AxisFit:
+        done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
+        return done or fit_axis(stretches, plate, period_s, start, inverter, None)
+
+    fit, late = _aligned(first, rows_off(periods_late(first, period_s, prior(plate))), one)
+    fits = [fit]
+    for stretches in others:
+        fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
     as_fitted = tuple(fits)
     free = [f.batch for f in fits]
     legs = one_inverter(free)
@@ -125,8 +142,50 @@ def identify(
         legs = with_known_law(free, [segments(f.stretches) for f in fits], legs)
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
+    shift = _time_shift(results, fits, late, period_s) if is_final else _as_fitted(results[0].batch, late, period_s)
+    require_near(shift)
     temperature = winding_temperature_degc or _temperature(recording)
-    return replace(_summary(results, examined, plate, estimator, temperature, assumption), fits=as_fitted)
+    return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
+
+
+def _aligned(
+    stretches: Sequence[Stretch], late: int, fit: Callable[[Sequence[Stretch]], AxisFit]
+) -> tuple[AxisFit, int]:
+    """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late; `late`: to
+    begin with."""
+    for _ in range(MOST_SHIFTS):
+        found = fit(shifted(stretches, late))
+        period_s = found.batch.sample_period_s
+        more = more_periods(found.batch.delay, period_s)
+        if not more:
+            return found, late
+        late += more
+        if abs(late) > FARTHEST:
+            break
+    require_near(TimeShift(late, late * period_s, 0.0, period_s))
+    return found, late - more
+
+
+def _as_fitted(batch: BatchFit, late: int, period_s: float) -> TimeShift:
+    return TimeShift(late, late * period_s + batch.delay.value, batch.delay.std, period_s)
+
+
+def _time_shift(results: Sequence[AxisResult], fits: Sequence[AxisFit], late: int, period_s: float) -> TimeShift:
+    """How far the currents lie behind the voltage; where no fit asked for a delay, what a fit with one says of none."""
+    batch = results[0].batch
+    if not batch.model.with_delay:
+        with_delay = replace(batch.model, with_delay=True)
+        parts = segments(fits[0].stretches)
+        batch = fit_segments(
+            parts,
+            period_s,
+            batch.gamma.as_inverse_gamma(),
+            with_delay,
+            extended(batch, with_delay),
+            TRIAL_STEPS,
+            own_start=batch.own,
+        )
+    return _as_fitted(batch, late, period_s)
 
 
 def _temperature(recording: StandstillRecording) -> float | None:
@@ -154,6 +213,7 @@ def _summary(
     estimator: Estimator,
     temperature: float | None,
     assumption: str,
+    shift: TimeShift,
 ) -> Identification:
     rated = rated_flux(plate, float(np.mean([r.parameters.stator_resistance_ohm for r in results])))
     flux = min(rated.stator_peak_wb, *(r.peak_stator_flux_wb for r in results))
@@ -168,7 +228,6 @@ def _summary(
     if temperature is not None:
         factor = (20.0 - COPPER_ZERO_DEGC) / (temperature - COPPER_ZERO_DEGC)
         at_20 = (r_s * factor, math.sqrt(combined.covariance[0, 0]) * factor)
-    delay = first.batch.delay
     return Identification(
         estimator=estimator,
         parameters=combined.parameters,
@@ -179,13 +238,18 @@ def _summary(
         combined=combined,
         rated_flux=rated,
         inverter=first.batch.inverter(),
-        delay_s=(delay.value, delay.std),
+        time_shift=shift,
         magnetizing_curve=tuple(curve),
         gaps=examined.gaps,
         lost_samples=examined.lost_samples,
         duration_s=examined.duration_s,
         stator_resistance_20degc_ohm=at_20,
-        remarks=(*examined.remarks, *combined.remarks, *_remarks(results, rated, flux)),
+        remarks=(
+            *examined.remarks,
+            *([shift.sentence] if shift.is_significant else []),
+            *combined.remarks,
+            *_remarks(results, rated, flux),
+        ),
     )
 
 

@@ -133,6 +133,7 @@ class IdentificationDocument(TypedDict):
     rated_flux_wb: RatedFlux
     inverter: Inverter
     delay_s: Measured
+    time_shift_periods: Measured
     magnetizing_curve: list[CurvePoint]
     stator_resistance_20degc_ohm: Measured | None
     gaps: Gaps

@@ -56,6 +56,10 @@ def document(result: Identification) -> contract.IdentificationDocument:
         },
         "inverter": inverter_json(result.inverter, result.axes[0].staircase),
         "delay_s": {"value": result.delay_s[0], "std": result.delay_s[1]},
+        "time_shift_periods": {
+            "value": result.delay_s[0] / result.time_shift.sample_period_s,
+            "std": result.delay_s[1] / result.time_shift.sample_period_s,
+        },
         "magnetizing_curve": [
             {
                 "stator_flux_wb": flux,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from commissioner.monitor.intake.against_plate import against_plate, of_contradiction, over_currents
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.loads.mean_speed import whole_record_speed
@@ -80,12 +81,14 @@ class Refused:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the caller knows: load frequencies in Hz, the inertia, a better start than the plate."""
+    """What the caller knows: load frequencies in Hz, the inertia, a better start than the plate; `trust`: plate | data, which is
+    right where the two contradict each other."""
 
     load_frequencies_hz: tuple[float, ...] = ()
     inertia_kg_m2: float | None = None
     start: Start | None = None
     segment_s: float = SEGMENT_S
+    trust: str | None = None
 
 
 def observe(
@@ -123,6 +126,14 @@ def observe(
         audited = replace(audited, findings=(*audited.findings, poles))
         if poles.stops:
             return Refused(audited, poles, audited.findings)
+    against = against_plate(audited, None if found.shaft is None else found.shaft.frequency_hz, plate)
+    if against is not None:
+        if wishes.trust == "plate" and against.likely is not None:
+            return observe(over_currents(recording, against.likely), plate, replace(wishes, trust=None), lag_deg)
+        finding = of_contradiction(against, stops=wishes.trust != "data")
+        audited = replace(audited, findings=(*audited.findings, finding))
+        if finding.stops:
+            return Refused(audited, finding, audited.findings)
     inertia = wishes.inertia_kg_m2 if wishes.inertia_kg_m2 is not None else plate.inertia_kg_m2
     return _invert(audited, frame, part, search, found, start, plate, inertia)
 

@@ -29,6 +29,22 @@ class LoadPeriod(TypedDict):
     speed_ripple_rms_rad_per_s: float
 
 
+class State(TypedDict):
+    """A stretch of the recording: off | residual | start | ramp | load step | steady | coast-down; `used`: the answer is of it.
+    Of a steady stretch beside it, or one that is too short, its own speed and torque; `withheld`: why they are of the terminals
+    and the plate only."""
+
+    state: str
+    start_s: float
+    end_s: float
+    current_a: float
+    frequency_hz: float
+    used: bool
+    mean_speed_rad_per_s: NotRequired[Measured]
+    mean_torque_nm: NotRequired[Measured]
+    withheld: NotRequired[str]
+
+
 class MonitoringDocument(TypedDict):
     """The answer to one recording."""
 
@@ -53,6 +69,7 @@ class MonitoringDocument(TypedDict):
     audit: dict[str, Any]
     quantities: str
     files: NotRequired[dict[str, str]]
+    states: NotRequired[list[State]]
 
 
 class Refusal(TypedDict):
@@ -78,4 +95,5 @@ class RefusedMonitoring(TypedDict):
     indicators: dict[str, Any]
     audit: dict[str, Any]
     reason: NotRequired[str]
+    states: NotRequired[list[State]]
     error: NotRequired[dict[str, Any]]

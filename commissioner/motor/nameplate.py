@@ -162,20 +162,48 @@ def _problems(plate: Nameplate) -> Iterator[PlateProblem]:
         yield from _contradictions(plate)
 
 
+LARGEST_SLIP, LARGEST_SLIP_OF_MORE_W = 0.25, (300.0, 0.16)
+"""Rated slip of any cage motor, and from this power on: 60 Hz beside the speed at 50 Hz makes 0.20 of a four-pole motor."""
+
+
+def typical_efficiency(power_w: float) -> float:
+    """Of a cage motor of this rated power: 0.65 at 0.18 kW, 0.82 at 2.2 kW, 0.95 at 200 kW (IE1 to IE3 lie within 0.1)."""
+    return max(1.0 - 0.22 * float((power_w / 1000.0) ** -0.27), 0.35)
+
+
+LEAST_OF_TYPICAL = 0.7
+"""Of the typical efficiency: sqrt 3, the smallest factor between two readings of one plate, leaves 0.58 of it."""
+
+
 def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
     synchronous_rpm = 60.0 * plate.rated_frequency_hz / plate.pole_pairs
-    if not 0.0 < plate.rated_slip < 0.25:
+    most = LARGEST_SLIP_OF_MORE_W[1] if plate.rated_power_w > LARGEST_SLIP_OF_MORE_W[0] else LARGEST_SLIP
+    if not 0.0 < plate.rated_slip < most:
         yield PlateProblem(
             "rated_speed_rpm",
             plate.rated_speed_rpm,
-            f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs by at most a quarter",
+            f"below the synchronous {synchronous_rpm:.0f} 1/min of {plate.pole_pairs} pole pairs at "
+            f"{plate.rated_frequency_hz:g} Hz by at most {most:.0%}: speed, frequency (50 or 60 Hz) and pole pairs of one line",
         )
     input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
     efficiency = plate.rated_power_w / input_w
-    if not 0.25 < efficiency < 1.0:
+    least = LEAST_OF_TYPICAL * typical_efficiency(plate.rated_power_w)
+    if not least < efficiency < 1.0:
         yield PlateProblem(
             "rated_power_w",
             plate.rated_power_w,
-            f"0.25 ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate; of a plate with "
-            "two voltages, voltage and current of the same connection",
+            f"{least:.2g} ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate (it is "
+            f"{efficiency:.3g}){_of_two_lines(plate, efficiency)}; of a plate with two voltages, voltage and current of the "
+            "same connection",
         )
+
+
+def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
+    """The two readings that would fit where voltage and current are of different connections."""
+    up = math.sqrt(3.0) if efficiency < 1.0 else 1.0 / math.sqrt(3.0)
+    if not LEAST_OF_TYPICAL < up * efficiency / typical_efficiency(plate.rated_power_w) < 1.25:
+        return ""
+    return (
+        f": {plate.rated_voltage_v:.4g} V with {plate.rated_current_a / up:.3g} A would fit, or "
+        f"{plate.rated_voltage_v / up:.4g} V with {plate.rated_current_a:.4g} A"
+    )

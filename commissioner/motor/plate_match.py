@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.motor.running import equal_leakages, stator_impedance
+from commissioner.motor.running import equal_leakages, from_nameplate, stator_impedance
 
 CURRENT_RATIO = (0.66, 1.66)
 """Computed over rated current: 0.83 ... 1.59 in the table, widened: upwards by 5 % (a cold rotor adds a fifth to what most
@@ -114,3 +114,97 @@ def _of_scale(what: str, value: float, limit: str, impedances: float, plate: Nam
         f"{what}: all impedances are {impedances:.2g} times what the plate's motor has",
         value, limit, "check that --motor is the motor at the drive, its connection (factor 3), and the current sensors' scale",
     )  # fmt: skip
+
+
+SCALE = (0.70, 1.58)
+"""Geometric mean of current, active and reactive power over the plate's, at one voltage, frequency and slip: 0.87 ... 1.56
+in the table at rated slip (1.37 but for two plates with an efficiency that no motor of their size has). sqrt 3, the smallest
+factor that two readings differ by, is 1.73."""
+FACTORS = (
+    (math.sqrt(3.0), "star and delta, or line and phase values, mixed up"),
+    (2.0, "a probe, a turns or a terminal factor"),
+    (3.0, "star and delta mixed up: impedances differ by 3"),
+    (10.0, "a probe's or a range's factor 10"),
+    (100.0, "a factor 100"),
+    (1000.0, "milli taken for whole units"),
+)
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A motor at its terminals: phase voltage rms, supply frequency, slip, line current rms, active and reactive power."""
+
+    voltage_v: float
+    frequency_hz: float
+    slip: float
+    current_a: float
+    power_w: float
+    reactive_var: float
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Data and plate say different things: both values, by which factor, and what may be behind it.
+
+    `factor`: the data's currents over the plate's. `likely`: the nearest of the usual factors, None where none is near.
+    """
+
+    what: str
+    from_data: float
+    from_plate: float
+    unit: str
+    factor: float
+    likely: float | None
+    limit: str
+    remedy: str
+
+    @property
+    def value(self) -> str:
+        return f"{self.from_data:.4g} {self.unit} from the data, {self.from_plate:.4g} {self.unit} from the plate"
+
+
+def rated_point(machine: InverseGamma, plate: Nameplate) -> OperatingPoint:
+    """What a machine would draw at rated voltage, frequency and slip."""
+    impedance = stator_impedance(equal_leakages(machine), plate.rated_frequency_rad_per_s, plate.rated_slip)
+    return _drawn(impedance, plate.rated_voltage_v / math.sqrt(3.0), plate.rated_frequency_hz, plate.rated_slip)
+
+
+def plate_point(plate: Nameplate, at: OperatingPoint) -> OperatingPoint:
+    """What the plate's motor draws at another point's voltage, frequency and slip: exact at the rated one, else by the
+    circuit that the plate implies."""
+    impedance = stator_impedance(from_nameplate(plate), 2.0 * math.pi * at.frequency_hz, at.slip)
+    return _drawn(impedance, at.voltage_v, at.frequency_hz, at.slip)
+
+
+def _drawn(impedance: complex, voltage_v: float, frequency_hz: float, slip: float) -> OperatingPoint:
+    current = voltage_v / impedance
+    apparent = 3.0 * voltage_v * current.conjugate()
+    return OperatingPoint(voltage_v, frequency_hz, slip, abs(current), apparent.real, apparent.imag)
+
+
+def contradiction(seen: OperatingPoint, plate: Nameplate) -> Contradiction | None:
+    """Whether the data's currents and powers are the plate's at this point; None where they are."""
+    said = plate_point(plate, seen)
+    pairs = ((seen.current_a, said.current_a), (seen.power_w, said.power_w), (seen.reactive_var, said.reactive_var))
+    if any(not (a > 0.0 and b > 0.0) for a, b in pairs):
+        return None
+    factor = math.prod(a / b for a, b in pairs) ** (1.0 / 3.0)
+    if SCALE[0] <= factor <= SCALE[1]:
+        return None
+    likely, why = _usual(factor)
+    return Contradiction(
+        f"the data do not belong to this plate: at {seen.voltage_v * math.sqrt(3.0):.4g} V, {seen.frequency_hz:.4g} Hz and a slip "
+        f"of {seen.slip:.3g} they give {factor:.3g} times the plate's current and power{why}",
+        seen.current_a, said.current_a, "A", factor, likely, f"{SCALE[0]:g} ... {SCALE[1]:g} times the plate's",
+        "check the current sensors' scale (and the voltages'), and that the plate is this motor's, in its connection, with its "
+        "frequency and pole pairs; say which is right by --trust plate or --trust data",
+    )  # fmt: skip
+
+
+def _usual(factor: float) -> tuple[float | None, str]:
+    """The usual factor within a fifth of one, and what makes it."""
+    size = max(factor, 1.0 / factor)
+    near = min(FACTORS, key=lambda f: abs(math.log(size / f[0])))
+    if abs(math.log(size / near[0])) > 0.27:
+        return None, ""
+    return (near[0] if factor > 1.0 else 1.0 / near[0]), f" ({near[1]}?)"

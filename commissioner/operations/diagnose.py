@@ -17,15 +17,20 @@ from commissioner.diagnose.points.table import Points, is_points_table, read_poi
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
+from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.running import diagnosed, is_running
+from commissioner.operations.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
@@ -40,6 +45,7 @@ class DiagnoseRequest:
     out: Path | None = None
     excluded: tuple[str, ...] = ()
     mapping: Path | None = None
+    trust: str | None = None
 
 
 @dataclass(frozen=True)
@@ -91,12 +97,30 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     recordings, copies = without_copies(recordings)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     document = as_document(seen, None)
+    decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
+    remarks = [*decided, *remarks]
     document["audit"] = [*remarks, *copies, *document["audit"]]
     document["uncertain"] = uncertain(seen, withdrawn(seen.steps, {c.name for c in (*seen.causes, *seen.unsure)}))
     document["dc_link_v"] = seen.found.record.facts.dc_link_v if seen.found else None
     if request.out is not None:
         _write_recordings(request.out, seen, document, tables)
     return Diagnosed(document, request.out, seen)
+
+
+def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:
+    """What the circuit says against the plate, where both are known; DataRefused unless the data are to be trusted."""
+    values = document["parameters_before"]
+    if any(key not in plate for key in NAMEPLATE_KEYS) or any(name not in values for name in PARAMETERS):
+        return []
+    nameplate = nameplate_from(plate)
+    found = contradiction(
+        rated_point(InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS)), nameplate), nameplate
+    )
+    if found is None:
+        return []
+    if trust != "data":
+        raise refused(found)
+    return [trusted_data(found)]
 
 
 def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, tables: Sequence[Table]) -> None:

@@ -16,7 +16,9 @@ from commissioner.identify.contract import FluxReached, IdentifiedDocument
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.plate_match import contradiction, mismatch, plate_match, rated_point
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.trust import Trust, refused, trust_from, trusted_data, trusted_plate, with_currents_over
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import to_standstill
@@ -29,12 +31,14 @@ PAUSE_S = 10.0
 
 @dataclass(frozen=True)
 class IdentifyRequest:
-    """`motor` overrides the recordings' metadata; `estimator`: pao | lyapunov | nls; `mapping`: what their channels are."""
+    """`motor` overrides the recordings' metadata; `estimator`: pao | lyapunov | nls; `mapping`: what their channels are.
+    `trust`: plate | data, where the two contradict each other."""
 
     files: tuple[Path, ...]
     motor: str | None = None
     estimator: str = "pao"
     mapping: Path | None = None
+    trust: str | None = None
 
 
 @dataclass(frozen=True)
@@ -72,10 +76,37 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     said = read_mapping(request.mapping) if request.mapping else None
     recording = joined([to_standstill(contract_table(path, said)) for path in request.files])
     plate = None if request.motor is None else load_motor(request.motor)
+    plate = plate or nameplate_from(recording.metadata, recording.source)
+    trust = trust_from(request.trust)
     observe(Began("identifying"))
-    found = analyse(recording, plate, cast("Estimator", request.estimator))
+    found, decided = _with_the_plate(recording, plate, cast("Estimator", request.estimator), trust)
     document: IdentifiedDocument = {**found.as_json(), "flux_guard": _flux_reached(found), "written": []}
-    return Identified(document, found, plate or nameplate_from(recording.metadata), request.files)
+    document["remarks"] = [*decided, *document["remarks"]]
+    return Identified(document, found, plate, request.files)
+
+
+def _with_the_plate(
+    recording: StandstillRecording, plate: Nameplate, estimator: Estimator, trust: Trust | None
+) -> tuple[Identification, list[str]]:
+    """What was identified, and what was decided where it contradicts the plate. DataRefused: nobody decided."""
+    found = analyse(recording, plate, estimator)
+    against = contradiction(rated_point(found.parameters, plate), plate)
+    other = mismatch(plate_match(found.parameters, plate), plate)
+    if against is None and other is None:
+        return found, []
+    if trust == "data":
+        return found, [trusted_data(against) if against else f"{other.what}: the data were trusted" if other else ""]
+    if trust == "plate" and against is not None and against.likely is not None:
+        again = analyse(with_currents_over(recording, against.likely), plate, estimator)
+        return again, [trusted_plate(against.likely)]
+    if against is not None:
+        raise refused(against)
+    assert other is not None
+    raise DataRefused(
+        f"the data do not belong to this plate: {other.what}", step="compare data and plate",
+        value=f"{other.value:.3g} from the data, 1 from the plate", limit=other.limit,
+        remedy=f"{other.remedy}; or say which is right by --trust data",
+    )  # fmt: skip
 
 
 def _flux_reached(found: Identification) -> FluxReached:

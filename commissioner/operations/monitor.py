@@ -7,13 +7,14 @@ from pathlib import Path
 
 from commissioner.errors import DataRefused
 from commissioner.monitor.chain import Observation, Refused, Wishes
-from commissioner.monitor.chain import observe as watch
-from commissioner.monitor.contract import MonitoringDocument, RefusedMonitoring
+from commissioner.monitor.contract import MonitoringDocument, RefusedMonitoring, State
 from commissioner.monitor.result import as_document, entry_of, refused_document, with_reference
 from commissioner.monitor.trend.indicators import pulses, trendable
 from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.stretches import in_its_states
+from commissioner.operations.trust import trust_from
 from commissioner.recordings.baseline import update
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of, start_from
@@ -34,6 +35,7 @@ class MonitorRequest:
     learn: bool = False
     out: Path | None = None
     mapping: Path | None = None
+    trust: str | None = None
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,17 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | N
     plate = plate_of(recording.metadata, str(request.file), request.motor)
     start = start_from(request.start) if request.start else None
     observe(Began("looking for speed and load"))
-    seen = watch(recording, plate, Wishes(request.load_hz, request.inertia_kg_m2, start))
+    wishes = Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust))
+    seen, recording, stretches = in_its_states(recording, plate, wishes)
     if isinstance(seen, Refused):
-        return _refused(seen, request.file)
+        return _refused(seen, request.file, stretches)
     made = pulses(seen)
     indicators = trendable(seen, made)
     verdict, history = (None, None)
     if request.baseline is not None:
         verdict, history = update(request.baseline, entry_of(seen, indicators, str(request.file)), request.learn)
     document = as_document(seen, made, indicators, verdict)
+    document["states"] = stretches
     comparison = against_encoder(seen, recording)
     if comparison is not None:
         document = with_reference(document, comparison)
@@ -81,7 +85,7 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | N
     return Monitored(document, seen, verdict)
 
 
-def _refused(seen: Refused, file: Path) -> NotMonitored:
+def _refused(seen: Refused, file: Path, stretches: list[State]) -> NotMonitored:
     reason = seen.reason
     error = DataRefused(
         f"{file}: {reason.what}",
@@ -91,5 +95,6 @@ def _refused(seen: Refused, file: Path) -> NotMonitored:
         remedy=reason.remedy,
     )
     document = refused_document(seen)
+    document["states"] = stretches
     document["reason"], document["error"] = error.what, error.as_dict()
     return NotMonitored(document, seen, error)

@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from commissioner.identify.excite.current_flux import CurrentFlux
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.space_vector import axis_current_a
 from commissioner.records import SampleBlock, Signal, StandstillRecording
 
 
@@ -44,6 +47,22 @@ def assemble(
         metadata=metadata,
         source=source,
     )
+
+
+def highest_stator_flux_wb(blocks: Iterable[tuple[int, SampleBlock]], machine: InverseGamma) -> float:
+    """Over every energised sample of a run, ramps and first moments included, from the currents alone.
+
+    Each segment begins without voltage: what its sensors show then is offset.
+    """
+    highest, current, flux, offset_a = 0.0, None, None, 0.0
+    for segment, block in blocks:
+        if block.count == 0:
+            continue
+        seen = axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
+        if flux is None or segment != current:
+            current, flux, offset_a = segment, CurrentFlux(machine, block.sample_period_s), float(np.mean(seen))
+        highest = max(highest, float(np.max(np.abs(flux.advance(seen - offset_a, block.lost_before)))))
+    return highest
 
 
 def columns(recording: StandstillRecording) -> dict[str, Signal]:

@@ -6,12 +6,11 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from commissioner.errors import CheckFailed
-from commissioner.motor.nameplate import prior
 from commissioner.procedure.checks import judge_idle
 from commissioner.procedure.findings import ChecksJudged, RunEnded, StateEntered, VerdictReached
 from commissioner.procedure.states import ENDED, Event, State, follow
 from commissioner.procedure.steps import Findings, Job, Step, connect, write
-from commissioner.procedure.verdict import Decision, decide, evidence_of
+from commissioner.procedure.verdict import Decision, decide, evidence_of, match_of
 from commissioner.records import DriveStatus
 from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, TakeSnapshot, Tell
 
@@ -46,8 +45,8 @@ def _check(job: Job, findings: Findings) -> Step:
 def _judge(job: Job, findings: Findings) -> Step:
     assert findings.identification is not None
     evidence = evidence_of(findings.identification)
-    verdict = decide(evidence, prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
-    findings.verdict = verdict
+    verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
+    findings.verdict, findings.plate_match = verdict, match_of(evidence.combined, job.nameplate)
     value, limit, remedy = next(((o.value, o.limit, o.remedy) for o in verdict.objections), (None, None, ""))
     yield Tell(VerdictReached(verdict.decision.value, verdict.reason, value, limit, remedy))
     return Event.WRITE_BACK if verdict.decision is Decision.WRITE_BACK else Event.REJECT

@@ -17,12 +17,13 @@ from commissioner.identify.inverter.first_current import FirstCurrent
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, DcLevel, InverterError, Staircase
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
-from commissioner.procedure.assembly import assemble
+from commissioner.motor.plate_match import PlateMatch
+from commissioner.procedure.assembly import assemble, highest_stator_flux_wb
 from commissioner.procedure.checks import CheckResult, DriveLimits, StreamPace, check_failed, judge_drive
 from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
-from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of
+from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of, match_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
     ArmWatchdog,
@@ -127,6 +128,8 @@ class Findings:
     flux_limit_wb: float | None = None
     identification: Identification | None = None
     verdict: Verdict | None = None
+    plate_match: PlateMatch | None = None
+    """Of the combined values."""
     written: tuple[WrittenParameter, ...] = ()
 
     @property
@@ -217,8 +220,13 @@ def judge(job: Job, findings: Findings) -> Step:
         recording, job.nameplate, winding_temperature_degc=findings.winding_degc, earlier=findings.look
     )
     findings.identification = identification
-    verdict = decide(evidence_of(identification), prior(job.nameplate), job.plan.acceptance, write_back=job.write_back)
+    evidence = evidence_of(identification)
+    findings.plate_match = match_of(evidence.combined, job.nameplate)
+    verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict
+    highest_wb = highest_stator_flux_wb(findings.blocks, identification.parameters)
+    limit_wb = findings.flux_limit_wb or job.flux_limit_wb(findings.resistance_ohm(job))
+    findings.peak_flux_fraction = max(findings.peak_flux_fraction, highest_wb / limit_wb)
     yield Tell(_told(verdict))
     return {Decision.WRITE_BACK: Event.WRITE_BACK, Decision.KEEP: Event.KEEP, Decision.REJECT: Event.REJECT}[
         verdict.decision

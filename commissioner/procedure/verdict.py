@@ -10,7 +10,8 @@ import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
 from commissioner.motor.circuit import InverseGamma, Quantity
-from commissioner.motor.nameplate import ParameterBox
+from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
+from commissioner.motor.plate_match import PlateMatch, mismatch, plate_match
 from commissioner.procedure.plan import Acceptance
 from commissioner.records import Signal
 
@@ -89,10 +90,11 @@ def _values(parameters: InverseGamma, std: Signal) -> Values:
     return {name: Quantity(v, float(s)) for name, v, s in zip(PARAMETERS, parameters.as_tuple(), std, strict=True)}
 
 
-def decide(evidence: Evidence, box: ParameterBox, acceptance: Acceptance, *, write_back: bool) -> Verdict:
+def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, write_back: bool) -> Verdict:
     """WRITE_BACK or KEEP where nothing objects, else REJECT with every objection, gravest first."""
     objections = (
-        *_outside(evidence.combined, box),
+        *_another_motor(evidence.combined, plate),
+        *_outside(evidence.combined, prior(plate)),
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence.combined, acceptance),
         *_spread(evidence, acceptance),
@@ -100,6 +102,20 @@ def decide(evidence: Evidence, box: ParameterBox, acceptance: Acceptance, *, wri
     if objections:
         return Verdict(Decision.REJECT, objections)
     return Verdict(Decision.WRITE_BACK if write_back else Decision.KEEP, ())
+
+
+def match_of(combined: Values, plate: Nameplate) -> PlateMatch:
+    """How the combined values fit the plate."""
+    return plate_match(InverseGamma(*(combined[name].value for name in PARAMETERS)), plate)
+
+
+def _another_motor(combined: Values, plate: Nameplate) -> Iterator[Objection]:
+    """Values that no common error explains away: the plate is another motor's, or the currents are of foreign scale."""
+    if any(combined[name].value <= 0.0 for name in PARAMETERS):
+        return
+    found = mismatch(match_of(combined, plate), plate)
+    if found is not None:
+        yield Objection(found.what, found.value, found.limit, found.remedy)
 
 
 def _outside(combined: Mapping[str, Quantity], box: ParameterBox) -> Iterator[Objection]:

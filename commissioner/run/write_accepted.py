@@ -18,7 +18,7 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.records import ParameterSnapshot, drive_words
+from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
 from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
@@ -91,9 +91,11 @@ def plan_restore(run: RunSummary, url: str | None) -> Plan:
 
 
 def held_by_drive(run: RunSummary, url: str | None) -> tuple[str, Mapping[str, float]]:
-    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing."""
+    """The run's drive in words, and what it holds in use by the contract's names. Reads the drive, changes nothing.
+    IdentityMismatch: another drive answers."""
     ready = _ready(run, url)
     with _drive(ready) as inverter:
+        _require_the_runs_drive(inverter, ready, "compare")
         snapshot = inverter.snapshot()
     ours = our_values(ready.profile, snapshot.in_use, ready.plate)
     held = {one.field: one.value for one in ours.values()}
@@ -208,18 +210,24 @@ def _drive(ready: _Ready) -> Iterator[Inverter]:
 
 
 def _plan(run: RunSummary, ready: _Ready, inverter: Inverter, what: str, wanted: Mapping[str, float]) -> Plan:
+    identity = _require_the_runs_drive(inverter, ready, what)
+    present = inverter.snapshot().in_use
+    rows = tuple(_row(ready.profile, name, present[name], value) for name, value in wanted.items())
+    return Plan(run.run, what, identity.drive_type, identity.serial_number, rows)
+
+
+def _require_the_runs_drive(inverter: Inverter, ready: _Ready, step: str) -> DriveIdentity:
+    """Who answers. IdentityMismatch: another one than the run was made on."""
     identity = inverter.identify()
     if identity.words != ready.snapshot.identity.words:
         raise IdentityMismatch(
             "this is not the drive of the run",
-            step=what,
+            step=step,
             value=identity.words,
             limit=ready.snapshot.identity.words,
             remedy="connect the drive that was measured, or measure this one",
         )
-    present = inverter.snapshot().in_use
-    rows = tuple(_row(ready.profile, name, present[name], value) for name, value in wanted.items())
-    return Plan(run.run, what, identity.drive_type, identity.serial_number, rows)
+    return identity
 
 
 def _row(profile: DriveProfile, name: str, now: float, will_be: float) -> PlannedRow:

@@ -19,8 +19,9 @@ from commissioner.safety.watch import StopReason
 
 ZERO_S, WINDOW_S = 0.05, 0.04
 """Time at zero voltage from which the offsets are taken; time over which the pattern is judged."""
-MISFIT = 0.2
-"""Largest misfit of a phase, of the axis current: gains that differ by a tenth and legs by another stay below."""
+MISFIT = 0.12
+"""Largest misfit of a phase, of the axis current: gains that differ by a tenth leave 0.04 and legs that do as much again. The
+phase that carries the whole axis current leaves only (g - 1) / (2 g + 1) of a gain g: 0.2 where it shows twice its current."""
 SIGMAS = 6.0
 SCALE, SCALE_FLOOR = 0.1, 0.004
 """How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""

@@ -1,6 +1,6 @@
-"""Mutation testing of the safety core: `python -m tests.campaigns.mutants [--show]`.
+"""Mutation testing of the safety core: `python -m tests.campaigns.mutants [--show] [--module NAME]`.
 
-Every mutant of safety/ and procedure/states.py must fail the safety core's own tests. Operators: comparisons moved by
+Every mutant of safety/, motor/plate_match.py and procedure/states.py must fail the safety core's own tests. Operators: comparisons moved by
 one step or turned round, `and`/`or` exchanged, `not` dropped, numbers and booleans changed, min/max exchanged, a signed
 value for its magnitude, a condition fixed to true or false, a table's target replaced, an `or` chain losing a member, an
 answer lost.
@@ -26,6 +26,9 @@ ROOT = Path(__file__).resolve().parents[2]
 TARGETS = {
     "commissioner.safety.limits": ("tests/unit/safety/test_limits.py",),
     "commissioner.safety.watch": ("tests/unit/safety/test_watch.py",),
+    "commissioner.safety.freshness": ("tests/unit/safety/test_freshness.py",),
+    "commissioner.safety.sensors": ("tests/unit/safety/test_sensors.py",),
+    "commissioner.motor.plate_match": ("tests/unit/motor/test_plate_match.py",),
     "commissioner.procedure.states": ("tests/unit/procedure/test_states.py",),
 }
 """commands.py holds records only: there is nothing to mutate."""
@@ -188,9 +191,10 @@ def _emptied(module: ModuleType) -> ModuleType:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.mutants", description=__doc__)
     parser.add_argument("--show", action="store_true", help="name every mutant")
+    parser.add_argument("--module", action="append", choices=list(TARGETS), help="only this one; repeatable")
     options = parser.parse_args(arguments)
     count, alive = 0, []
-    for module in TARGETS:
+    for module in options.module or TARGETS:
         source = Path(str(importlib.import_module(module).__file__)).read_text("utf-8")
         for mutant in mutants(module, source):
             count += 1

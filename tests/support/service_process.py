@@ -129,9 +129,14 @@ class ServiceProcess:
         last = [line for line in self.truth() if line["event"] == "de_energised"][-1]
         return max(0.0, float(last["wall"]) - since_wall)
 
-    def run_process(self) -> int:
-        """The process id of the run that this service has started."""
-        return self._children("--dead-man")[0]
+    def run_processes(self) -> dict[str, int]:
+        """The processes of the runs that this service has started, by host and port of their drive."""
+        found = {}
+        for pid in self._children("--dead-man"):
+            command = (Path("/proc") / str(pid) / "cmdline").read_bytes().decode("utf-8", "replace").split("\0")
+            url = command[command.index("--drive") + 1]
+            found[url.partition("//")[2].partition("?")[0]] = pid
+        return found
 
     def kill(self) -> None:
         """SIGKILL to the service alone."""

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rich.console import Console
+
 from commissioner.cli.screens.screen import err, out, quantity, table
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.trend.trend import Verdict
 
 
-def show_refused(seen: Refused) -> None:
+def show_refused(seen: Refused, document: Mapping[str, Any]) -> None:
     """What the terminals show all the same."""
+    _states(document, err)
     for finding in seen.findings:
         if not finding.stops:
             err.print(f"[dim]{finding.kind}[/] {finding.what}")
@@ -25,8 +28,26 @@ def show_refused(seen: Refused) -> None:
         )
 
 
+def _states(document: Mapping[str, Any], where: Console) -> None:
+    """The recording's stretches, where there is more than one."""
+    stretches = document.get("states", [])
+    if len(stretches) < 2:
+        return
+    rows = []
+    for s in stretches:
+        own = s.get("withheld", "")
+        if "mean_torque_nm" in s:
+            speed, torque = s["mean_speed_rad_per_s"], s["mean_torque_nm"]
+            own = f"{speed['value'] * 9.5493:.6g} 1/min, {torque['value']:.4g} N m (std {torque['std']:.2g})"
+        if s["used"] and where is out:
+            own = "the answer below"
+        rows.append((s["state"], f"{s['start_s']:.3g} ... {s['end_s']:.3g} s", f"{s['current_a']:.3g} A", own))
+    where.print(table("", ("state", "from, to", "current", ""), rows))
+
+
 def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None) -> None:
     """The human view: what turns how fast against what, how sure, and what was put right."""
+    _states(document, out)
     wiring = miswired(seen.findings)
     for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")

@@ -15,7 +15,7 @@ def monitor(request: MonitorRequest, *, as_json: bool) -> None:
     if as_json:
         emit(done.document)
     elif isinstance(done, NotMonitored):
-        show_refused(done.seen)
+        show_refused(done.seen, done.document)
         raise done.error
     else:
         show(done.seen, done.document, done.verdict)

@@ -11,12 +11,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
+from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.circuits import Extension, candidates_for, fit_points, held_out, scales
 from commissioner.diagnose.points.table import Array, Points
 from commissioner.motor.circuit import Quantity
 
 SIGNIFICANCE = 1e-3
 LEAST_HELD_OUT_GAIN = 0.25
+LEAST_RISE = 0.02
+"""Of the rotor's resistance over the frequencies measured: less is nothing to name."""
 MOST_SCATTER = {"current": 0.05, "power": 0.1}
 """Rms error of the fitted points that coarse instruments may still make; beyond it no circuit here describes them."""
 
@@ -130,6 +134,12 @@ def _conclude(
         sizes = _sizes(extension, x[mine], covariance[mine, mine], points, scale)
         causes.append(PointCause(extension.name, sizes, p_values[extension.name], float(np.clip(share, 0.0, 1.0))))
         at += extension.does.numbers
+    slow = slow_rotor(points)
+    if slow is not None and slow.p_value < SIGNIFICANCE and slow.rise_over_range[0] > LEAST_RISE:
+        causes = _with_bars(causes, slow)
+    if points.is_locked:
+        remark = remark_of(slow, np.unique(points.frequency_hz).tolist())
+        points = replace(points, remarks=(*points.remarks, remark))
     verdict, reason = _verdict(points, causes, tested, missed)
     plain = fit_points(points, [], scale)
     before, after = (
@@ -150,12 +160,25 @@ def _conclude(
         relative[1],
         gain,
         _parameters(points, plain[0], plain[1]),
-        _parameters(points, x, covariance),
+        _parameters(points, x, covariance) | _slow(slow),
         dict(tested),
         points,
         before,
         after,
     )
+
+
+def _slow(slow: SlowRotor | None) -> dict[str, Quantity]:
+    return {} if slow is None else {"rotor_resistance_ohm": Quantity(slow.resistance_ohm, slow.std_ohm)}
+
+
+def _with_bars(causes: Sequence[PointCause], slow: SlowRotor) -> list[PointCause]:
+    """With the displacement of current that the frequencies show, where the plain rise with f squared did not."""
+    bars = next(n for n, c in CATALOGUE.items() if c.in_points and c.in_points.acts_on == "resistance")
+    if any(c.name == bars for c in causes):
+        return list(causes)
+    sizes = {"resistance_rise_over_range": (*slow.rise_over_range, "1")}
+    return [*causes, PointCause(bars, sizes, slow.p_value, 0.0)]
 
 
 def _verdict(

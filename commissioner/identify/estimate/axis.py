@@ -16,7 +16,8 @@ from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import BatchFit, Segment
 from commissioner.identify.batch.starts import from_impedance
 from commissioner.identify.batch.whiteness import Whiteness, whiteness
-from commissioner.identify.estimate.sufficiency import require_alignment, require_conditioned
+from commissioner.identify.estimate.sufficiency import require_conditioned
+from commissioner.identify.intake.alignment import more_periods
 from commissioner.identify.intake.stretches import Stretch
 from commissioner.identify.inverter.compensation import NOTHING, Compensation
 from commissioner.identify.inverter.staircase import InverterError, Staircase, dc_levels, fit_staircase
@@ -89,15 +90,15 @@ def fit_axis(
     fit = _begun_like(like, stretches, period_s) if like is not None else None
     stairs = None if fit else _staircase(stretches)
     fit = fit or _fitted(stretches, stairs, plate, period_s, guess, leg or (stairs.inverter if stairs else None))
+    if more_periods(fit.batch.delay, period_s):
+        return fit  # on the wrong rows nothing else of it counts
     try:
-        require_alignment(fit.batch)
         require_conditioned(fit.batch)
     except DataRefused:
         if leg is not None or (stairs or _staircase(stretches)) is None:
             raise
         # what was taken for settled levels was none: begin as if there were none
         fit = _fitted(stretches, None, plate, period_s, guess, None)
-        require_alignment(fit.batch)
         require_conditioned(fit.batch)
     return fit
 

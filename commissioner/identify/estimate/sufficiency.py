@@ -20,8 +20,6 @@ PLAUSIBLE_IMPEDANCE = (1e-3, 30.0)
 """Rms voltage over rms current of a test, of the rated impedance; a resistance alone is 0.004 to 0.15 of it."""
 
 LARGEST_SHARE_BESIDE, LARGEST_MISFIT = 0.02, 10.0
-EARLIEST, LATEST = -0.5, 1.95
-"""Delay of the current behind the voltage, in sample periods; the fit goes from -1 to 2."""
 
 
 def require_amperes(examined: Audit, plate: Nameplate) -> None:
@@ -95,23 +93,6 @@ def _share_beside(stretch: Stretch, frequency_hz: float, period_s: float) -> flo
     f = np.fft.rfftfreq(x.size, period_s)
     around = (np.abs(f - frequency_hz) < 0.3 * frequency_hz) | (np.abs(f - frequency_hz) < 4.0 / (x.size * period_s))
     return float(np.sum(power[~around]) / np.sum(power))
-
-
-def require_alignment(batch: BatchFit) -> None:
-    """Voltage and current on one time axis: no current answers before its voltage, none much later."""
-    if not batch.model.with_delay:
-        return
-    periods = batch.delay.value / batch.sample_period_s
-    if EARLIEST < periods < LATEST:
-        return
-    raise DataRefused(
-        "the current answers before the voltage" if periods < 0 else "the current answers too late",
-        step="identify",
-        value=f"the current is {batch.delay.value * 1e6:+.0f} us behind the voltage, or further",
-        limit=f"{EARLIEST:g} to {LATEST:g} sample periods of {batch.sample_period_s * 1e6:.0f} us",
-        remedy="voltage_axis_v holds from its own row's time to the next, currents are read at the row's time: shift the "
-        "voltage column by the missing rows",
-    )
 
 
 def require_conditioned(batch: BatchFit) -> None:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from commissioner.errors import DataRefused
+from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check, connection_of
 
 NAMEPLATE_KEYS = (*RATED_VALUES, "pole_pairs")
 
 
-def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:
-    """The nameplate in a recording's metadata; DataRefused naming the first key that is missing or impossible."""
+def nameplate_from(metadata: Mapping[str, float | str], source: str = "the recording") -> Nameplate:
+    """The nameplate in a recording's metadata; DataRefused naming the first key that is missing, ConfigurationError the first
+    that is impossible."""
     for key in NAMEPLATE_KEYS:
         if not isinstance(metadata.get(key), float | int):
             raise DataRefused(
@@ -31,11 +32,5 @@ def nameplate_from(metadata: Mapping[str, float | str]) -> Nameplate:
         inertia_kg_m2=float(inertia) if isinstance(inertia, float | int) else None,
     )
     for problem in check(plate):
-        raise DataRefused(
-            f"the nameplate cannot be right: {problem.key}",
-            step="read the nameplate",
-            value=problem.value,
-            limit=problem.expected,
-            remedy=f"correct {problem.key}, or give --motor",
-        )
+        raise ConfigurationError(file=source, key=problem.key, value=problem.value, expected=problem.expected)
     return plate

@@ -50,6 +50,16 @@ class CheckRow(TypedDict):
     remedy: str
 
 
+class PlateMatchDocument(TypedDict):
+    """How the combined values fit the plate, each a ratio (`motor.plate_match`); `unseen_gain`: bounds of a gain common to all
+    current sensors that would not have been noticed."""
+
+    current_ratio: float
+    copper_loss_ratio: float
+    impedance_ratio: float
+    unseen_gain: list[float]
+
+
 class RunDocument(TypedDict):
     """`parameters` is empty, and what comes of an identification missing, where a run did not get so far."""
 
@@ -83,3 +93,4 @@ class RunDocument(TypedDict):
     gaps: NotRequired[Gaps]
     winding_temperature_degc: NotRequired[float | None]
     longer_test: NotRequired[dict[str, Any]]
+    plate_match: NotRequired[PlateMatchDocument]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, cast
 
 from commissioner.procedure.findings import RunEnded
@@ -68,9 +69,19 @@ def diagnosis_sentences(diagnosis: Mapping[str, Any], parameters: Mapping[str, A
 
 def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:
     """The winding's temperature, and what a longer test would buy: in numbers, and as a remark."""
-    longer = findings.longer_test
+    longer, match = findings.longer_test, findings.plate_match
     more: dict[str, Any] = {"winding_temperature_degc": findings.winding_degc, "longer_test": longer}
-    return more | {"remarks": [*remarks, longer.sentence]} if longer else more
+    said = list(remarks)
+    if longer is not None:
+        said.append(longer.sentence)
+    if match is not None:
+        low, high = match.unseen_gain
+        more["plate_match"] = {**asdict(match), "unseen_gain": [low, high]}
+        said.append(
+            f"a gain that all current sensors have in common would not have been noticed between {low:.2f} and {high:.2f}: it "
+            "divides every resistance and inductance here; compare one current with a meter of your own"
+        )
+    return more | {"remarks": said}
 
 
 def _before(findings: Findings, names: Mapping[str, str], factors: Mapping[str, float]) -> Mapping[str, float] | None:

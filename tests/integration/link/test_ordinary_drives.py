@@ -16,7 +16,7 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.operations.check import CheckRequest, check
 from commissioner.run.job import names_of
 from commissioner.settings import load_motor
-from tests.support.libmodbus_drive import LibmodbusDrive, needs_libmodbus
+from tests.support.libmodbus.drive import LibmodbusDrive, needs_libmodbus
 
 pytestmark = needs_libmodbus
 

@@ -8,7 +8,7 @@ from playwright.sync_api import Browser
 from tests.support.browser import chromium
 from tests.support.service_process import ServiceProcess
 
-PAGE_LOST_S = 2.0
+PAGE_LOST_S = 5.0
 
 
 @pytest.fixture(scope="session")

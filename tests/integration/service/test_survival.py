@@ -71,17 +71,19 @@ def state_of(service, drive="bench"):
 
 
 def test_two_drives_each_with_its_run_and_one_whose_process_is_killed(service, bench):
-    runs = {"bench": service.start_run(**AXIS)}
-    bench_process = service.run_process()
-    runs["simulator"] = service.start_run()
+    runs = {"simulator": service.start_run(axes_deg=[0, 60, 120]), "bench": service.start_run(**AXIS)}
+    processes = service.run_processes()
+    assert set(runs.values()) <= set(service.client.get("/api/health").json()["runs_live"])
     for drive, run in runs.items():
         answer = service.client.post("/api/runs", json={"drive": drive, "motor": "motor_2kw2", "confirm": True})
         assert (answer.status_code, answer.json()["value"]) == (409, run)
     service.wait_energised(runs["bench"])
     began = time.time()
-    os.kill(bench_process, signal.SIGKILL)
+    os.kill(processes[bench.url.rpartition("/")[2]], signal.SIGKILL)
     assert dead_after_s(bench, began) <= WATCHDOG_S + ZERO_VOLTS_S
-    assert service.wait_over(runs["simulator"])["outcome"] == "commissioned"
+    service.wait_over(runs["bench"])
+    assert runs["simulator"] in service.client.get("/api/health").json()["runs_live"]
+    assert service.client.post(f"/api/runs/{runs['simulator']}/stop").json()["zero_volts"]
     cut = service.client.get(f"/api/runs/{runs['bench']}").json()
     assert cut["outcome"] == "cut off"
     page = service.client.get(f"/runs/{runs['bench']}", headers={"accept": "text/html"}).text

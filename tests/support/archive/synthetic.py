@@ -12,6 +12,7 @@ from commissioner.encoding import plain
 from commissioner.run.archive.journal import Journal, digest, read_journal
 from commissioner.run.archive.seal import CLOSED
 from commissioner.run.archive.summary import summary_of
+from commissioner.run.index.rows import utc_of
 
 PLATE = {
     "rated_power_w": 2200.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 5.0, "rated_speed_rpm": 1420.0,
@@ -57,7 +58,7 @@ def make_run(
     folder.mkdir(parents=True)
     request = {"url": "tcp://192.168.0.20:502", "profile": profile, "nameplate": plate or PLATE, "origin": origin or {}}
     (folder / "request.json").write_text(json.dumps(request), "utf-8")
-    journal = Journal(folder / "journal.jsonl")
+    journal = _JournalOf(folder / "journal.jsonl", utc_of(name))
     blocks = (0, digest(b""))
     started = {"run": name, "version": "1.0", "host": "laptop-3", "person": person}
     journal.write("run_started", started, blocks, durable=False)
@@ -78,6 +79,28 @@ def make_run(
         (folder / "summary.json").write_text(json.dumps({"summary": summary, "journal": facts}), "utf-8")
     journal.close()
     return folder
+
+
+class _JournalOf(Journal):
+    """A journal whose records were written at a time of the past."""
+
+    def __init__(self, path: Path, utc: str) -> None:
+        super().__init__(path)
+        self._utc = utc
+
+    def write(self, kind: str, record: object, blocks: tuple[int, str], *, durable: bool) -> None:
+        line = {
+            "n": self.records,
+            "utc": self._utc,
+            "previous": self.head,
+            "blocks": blocks,
+            "kind": kind,
+            "record": plain(record),
+        }
+        text = json.dumps(line, allow_nan=False)
+        self._file.write(text + "\n")
+        self._file.flush()
+        self.records, self.head = self.records + 1, digest(text.encode())
 
 
 def make_archive(root: Path, count: int, seed: int = 1) -> None:

@@ -1,12 +1,15 @@
 """The verdict on hand-made evidence: axes are compared where the iron was equally deep."""
 
+import csv
 from dataclasses import replace
+from pathlib import Path
 
-from commissioner.motor.circuit import Quantity
+from commissioner.motor.circuit import InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
 from commissioner.procedure.verdict import PARAMETERS, Decision, Evidence, decide
 from commissioner.settings import load_motor, load_procedure
 
+MOTORS = Path(__file__).parents[2] / "data" / "motors" / "motors.csv"
 PLATE = load_motor("motor_2kw2")
 VALUES = {
     name: Quantity(value, 0.001 * value)
@@ -24,12 +27,12 @@ def test_axes_that_agree_at_one_flux_are_not_apart_because_one_went_deeper_into_
     axes = ((0.0, VALUES), (60.0, with_magnetizing(0.9)))
     alike = ((0.0, VALUES), (60.0, with_magnetizing(1.001)))
     evidence = Evidence(VALUES, axes, at_one_flux=alike)
-    assert decide(evidence, prior(PLATE), ACCEPTANCE, write_back=True).decision is Decision.WRITE_BACK
+    assert decide(evidence, PLATE, ACCEPTANCE, write_back=True).decision is Decision.WRITE_BACK
 
 
 def test_axes_that_differ_at_one_flux_are_objected_to():
     alike = ((0.0, VALUES), (60.0, with_magnetizing(0.9)))
-    verdict = decide(Evidence(VALUES, alike, at_one_flux=alike), prior(PLATE), ACCEPTANCE, write_back=True)
+    verdict = decide(Evidence(VALUES, alike, at_one_flux=alike), PLATE, ACCEPTANCE, write_back=True)
     assert verdict.decision is Decision.REJECT
     assert "magnetizing_inductance_h differs" in verdict.reason
 
@@ -37,4 +40,36 @@ def test_axes_that_differ_at_one_flux_are_objected_to():
 def test_without_saturation_the_values_themselves_are_compared():
     axes = ((0.0, VALUES), (60.0, with_magnetizing(0.9)))
     evidence = replace(Evidence(VALUES, axes), at_one_flux=())
-    assert decide(evidence, prior(PLATE), ACCEPTANCE, write_back=True).decision is Decision.REJECT
+    assert decide(evidence, PLATE, ACCEPTANCE, write_back=True).decision is Decision.REJECT
+
+
+def small_motor():
+    """The 0.18 kW machine of the table in the place of a 1.1 kW one."""
+    with MOTORS.open(encoding="utf-8") as file:
+        rows = {row["id"]: row for row in csv.DictReader(file)}
+    row = min((r for r in rows.values() if r["use_for_mc"] == "1"), key=lambda r: float(r["P_kW"]))
+    assert float(row["P_kW"]) < 0.2
+    return InverseGamma(
+        float(row["Rs_ohm"]), float(row["R_R_ohm"]), 1e-3 * float(row["L_sgm_mH"]), 1e-3 * float(row["L_M_mH"])
+    )
+
+
+def sure_of(machine):
+    return {name: Quantity(v, 1e-3 * v) for name, v in zip(PARAMETERS, machine.as_tuple(), strict=True)}
+
+
+def test_a_small_motor_on_a_large_motors_plate_is_never_good_enough():
+    plate = replace(PLATE, rated_power_w=1100.0, rated_current_a=2.6, rated_speed_rpm=1415.0, power_factor=0.79)
+    values = sure_of(small_motor())
+    verdict = decide(Evidence(values, ((0.0, values),)), plate, ACCEPTANCE, write_back=True)
+    assert verdict.decision is Decision.REJECT
+    assert "rated current" in verdict.reason or "copper loss" in verdict.reason
+
+
+def test_copper_loss_beyond_the_plates_losses_is_an_objection_of_its_own():
+    """Current and box are right, the winding's resistance alone is not."""
+    values = sure_of(replace(prior(PLATE).typical, stator_resistance_ohm=8.0))
+    losses_w = 3**0.5 * 400.0 * PLATE.rated_current_a * PLATE.power_factor - PLATE.rated_power_w
+    assert 3 * 8.0 * PLATE.rated_current_a**2 > losses_w
+    verdict = decide(Evidence(values, ((0.0, values),)), PLATE, ACCEPTANCE, write_back=True)
+    assert verdict.decision is Decision.REJECT and "copper loss" in verdict.reason

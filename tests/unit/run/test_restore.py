@@ -16,7 +16,7 @@ from commissioner.run import restore as restoring
 from commissioner.run.archive.catalogue import summarise
 from commissioner.run.archive.folder import RunFolder, read_blocks
 from commissioner.settings import load_motor
-from tests.support.chained import rechain
+from tests.support.archive.chained import rechain
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive
 
 PROFILE = load_profile("simulated")

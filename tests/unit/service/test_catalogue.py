@@ -10,6 +10,7 @@ from jinja2 import Environment
 from jinja2.ext import extract_from_ast
 
 import commissioner
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.service.page import band, frame, texts, words
 from commissioner.service.page.texts import Texts
 from commissioner.service.simulator import SCENARIOS
@@ -67,7 +68,7 @@ def names():
     yield from words.SCRIPT_TEXTS
     yield from frame.STEPS
     yield from band.PARTS.values()
-    yield from (text for cause in words.CAUSES.values() for text in cause)
+    yield from (text for cause in CATALOGUE.values() for text in cause.in_service if text)
     yield from (quantity.name for quantity in words.QUANTITIES)
     yield from (scenario.replace("_", " ") for scenario in SCENARIOS)
     yield from ("commissioned", "rejected", "aborted", "faulted", "cut off", "passed", "not passed")

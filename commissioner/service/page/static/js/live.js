@@ -72,9 +72,15 @@ function gauge(id, now, high, limit, digits, unit) {
   box.querySelector("[data-high]").textContent = number(high, digits, unit);
   box.querySelector("[data-limit]").textContent = number(limit, digits, unit);
 }
+function item(test, k) {
+  const made = $("#testitem").content.firstElementChild.cloneNode(true);
+  made.dataset.test = k;
+  made.querySelector("b").textContent = `${number(test.axis_deg, 0)}°`;
+  return made;
+}
 function progress(live) {
   const list = $("#progress");
-  if (live.tests.length && !list.querySelector("[data-test]")) { location.reload(); return; }
+  if (live.tests.length && !list.querySelector("[data-test]")) list.replaceChildren(...live.tests.map(item));
   live.tests.forEach((test, k) => {
     const item = list.querySelector(`[data-test="${k}"]`), is = k + 1 === live.test;
     const share = test.state === "done" ? 1 : is ? Math.min(0.99, test.energised_s / (live.planned_s || 1)) : 0;

@@ -18,7 +18,7 @@ from tests.support.reference_firmware import FirmwareProcess, missing, needs_lib
 
 __all__ = ["LibmodbusDrive", "missing", "needs_libmodbus"]
 
-SOURCE = Path(__file__).resolve().parent / "libmodbus" / "drive.c"
+SOURCE = Path(__file__).resolve().parent / "drive.c"
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,43 @@
+"""Do the currents of a running motor belong to its plate? Current and power at the measured voltage, frequency and slip."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction
+from commissioner.records import ReadingNote, RunningRecording
+
+
+def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Contradiction | None:
+    """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen."""
+    seen = audited.fundamental
+    if seen is None or shaft_hz is None:
+        return None
+    slip = 1.0 - plate.pole_pairs * shaft_hz / seen.frequency_hz
+    if not 0.0 < slip < 0.5:
+        return None
+    point = OperatingPoint(
+        abs(seen.voltage_v) / math.sqrt(2.0), seen.frequency_hz, slip, abs(seen.current_a) / math.sqrt(2.0), seen.power_w,
+        seen.reactive_var,
+    )  # fmt: skip
+    return contradiction(point, plate)
+
+
+def of_contradiction(against: Contradiction, *, stops: bool) -> Finding:
+    """As a finding: a refusal, or a note where the data are trusted."""
+    return Finding(
+        "plate_contradiction", "refused" if stops else "note",
+        against.what + ("" if stops else ": the data were trusted, as told"), against.value, against.limit, against.remedy,
+    )  # fmt: skip
+
+
+def over_currents(recording: RunningRecording, factor: float) -> RunningRecording:
+    """The recording with its currents divided by a factor, and a note of it."""
+    u, v, w = recording.currents_a
+    note = ReadingNote(
+        "currents_by_plate", f"the currents were divided by {factor:.4g}: the plate was to be trusted, as told"
+    )
+    return replace(recording, currents_a=(u / factor, v / factor, w / factor), notes=(*recording.notes, note))

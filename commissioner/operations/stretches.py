@@ -1,0 +1,92 @@
+"""A running recording watched state by state: the answer is of its longest steady stretch, the others have their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from commissioner.monitor.chain import Observation, Refused, Wishes, observe
+from commissioner.monitor.contract import State
+from commissioner.monitor.intake.carrier import means_over_carrier
+from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.intake.states import Stretch, cut_out, states
+from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import ReadingNote, RunningRecording
+
+MARGIN_S = 0.06
+"""At either end of a steady stretch: the window that finds it reaches so far over its edge."""
+
+
+def in_its_states(
+    recording: RunningRecording, plate: Nameplate, wishes: Wishes
+) -> tuple[Observation | Refused, RunningRecording, list[State]]:
+    """(what the longest steady stretch says, that stretch, all stretches). A recording of one state is watched whole."""
+    recording, carrier = means_over_carrier(recording)
+    if carrier is not None and carrier.stops:
+        return _not_watched(recording, carrier), recording, []
+    if carrier is not None:
+        recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
+    stretches = states(recording, plate)
+    if len(stretches) == 1:
+        return observe(recording, plate, wishes), recording, [_state(stretches[0], used=True)]
+    steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
+    if not steady:
+        said = ", ".join(f"{s.state} {s.start_s:.3g} ... {s.end_s:.3g} s" for s in stretches)
+        finding = Finding(
+            "no_steady_stretch", "refused", "the motor is never in a steady state", said, "a steady stretch of a second",
+            "record longer at constant supply and load",
+        )  # fmt: skip
+        return _not_watched(recording, finding), recording, [_state(s, used=False) for s in stretches]
+    longest = max(steady, key=lambda s: s.duration_s)
+    part = cut_out(recording, longest, MARGIN_S)
+    note = ReadingNote(
+        "states", f"{_listed(stretches)}: the answer is of the steady {_span(longest)}, what is beside it was not used"
+    )
+    seen = observe(replace(part, notes=(*part.notes, note)), plate, wishes)
+    out = [_state(s, used=s is longest) for s in stretches]
+    for stretch, state in zip(stretches, out, strict=True):
+        if stretch in steady:
+            _add_own(state, recording, stretch, plate, wishes, is_watched=stretch is longest)
+    return seen, part, out
+
+
+def _add_own(
+    state: State, recording: RunningRecording, stretch: Stretch, plate: Nameplate, wishes: Wishes, *, is_watched: bool
+) -> None:
+    """What a steady stretch says: as the chain has it, else, of a short one, as its terminals do, and why no more."""
+    part = cut_out(recording, stretch, MARGIN_S)
+    if not is_watched:
+        own = observe(part, plate, wishes)
+        if isinstance(own, Observation):
+            state["mean_speed_rad_per_s"] = {"value": own.mean_speed_rad_per_s, "std": own.mean_speed_std}
+            state["mean_torque_nm"] = {"value": own.mean_torque_nm, "std": own.mean_torque_std}
+            return
+        state["withheld"] = f"from current, voltage and plate only: {own.reason.what}"
+    terminal = from_terminals(part, plate, stretch.frequency_hz)
+    if terminal is not None:
+        state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
+        state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
+
+
+def _state(stretch: Stretch, *, used: bool) -> State:
+    return {
+        "state": stretch.state, "start_s": stretch.start_s, "end_s": stretch.end_s, "current_a": stretch.current_a,
+        "frequency_hz": stretch.frequency_hz, "used": used,
+    }  # fmt: skip
+
+
+def _span(stretch: Stretch) -> str:
+    return f"{stretch.start_s:.3g} ... {stretch.end_s:.3g} s"
+
+
+def _listed(stretches: tuple[Stretch, ...]) -> str:
+    return ", ".join(f"{s.state} {_span(s)}" for s in stretches)
+
+
+def _not_watched(recording: RunningRecording, finding: Finding) -> Refused:
+    empty = np.zeros(0, dtype=np.complex128)
+    notes = tuple(Finding(n.code, "note", n.what) for n in recording.notes)
+    audited = Audited(0, 0.0, recording.sample_period_s, empty, empty, None, None, (*notes, finding), {})
+    return Refused(audited, finding, audited.findings)

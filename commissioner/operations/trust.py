@@ -1,0 +1,53 @@
+"""Plate and data that contradict each other: named with both values, and which of the two the user says is right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, cast
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.motor.plate_match import Contradiction
+from commissioner.records import Signal, StandstillRecording
+
+Trust = Literal["plate", "data"]
+
+
+def trust_from(said: str | None) -> Trust | None:
+    """UsageError for another word."""
+    if said not in (None, "plate", "data"):
+        raise UsageError(
+            f"there is no trust in {said!r}", step="command line", value=said, limit="--trust plate or --trust data",
+            remedy="say which of the two is right where they contradict each other",
+        )  # fmt: skip
+    return cast("Trust | None", said)
+
+
+def refused(found: Contradiction) -> DataRefused:
+    """The error of a contradiction that nobody has decided."""
+    return DataRefused(
+        found.what, step="compare data and plate", value=found.value, limit=found.limit, remedy=found.remedy
+    )
+
+
+def trusted_data(found: Contradiction) -> str:
+    """What a result says whose user trusts the data."""
+    return f"{found.what} ({found.value}): the data were trusted, as told"
+
+
+def trusted_plate(factor: float) -> str:
+    """What a result says whose currents were brought to the plate."""
+    return f"plate and data contradicted each other: the currents were divided by {factor:.4g}, as the plate was to be trusted"
+
+
+def with_currents_over(recording: StandstillRecording, factor: float) -> StandstillRecording:
+    """The recording with all currents divided by a factor."""
+
+    def part(current: Signal | None) -> Signal | None:
+        return None if current is None else current / factor
+
+    return replace(
+        recording,
+        current_u_a=recording.current_u_a / factor,
+        current_v_a=recording.current_v_a / factor,
+        current_w_a=part(recording.current_w_a),
+    )

@@ -1,0 +1,1 @@
+"""A drive behind libmodbus: its C source, and the process that a test starts."""

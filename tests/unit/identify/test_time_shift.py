@@ -1,0 +1,80 @@
+"""Currents early or late against the voltage, up to three sample periods: found with its error, and the values stay right."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from commissioner.errors import DataRefused
+from commissioner.identify.analysis import identify
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import StandstillRecording
+
+PLATE = Nameplate(2200.0, 400.0, 50.0, 4.9, 1436.0, 0.80, 2, "star")
+TRUTH = (3.7, 2.122, 0.020934, 0.22477)
+T = 250e-6
+
+
+def recording(lag, seconds=1.6, noise_a=0.01, seed=1):
+    """The exact answer of the linear machine to a held multitone voltage, read `lag` periods late."""
+    r_s, r_r, leak, main = TRUTH
+    a = np.array([[-(r_s + r_r) / leak, r_r / main / leak], [r_r, -r_r / main]])
+    b = np.array([1.0 / leak, 0.0])
+    n = round(seconds / T)
+    t = np.arange(n) * T
+    tones = ((1.3, 9.0), (3.7, 12.0), (11.0, 25.0), (37.0, 45.0), (83.0, 60.0))
+    u = sum(amp * np.sin(2 * np.pi * f * t + k) for k, (f, amp) in enumerate(tones)) * np.minimum(t / 0.05, 1.0)
+
+    def held(h):
+        block = np.zeros((3, 3))
+        block[:2, :2], block[:2, 2] = a * h, b * h
+        return expm(block)
+
+    whole, part = int(np.floor(-lag)), -lag - np.floor(-lag)
+    full, inside = held(T), held(part * T)
+    x, i = np.zeros((n + 1, 2)), np.zeros(n)
+    for k in range(n):
+        x[k + 1] = full[:2, :2] @ x[k] + full[:2, 2] * u[k]
+        i[k] = (inside[:2, :2] @ x[k] + inside[:2, 2] * u[k])[0]
+    # row k holds the current of (k - lag) T
+    at = np.arange(n) + whole
+    current = np.where((at >= 0) & (at < n), i[np.clip(at, 0, n - 1)], 0.0)
+    keep = slice(0, n - max(whole + 1, 0))
+    random = np.random.default_rng(seed)
+    u, current, t = u[keep], current[keep], t[keep]
+    shake = noise_a * random.standard_normal((2, t.size))
+    return StandstillRecording(
+        t,
+        np.zeros(t.size, dtype=np.int64),
+        np.zeros(t.size),
+        u,
+        current + shake[0],
+        -0.5 * current + shake[1],
+        None,
+        None,
+        T,
+    )
+
+
+@pytest.mark.parametrize("lag", [-2.9, -1.3, -0.3, 0.5, 1.6, 3.0])
+def test_a_shift_is_found_with_its_error_and_moves_no_value(lag):
+    seen = identify(recording(lag), PLATE)
+    value, std = seen.delay_s
+    assert value / T == pytest.approx(lag, abs=max(4.0 * std / T, 0.004)) and 0.0 < std / T < 0.02
+    for found, error, true in zip(seen.parameters.as_tuple(), seen.std, TRUTH, strict=True):
+        assert found == pytest.approx(true, abs=max(3.5 * error, 1.5e-3 * true))
+    assert any("behind the voltage" in remark for remark in seen.remarks)
+
+
+def test_sound_currents_have_none_within_its_error():
+    for seed in range(1):
+        seen = identify(recording(0.0, seed=seed), PLATE)
+        value, std = seen.delay_s
+        assert abs(value) < 4.0 * std and 0.0 < std / T < 0.01
+        assert not any("behind the voltage" in remark for remark in seen.remarks)
+
+
+@pytest.mark.parametrize("lag", [-4.2, 3.6])
+def test_a_shift_beyond_is_refused_with_its_value(lag):
+    with pytest.raises(DataRefused, match="current answers") as refusal:
+        identify(recording(lag), PLATE)
+    assert f"{lag:+.1f}" in str(refusal.value.value)

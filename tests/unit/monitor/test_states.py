@@ -1,0 +1,83 @@
+"""The state of the recording, stretch by stretch, and means over whole carrier periods; truth from an independent machine model."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commissioner.monitor.intake.carrier import means_over_carrier
+from commissioner.monitor.intake.states import cut_out, states
+from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.motor.nameplate import Nameplate
+from commissioner.recordings.importers import read_running
+from commissioner.recordings.plate import plate_of
+from commissioner.records import RunningRecording
+
+DATA = Path(__file__).parents[2] / "data" / "intake"
+PLATE = Nameplate(2250.0, 400.0, 50.0, 4.86, 1436.0, 0.78, 2, "star")
+
+
+def stretches(file):
+    recording = read_running(DATA / file)
+    plate = plate_of(recording.metadata, file, None)
+    return recording, plate, states(recording, plate)
+
+
+def test_off_start_step_and_coasting_are_told_with_their_times():
+    """Off to 0.2 s, direct start to 0.29 s, 5 N m, step to 13 N m at 1.4 s, off at 2.3 s."""
+    recording, plate, seen = stretches("off_start_step_off.csv.gz")
+    assert [s.state for s in seen] == ["off", "start", "steady", "load step", "steady", "coast-down"]
+    assert seen[1].start_s == pytest.approx(0.2, abs=0.04) and 0.29 <= seen[1].end_s < 0.45
+    assert seen[3].start_s <= 1.42 <= seen[3].end_s and seen[5].start_s == pytest.approx(2.3, abs=0.04)
+    for stretch, torque, speed in ((seen[2], 5.0, 155.05), (seen[4], 13.0, 151.39)):
+        own = from_terminals(cut_out(recording, stretch, 0.06), plate, stretch.frequency_hz)
+        assert own.torque_nm == pytest.approx(torque, abs=2.0 * own.torque_std_nm)
+        assert own.speed_rad_per_s == pytest.approx(speed, abs=2.0 * own.speed_std_rad_per_s)
+
+
+def test_a_ramp_of_the_supply_is_told_from_the_steady_state_behind_it():
+    """5 to 50 Hz in 1.5 s, then 50 Hz."""
+    _, _, seen = stretches("ramp.csv.gz")
+    assert [s.state for s in seen] == ["ramp", "steady"]
+    assert 1.5 <= seen[1].start_s < 1.7
+
+
+def switched(carrier_hz, rate_hz, seconds=1.0, f=40.0, spread=0.0, seed=0):
+    """Line voltages of a sine-triangle inverter of 560 V, sampled instantly, and currents of their fundamental."""
+    fine = 40
+    t = np.arange(round(seconds * rate_hz) * fine) / (rate_hz * fine)
+    random = np.random.default_rng(seed)
+    wobble = np.interp(t, np.arange(0, seconds + 0.02, 0.01), random.standard_normal(int(seconds / 0.01) + 2))
+    phase = np.cumsum(carrier_hz * (1 + spread * wobble)) / (rate_hz * fine)
+    triangle = 4 * np.abs(phase % 1 - 0.5) - 1
+    legs = [280 * np.sign(0.8 * np.cos(2 * np.pi * f * t - k * 2 * np.pi / 3) - triangle) for k in range(3)]
+    lines = [(legs[k] - legs[(k + 1) % 3])[::fine] for k in range(3)]
+    t = t[::fine]
+    currents = tuple(4 * np.cos(2 * np.pi * f * t - k * 2 * np.pi / 3 - 0.6) for k in range(3))
+    return RunningRecording(t, currents, tuple(lines), True, None, 1.0 / rate_hz)
+
+
+@pytest.mark.parametrize(("carrier", "rate"), [(4000, 50e3), (4000, 100e3), (2500, 40e3), (5000, 53e3)])
+def test_the_carrier_is_found_and_means_are_the_fundamental(carrier, rate):
+    recording = switched(carrier, rate)
+    means, finding = means_over_carrier(recording)
+    assert finding.code == "carrier_means" and finding.value == pytest.approx(carrier, rel=0.02)
+    u = means.voltages_v[0]
+    true = 0.8 * 280 * np.sqrt(3) * np.cos(2 * np.pi * 40 * means.time_s + np.pi / 6)
+    # instants locked to the carrier see an edge to one sample: a mean is a tenth off at ten a period, and no mean helps
+    assert np.std(u - true) < max(0.08, 1.3 * carrier / rate) * np.std(true)
+    assert means.sample_period_s == pytest.approx(np.median(np.diff(means.time_s)))
+
+
+def test_too_slow_a_recording_is_refused_with_the_rate_that_would_do():
+    _, finding = means_over_carrier(switched(4000, 20e3))
+    assert finding.stops and "40" in str(finding.limit)
+
+
+def test_sine_voltages_are_left_alone():
+    recording = switched(4000, 20e3)
+    sine = tuple(300 * np.cos(2 * np.pi * 40 * recording.time_s - k * 2 * np.pi / 3) for k in range(3))
+    recording = replace(recording, voltages_v=sine)
+    assert means_over_carrier(recording) == (recording, None)
+    assert [s.state for s in states(recording, PLATE)] == ["steady"]

@@ -1,0 +1,149 @@
+"""Every machine of the table fits its own plate; another motor, another connection, a foreign scale do not."""
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate, check, prior
+from commissioner.motor.plate_match import (
+    CURRENT_RATIO,
+    MOST_INDUCTIVE,
+    PlateMatch,
+    inductance_mismatch,
+    mismatch,
+    plate_match,
+)
+from commissioner.motor.running import equal_leakages, stator_impedance
+from commissioner.settings import load_motor
+
+TABLE = Path(__file__).parents[2] / "data" / "motors" / "motors.csv"
+PLATE = load_motor("motor_2kw2")
+
+
+def machines():
+    """(name, parameters, plate) of the machines whose plate can be true; what a source does not state is computed at the slip of
+    its rated power."""
+    with TABLE.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if row["use_for_mc"] != "1":
+                continue
+            frequency, pairs = float(row["f_Hz"]), int(float(row["poles"])) // 2
+            speed = row["n_n_rpm"] or 60.0 * frequency / pairs * (1.0 - float(row["slip_calc"]))
+            plate = Nameplate(
+                1e3 * float(row["P_kW"]), float(row["V_LL"]), frequency, float(row["I_n_A"] or row["I_calc_A"]), float(speed),
+                float(row["pf_n"] or row["pf_calc"]), pairs, "star",
+            )  # fmt: skip
+            parameters = InverseGamma(
+                float(row["Rs_ohm"]), float(row["R_R_ohm"]), 1e-3 * float(row["L_sgm_mH"]), 1e-3 * float(row["L_M_mH"])
+            )
+            if not check(plate):
+                yield row["id"], parameters, plate
+
+
+KNOWN = list(machines())
+
+
+def scaled(machine, factor):
+    return InverseGamma(*(factor * value for value in machine.as_tuple()))
+
+
+def test_there_are_machines_with_plates():
+    assert len(KNOWN) >= 30
+
+
+@pytest.mark.parametrize(("name", "machine", "plate"), KNOWN, ids=[name for name, *_ in KNOWN])
+def test_a_machine_fits_its_own_plate(name, machine, plate):
+    match = plate_match(machine, plate)
+    assert mismatch(match, plate) is None
+    assert inductance_mismatch(machine.leakage_inductance_h + machine.magnetizing_inductance_h, plate) is None
+    low, high = match.unseen_gain
+    assert low <= 1.0 <= high
+
+
+@pytest.mark.parametrize(("name", "machine", "plate"), KNOWN, ids=[name for name, *_ in KNOWN])
+def test_star_for_delta_and_the_reverse_are_named(name, machine, plate):
+    delta = replace(plate, connection="delta")
+    found = mismatch(plate_match(scaled(machine, 3.0), delta), delta)
+    assert (found is not None and "wired" in found.what) or "impedances are" in found.what
+    found = mismatch(plate_match(scaled(machine, 1 / 3), plate), plate)
+    assert found is not None
+
+
+def test_the_ratios_are_those_of_the_circuit():
+    machine = prior(PLATE).typical
+    omega = 2 * math.pi * PLATE.rated_frequency_hz
+    slip = 1 - PLATE.rated_speed_rpm * PLATE.pole_pairs / (60 * PLATE.rated_frequency_hz)
+    impedance = stator_impedance(equal_leakages(machine), omega, slip)
+    current_a = PLATE.rated_voltage_v / math.sqrt(3) / abs(impedance)
+    losses_w = math.sqrt(3) * PLATE.rated_voltage_v * PLATE.rated_current_a * PLATE.power_factor - PLATE.rated_power_w
+    match = plate_match(machine, PLATE)
+    assert match.current_ratio == pytest.approx(current_a / PLATE.rated_current_a)
+    assert match.copper_loss_ratio == pytest.approx(
+        3 * machine.stator_resistance_ohm * PLATE.rated_current_a**2 / losses_w
+    )
+    assert match.impedance_ratio == pytest.approx(1.0)
+    assert plate_match(scaled(machine, 2.0), PLATE).impedance_ratio == pytest.approx(2.0)
+
+
+def test_a_plate_without_losses_leaves_nothing_for_the_copper():
+    lossless = replace(PLATE, rated_power_w=math.sqrt(3) * 400.0 * PLATE.rated_current_a * PLATE.power_factor)
+    assert plate_match(prior(PLATE).typical, lossless).copper_loss_ratio > 1e9
+
+
+@pytest.mark.parametrize(
+    ("current", "copper", "what"),
+    [
+        (CURRENT_RATIO[0], 0.5, None),
+        (CURRENT_RATIO[1], 0.5, None),
+        (1.0, 1.0, None),
+        (CURRENT_RATIO[0] - 1e-9, 0.5, "another rated current"),
+        (CURRENT_RATIO[1] + 1e-9, 0.5, "another rated current"),
+        (1.0, 1.0 + 1e-9, "copper loss"),
+        (0.1, 9.0, "another rated current"),
+    ],
+)
+def test_the_bounds_are_where_they_are_said_to_be(current, copper, what):
+    found = mismatch(PlateMatch(current, copper, 1.0), PLATE)
+    assert (found is None) if what is None else (what in found.what and found.limit and found.remedy)
+    if what == "copper loss":
+        assert (found.value, found.limit) == (copper, "1")
+    elif what:
+        assert found.value == current and "0.66 ... 1.66" in found.limit
+
+
+@pytest.mark.parametrize(
+    ("impedances", "connection", "says"),
+    [
+        (3.0, "delta", "wired in star where the plate says delta: all its impedances are three times"),
+        (2.2, "delta", "wired in star"), (4.2, "delta", "wired in star"),
+        (1 / 3, "star", "wired in delta where the plate says star: all its impedances are a third of"),
+        (1 / 2.2 - 1e-6, "star", "wired in delta"), (1 / 4.2 + 1e-6, "star", "wired in delta"),
+        (2.19, "delta", "all impedances are 2.2 times"), (4.21, "delta", "all impedances are 4.2 times"),
+        (3.0, "star", "all impedances are 3 times"), (1 / 3, "delta", "all impedances are 0.33 times"),
+    ],
+)  # fmt: skip
+def test_the_connection_is_named_where_all_impedances_are_its_factor_off(impedances, connection, says):
+    plate = replace(PLATE, connection=connection)
+    found = mismatch(PlateMatch(1.0 / impedances, 0.1, impedances), plate)
+    assert says in found.what
+    assert ("wire the motor in" in found.remedy) is ("wired" in says)
+
+
+def test_the_first_inductance_is_bounded_upwards_alone():
+    typical = prior(PLATE).typical
+    rest_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
+    assert inductance_mismatch(MOST_INDUCTIVE * rest_h * (1 - 1e-9), PLATE) is None
+    assert inductance_mismatch(0.01 * rest_h, PLATE) is None
+    found = inductance_mismatch(MOST_INDUCTIVE * rest_h * 1.001, PLATE)
+    assert "inductance" in found.what and found.value == pytest.approx(MOST_INDUCTIVE * 1.001)
+    assert "at most 1.95" in found.limit
+    delta = replace(PLATE, connection="delta")
+    assert "wired in star" in inductance_mismatch(3.0 * rest_h, delta).what
+
+
+def test_an_unseen_gain_is_the_ratio_over_the_bounds():
+    assert PlateMatch(1.2, 0.5, 1.0).unseen_gain == pytest.approx((1.2 / 1.66, 1.2 / 0.66))

@@ -1,0 +1,193 @@
+"""Current sensors that lie are found by what they break: the axis' pattern, their own movement, the drive's magnitude."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commissioner.records import SampleBlock
+from commissioner.safety.sensors import MISFIT, SCALE, SCALE_FLOOR, WINDOW_S, ZERO_S, SensorWatch
+from tests.unit.safety.test_watch import STATUS
+
+PERIOD_S, LIMIT_A, ROWS = 2e-4, 10.0, 50
+RNG = np.random.default_rng(3)
+NOISE = RNG.normal(0.0, 0.003, (3, 40_000))
+
+
+def blocks(axis_deg=0.0, peak_a=4.0, damage=lambda phases, start: phases, phases=3, offset=(0.02, -0.03, 0.01)):
+    """Zero volts for a little longer than ZERO_S, then a ramp with a tone on it, block by block."""
+    for number in range(14):
+        start = number * ROWS
+        time_s = (start + np.arange(ROWS)) * PERIOD_S
+        voltage = np.where(time_s < ZERO_S + 0.01, 0.0, 20.0 + 10.0 * np.sin(200.0 * time_s))
+        axis = peak_a / 30.0 * voltage
+        angles = np.deg2rad(axis_deg) - 2.0 * np.pi / 3.0 * np.arange(3)
+        seen = np.cos(angles)[:, None] * axis + NOISE[:, start : start + ROWS] + np.array(offset)[:, None]
+        u, v, w = damage(seen, start)
+        yield SampleBlock(
+            session=1, first_index=start, sample_period_s=PERIOD_S, axis_deg=axis_deg, voltage_axis_v=voltage,
+            current_u_a=u, current_v_a=v, current_w_a=w if phases == 3 else None, dc_link_v=540.0, lost_before=0,
+            clipped=False,
+        )  # fmt: skip
+
+
+def verdict(**how):
+    watch = SensorWatch(LIMIT_A)
+    return next((reason for block in blocks(**how) if (reason := watch.judge(block)) is not None), None)
+
+
+def of_phase(phase, change):
+    def damage(seen, start):
+        seen = seen.copy()
+        seen[phase] = change(seen[phase])
+        return seen
+
+    return damage
+
+
+@pytest.mark.parametrize("axis_deg", [0.0, 60.0, 120.0, 17.0])
+@pytest.mark.parametrize("phases", [2, 3])
+def test_true_sensors_are_believed(axis_deg, phases):
+    assert verdict(axis_deg=axis_deg, phases=phases) is None
+
+
+@pytest.mark.parametrize("gain", [0.92, 1.08])
+def test_gains_that_differ_by_less_than_a_tenth_are_no_lie(gain):
+    assert verdict(damage=of_phase(0, lambda i: gain * i)) is None
+
+
+@pytest.mark.parametrize("axis_deg", [0.0, 60.0, 120.0])
+@pytest.mark.parametrize("phase", [0, 1, 2])
+@pytest.mark.parametrize(
+    "change", [lambda i: -i, lambda i: 2.0 * i, lambda i: 0.4 * i], ids=["reversed", "doubled", "damped"]
+)
+def test_a_phase_of_foreign_sign_or_scale_is_named(axis_deg, phase, change):
+    reason = verdict(axis_deg=axis_deg, damage=of_phase(phase, change))
+    assert reason is not None and reason.is_fault
+    assert "does not follow the test axis" in reason.what
+    assert "uvw"[phase] in reason.what.split("phase ")[1].split(" does")[0]
+    assert reason.value > 0.0 and "beside the axis" in str(reason.limit)
+
+
+def test_phases_exchanged_are_seen():
+    assert "does not follow" in verdict(axis_deg=17.0, damage=lambda seen, start: seen[[1, 0, 2]]).what
+
+
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_a_phase_that_stands_still_is_named(phase):
+    reason = verdict(damage=of_phase(phase, lambda i: np.full_like(i, 0.7)))
+    assert f"phase {'uvw'[phase]} stands still" in reason.what
+    assert reason.value == 0.0
+
+
+def test_two_phases_that_stand_still_are_both_named():
+    def damage(seen, start):
+        return np.vstack([seen[:1], np.full((2, seen.shape[1]), 0.7)])
+
+    assert "phase v and w stands still" in verdict(damage=damage).what
+
+
+def test_a_phase_that_has_no_part_of_the_axis_may_stand_still():
+    """At 90 degrees phase u carries nothing."""
+    assert verdict(axis_deg=90.0, damage=of_phase(0, lambda i: np.full_like(i, 0.02))) is None
+
+
+def test_two_sensors_alone_cannot_accuse_each_other():
+    reason = verdict(axis_deg=17.0, phases=2, damage=of_phase(0, lambda i: -i))
+    assert "phase u or v does not follow" in reason.what
+
+
+def test_nothing_is_judged_before_a_window_is_full():
+    watch, judged = SensorWatch(LIMIT_A), 0
+    for block in blocks(damage=of_phase(0, lambda i: -3.0 * i)):
+        if watch.judge(block) is not None:
+            break
+        judged += 1
+    assert judged * ROWS * PERIOD_S >= ZERO_S + WINDOW_S - ROWS * PERIOD_S
+
+
+def test_offsets_are_no_currents():
+    assert verdict(offset=(0.8, -0.5, 0.3)) is None
+
+
+@pytest.mark.parametrize("over", [-0.002, 0.002])
+def test_the_misfit_is_judged_at_its_edge(over):
+    """A gain g of phase u along axis 0 leaves |g - 1| c^2 beside the rest's share; here measured on the pattern itself."""
+    cosines = np.array([1.0, -0.5, -0.5])
+
+    def misfit(gain):
+        seen = cosines * np.array([gain, 1.0, 1.0])
+        along = cosines @ seen / (cosines @ cosines)
+        return np.max(np.abs(seen - cosines * along)) / along
+
+    gains = np.linspace(1.0, 3.0, 20_001)
+    edge = gains[np.argmax([misfit(g) > MISFIT for g in gains[::20]]) * 20]
+    found = verdict(peak_a=400.0, damage=of_phase(0, lambda i: (edge + over * 20) * i), offset=(0.0, 0.0, 0.0))
+    assert (found is not None) is (over > 0)
+
+
+# --- against the drive's own magnitude ------------------------------------------------------------------------------
+def claimed(block, magnitude_a, produced, *, energised=True):
+    watch = SensorWatch(LIMIT_A)
+    watch.claim(replace(STATUS, is_energised=energised, current_magnitude_a=magnitude_a, samples_produced=produced))
+    return watch, watch.judge(block)
+
+
+def a_block(first_index=100, peak_a=4.0, w=True):
+    currents = np.zeros((3, 10))
+    currents[:, 3] = [peak_a, -0.5 * peak_a, -0.5 * peak_a]
+    return SampleBlock(
+        session=1, first_index=first_index, sample_period_s=PERIOD_S, axis_deg=0.0, voltage_axis_v=np.zeros(10),
+        current_u_a=currents[0], current_v_a=currents[1], current_w_a=currents[2] if w else None, dc_link_v=540.0,
+        lost_before=0, clipped=False,
+    )  # fmt: skip
+
+
+def test_the_same_sample_is_compared():
+    assert claimed(a_block(), 4.0, 104)[1] is None
+    reason = claimed(a_block(), 8.0, 104)[1]
+    assert reason.is_fault and "own current magnitude differ" in reason.what
+    assert (reason.value, reason.limit) == (4.0, "8 A")
+    assert claimed(a_block(), 2.0, 104)[1] is not None
+
+
+@pytest.mark.parametrize("w", [True, False])
+def test_the_third_phase_follows_from_the_sum(w):
+    block = a_block(w=w)
+    block = replace(block, current_u_a=-0.5 * block.current_u_a, current_v_a=block.current_v_a)
+    three = np.max(np.abs([block.current_u_a[3], block.current_v_a[3], -(block.current_u_a[3] + block.current_v_a[3])]))
+    assert w or claimed(block, float(three), 104)[1] is None
+
+
+@pytest.mark.parametrize(("off", "passes"), [(-1e-6, True), (1e-6, False)])
+def test_the_allowed_difference_is_a_tenth_of_the_larger_and_a_floor(off, passes):
+    larger = (4.0 + SCALE_FLOOR * LIMIT_A) / (1.0 - SCALE) + off
+    assert (claimed(a_block(), larger, 104)[1] is None) is passes
+    smaller = 4.0 * (1.0 - SCALE) - SCALE_FLOOR * LIMIT_A - off
+    assert (claimed(a_block(), smaller, 104)[1] is None) is passes
+
+
+def test_a_claim_waits_for_its_sample_and_one_that_is_gone_is_dropped():
+    watch, reason = claimed(a_block(), 8.0, 114)
+    assert reason is None
+    assert watch.judge(a_block(first_index=110)) is not None
+    watch, reason = claimed(a_block(), 8.0, 100)
+    assert reason is None
+    assert watch.judge(a_block(first_index=90)) is None
+    assert claimed(a_block(), 8.0, 101)[1] is not None  # sample 100, the block's first: 0 A there
+    assert claimed(a_block(), 8.0, 110)[1] is not None  # its last
+    assert claimed(a_block(), 8.0, 111)[1] is None
+
+
+@pytest.mark.parametrize(
+    ("magnitude", "produced", "energised"), [(math.nan, 104, True), (8.0, 0, True), (8.0, 104, False)]
+)
+def test_a_drive_that_says_nothing_is_not_compared(magnitude, produced, energised):
+    assert (
+        claimed(a_block(first_index=0 if produced == 0 else 100), magnitude, produced, energised=energised)[1] is None
+    )
+
+
+def test_one_sample_is_a_claim():
+    assert claimed(a_block(first_index=0), 8.0, 1)[1] is not None
