@@ -27,6 +27,8 @@ KEYS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h",
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
+MOST_LEFT_OF_SPEED = 0.002
+"""Of synchronous speed, rms: what a constant and a fan load may leave of a run-up; more is another load, and the inertia is not given."""
 LEAST_OVER_NOISE = 0.3
 """Of the noise, left by the four numbers, from which a remark sends the reader to `diagnose`."""
 
@@ -168,6 +170,8 @@ def _inertia(problem: Problem, machine: Machine) -> tuple[Array, float] | None:
             return None
         solved, *_ = np.linalg.lstsq(design, target, rcond=None)
         rest = target - design @ solved
+        if float(np.sqrt(np.mean(rest**2))) > MOST_LEFT_OF_SPEED * record.scales.frequency_rad_per_s / pairs:
+            return None  # the load changed in the run-up
         inverse = np.linalg.pinv(design.T @ design) * float(rest @ rest) / (target.size - 6)
         j = 1.0 / solved[0]
         return np.array([j, solved[1] * j, solved[2] * j]), float(j * j * np.sqrt(inverse[0, 0]))

@@ -75,9 +75,11 @@ def test_a_start_is_identified_as_well_as_its_noise_allows():
         found = identify([recording], plate)
         for (key, bound), true in zip(list(found.bound.items())[:4], truth["inverse_gamma"].values(), strict=True):
             ratios.append((found.parameters[key].value - true) / bound)
-        inertia.append(found.inertia.value / truth["inertia_kg_m2"] - 1.0)
+        if found.inertia is not None:  # a load step within the run-up: not given
+            inertia.append(found.inertia.value / truth["inertia_kg_m2"] - 1.0)
         assert found.chi2 < 1.06
     assert np.sqrt(np.mean(np.square(ratios))) < 1.3
+    assert len(inertia) >= 5
     assert np.max(np.abs(inertia)) < 0.01
 
 
