@@ -257,7 +257,7 @@ def identify(
     """The same estimators on a recording, offline; with --write-back its result into a drive without a test mode."""
     from commissioner.cli.verbs.identify import identify as verb
     from commissioner.cli.verbs.identify import identify_and_write
-    from commissioner.operations.identify import IdentifyRequest
+    from commissioner.operations.recordings.identify import IdentifyRequest
 
     request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust)
     if write_back:
@@ -288,7 +288,7 @@ def monitor(
 ) -> None:
     """Speed and load torque of a running motor within a revolution, from its terminals; load faults."""
     from commissioner.cli.verbs.monitor import monitor as verb
-    from commissioner.operations.monitor import MonitorRequest
+    from commissioner.operations.recordings.monitor import MonitorRequest
 
     request = MonitorRequest(file, motor, start, tuple(load_hz or ()), inertia, baseline, learn, out, mapping, trust)
     verb(request, as_json=json)
@@ -316,7 +316,7 @@ def diagnose(
 ) -> None:
     """What the simulation gets wrong about a recording, by name, with the measured gain."""
     from commissioner.cli.verbs.diagnose import diagnose as verb
-    from commissioner.operations.diagnose import DiagnoseRequest
+    from commissioner.operations.recordings.diagnose import DiagnoseRequest
 
     verb(DiagnoseRequest(tuple(files), motor, out, mapping=mapping, trust=trust), as_json=json, why=why)
 
@@ -336,7 +336,7 @@ def simulate(
     """Play a drive or motor configuration, plain or extended by diagnose, into a recording."""
     from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.simulate import simulate as verb
-    from commissioner.operations.simulate import SimulateRequest
+    from commissioner.operations.recordings.simulate import SimulateRequest
 
     angles = parse_axes(axes) or ()
     verb(SimulateRequest(model, out, like, seconds, angles, noise_a, seed, plain), as_json=json)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from commissioner.link.drive.facts import WriteReport
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.identify import Identified
+from commissioner.operations.recordings.identify import Identified
 from commissioner.run.archive.catalogue import RunSummary, find_run
 from commissioner.run.archive.late_report import mark_restored
 from commissioner.run.commission import Commissioned

@@ -191,7 +191,7 @@ def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
             for name in sizes:
                 gradient[name][j] += sign * moved.get(name, sizes[name])[0] / (2.0 * h) * slope[AT[number]]
     return {
-        name: (float(value), float(np.sqrt(max(gradient[name] @ covariance @ gradient[name], 0.0))), unit)
+        name: (float(value), float(np.sqrt(max(float(gradient[name] @ covariance @ gradient[name]), 0.0))), unit)
         for name, (value, unit) in sizes.items()
     }
 

@@ -56,7 +56,7 @@ def _on_mains(
 ) -> tuple[Machine, Problem]:
     """A start and two load steps on symmetric mains of the plate, with the shaft of the scenario."""
     count = round(SECONDS / period)
-    t = np.arange(count) * period
+    t = np.arange(count, dtype=np.float64) * np.float64(period)
     u = scales.voltage_v * np.exp(1j * scales.frequency_rad_per_s * t)
     voltage = np.stack([between(u.real), between(u.imag)], axis=1)
     window = Window(t, np.zeros((count, 3)), voltage, np.zeros((2 * count - 1, 2)), np.zeros(count, np.int64), True)

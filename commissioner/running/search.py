@@ -128,7 +128,8 @@ def search(
     """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted."""
     problem, base = nominal(problem)
     seeking = Search(problem, base, frozenset(excluded), rules, observe, go_on)
-    fit, accepted, is_complete = base, (), True
+    fit, is_complete = base, True
+    accepted: tuple[Named, ...] = ()
     for round_ in range(rules.most_causes):
         if not go_on():
             is_complete = False
@@ -292,7 +293,8 @@ def _judged(
     seeking: Search, fit: Fit, accepted: Sequence[Named]
 ) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Of each cause: chi-square that comes back without it, and what each rival in its place loses."""
-    gain, rivals = {}, {}
+    gain: dict[str, float] = {}
+    rivals: dict[str, dict[str, float]] = {}
     for k, one in enumerate(accepted):
         others = tuple(c for c in accepted if c != one)
         gain[one.cause] = max(seeking.fitted(_without(fit.machine, one), others).chi2 - fit.chi2, 0.0)

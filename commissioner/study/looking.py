@@ -23,7 +23,7 @@ def looked_at(case: Case) -> dict[str, Any]:
 
 
 def _identified(path: Path) -> dict[str, Any]:
-    from commissioner.operations.identify import IdentifyRequest, identify
+    from commissioner.operations.recordings.identify import IdentifyRequest, identify
 
     document: Any = identify(IdentifyRequest((path,))).document
     told = {"outcome": document["outcome"], "reason": document["reason"]}
@@ -34,7 +34,7 @@ def _identified(path: Path) -> dict[str, Any]:
 
 
 def _diagnosed(path: Path) -> dict[str, Any]:
-    from commissioner.operations.diagnose import DiagnoseRequest, diagnose
+    from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 
     document: Any = diagnose(DiagnoseRequest((path,))).document
     causes = " ".join(cause["name"] for cause in document["causes"])
@@ -47,7 +47,7 @@ def _diagnosed(path: Path) -> dict[str, Any]:
 
 
 def _monitored(path: Path) -> dict[str, Any]:
-    from commissioner.operations.monitor import MonitorRequest, monitor
+    from commissioner.operations.recordings.monitor import MonitorRequest, monitor
 
     document: Any = monitor(MonitorRequest(path)).document
     return {

@@ -8,8 +8,8 @@ from commissioner.cli.screens.running import show as show_running
 from commissioner.cli.screens.screen import emit
 from commissioner.cli.screens.search import show as show_search
 from commissioner.errors import DataRefused
-from commissioner.operations.diagnose import DiagnoseRequest
-from commissioner.operations.diagnose import diagnose as carry_out
+from commissioner.operations.recordings.diagnose import DiagnoseRequest
+from commissioner.operations.recordings.diagnose import diagnose as carry_out
 
 
 def diagnose(request: DiagnoseRequest, *, as_json: bool, why: bool = False) -> None:

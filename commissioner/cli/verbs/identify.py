@@ -7,9 +7,9 @@ from pathlib import Path
 from commissioner.cli.screens import screen
 from commissioner.cli.screens.identification import show, show_running
 from commissioner.errors import UsageError
-from commissioner.operations.identify import IdentifiedRunning, IdentifyRequest
-from commissioner.operations.identify import identify as carry_out
-from commissioner.operations.identify import identify_any as of_any_kind
+from commissioner.operations.recordings.identify import IdentifiedRunning, IdentifyRequest
+from commissioner.operations.recordings.identify import identify as carry_out
+from commissioner.operations.recordings.identify import identify_any as of_any_kind
 
 
 def identify(request: IdentifyRequest, *, as_json: bool) -> None:

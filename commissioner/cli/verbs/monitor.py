@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from commissioner.cli.screens.monitoring import show, show_refused
 from commissioner.cli.screens.screen import busy, emit
-from commissioner.operations.monitor import MonitorRequest, NotMonitored
-from commissioner.operations.monitor import monitor as carry_out
+from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored
+from commissioner.operations.recordings.monitor import monitor as carry_out
 
 
 def monitor(request: MonitorRequest, *, as_json: bool) -> None:

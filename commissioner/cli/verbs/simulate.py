@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from commissioner.cli.screens.screen import busy, emit, err
-from commissioner.operations.simulate import SimulateRequest
-from commissioner.operations.simulate import simulate as carry_out
+from commissioner.operations.recordings.simulate import SimulateRequest
+from commissioner.operations.recordings.simulate import simulate as carry_out
 
 
 def simulate(request: SimulateRequest, *, as_json: bool) -> None:

@@ -69,7 +69,7 @@ def compare_runs(runs: Path, before: str, after: str) -> Compared:
 
 def compare_with_recordings(runs: Path, run: str, files: tuple[Path, ...], motor: str | None = None) -> Compared:
     """A run beside what `identify` makes of recordings of the same motor, which come after it."""
-    from commissioner.operations.identify import IdentifyRequest, identify
+    from commissioner.operations.recordings.identify import IdentifyRequest, identify
 
     first = find_run(runs, run)
     before = result_of(first)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commissioner.operations.diagnose import DiagnoseRequest, diagnose
-from commissioner.operations.identify import IdentifiedRunning, IdentifyRequest, identify_any
-from commissioner.operations.simulate import SimulateRequest, simulate
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.identify import IdentifiedRunning, IdentifyRequest, identify_any
+from commissioner.operations.recordings.simulate import SimulateRequest, simulate
 from commissioner.recordings.table import read_table
 from sim.__main__ import main as simulator
 from sim.motoring.recording import build, record

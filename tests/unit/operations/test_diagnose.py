@@ -1,7 +1,7 @@
 """A diagnosis as an operation: what it hears of the search."""
 
 from commissioner.diagnose.search.journal import Accepted, Dropped
-from commissioner.operations.diagnose import withdrawn
+from commissioner.operations.recordings.diagnose import withdrawn
 
 
 def test_what_was_named_and_taken_back_is_remembered():

@@ -7,7 +7,7 @@ import pytest
 
 from commissioner.diagnose.points.bars import slow_rotor
 from commissioner.diagnose.points.table import read_points
-from commissioner.operations.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from tests.campaigns.intake.bars import draw
 
 DATA = Path(__file__).parents[3] / "data" / "intake"

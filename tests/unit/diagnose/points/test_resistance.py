@@ -8,7 +8,7 @@ import pytest
 from commissioner.diagnose.points.diagnosis import diagnose_points
 from commissioner.diagnose.points.table import Points, read_points
 from commissioner.errors import DataRefused
-from commissioner.operations.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from tests.support.standstill import usable_motors
 
 DATA = Path(__file__).parents[3] / "data" / "intake"

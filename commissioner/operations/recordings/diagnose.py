@@ -21,9 +21,9 @@ from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
-from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
-from commissioner.operations.running import diagnosed, is_running
-from commissioner.operations.trust import Trust, refused, trust_from, trusted_data
+from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
+from commissioner.operations.recordings.running import diagnosed, is_running
+from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table

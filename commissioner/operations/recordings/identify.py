@@ -18,7 +18,14 @@ from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import contradiction, mismatch, plate_match, rated_point
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.trust import Trust, refused, trust_from, trusted_data, trusted_plate, with_currents_over
+from commissioner.operations.recordings.trust import (
+    Trust,
+    refused,
+    trust_from,
+    trusted_data,
+    trusted_plate,
+    with_currents_over,
+)
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import to_standstill
@@ -61,7 +68,7 @@ class IdentifiedRunning:
 
 def identify_any(request: IdentifyRequest, observe: Observe = nobody) -> Identified | IdentifiedRunning:
     """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine."""
-    from commissioner.operations.running import identified, is_running
+    from commissioner.operations.recordings.running import identified, is_running
 
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(path, said) for path in request.files]

@@ -20,7 +20,7 @@ from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.running import is_running_model, played
+from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
 from commissioner.settings import load_motor
 

@@ -13,8 +13,8 @@ from commissioner.monitor.trend.indicators import pulses, trendable
 from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.stretches import in_its_states
-from commissioner.operations.trust import trust_from
+from commissioner.operations.recordings.stretches import in_its_states
+from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of, start_from
