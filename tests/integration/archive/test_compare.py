@@ -9,8 +9,8 @@ import pytest
 
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
 from commissioner.identify.estimate.axes import Identity
-from commissioner.operations import identify
 from commissioner.operations.history.compare import compare_runs, compare_with_drive, compare_with_recordings
+from commissioner.operations.recordings import identify
 from commissioner.run import write_accepted
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 from tests.unit.cli.test_failures import leave
