@@ -172,10 +172,17 @@ def _record_standstill(scenario: Scenario, options: argparse.Namespace) -> int:
 
 
 def _record_running(document: dict[str, object], options: argparse.Namespace) -> int:
-    from sim.recordings.running import record
     from sim.recordings.standstill import write_table
 
-    columns, metadata, truth = record(document, options.seed)
+    if "course" in document:
+        from sim.motoring.recording import build as motoring
+        from sim.motoring.recording import record as played
+
+        columns, metadata, truth = played(motoring(document, options.scenario), options.seed)
+    else:
+        from sim.recordings.running import record
+
+        columns, metadata, truth = record(document, options.seed)
     if options.recording:
         write_table(options.recording, columns, metadata)
     if options.truth:

@@ -180,6 +180,26 @@ def run(
 
 
 @app.command()
+def study(
+    file: Annotated[
+        Path, typer.Argument(help="Study file (.toml): kind, runs, motors, spread, effects, links, faults, seed.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for rows, table and page.")] = Path("study"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes of this computer; its cores if not given.")
+    ] = None,
+    scheduler: Annotated[str | None, typer.Option(help="A Dask scheduler instead, as tcp://HOST:8786.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Do only the cases that are missing in --out.")] = False,
+    json: Json = False,
+) -> None:
+    """A campaign of simulated commissionings, or of recordings: a table, a summary and a page."""
+    from commissioner.cli.verbs.study import study as verb
+    from commissioner.study.campaign import StudyRequest
+
+    verb(StudyRequest(file, out, workers, scheduler, resume), as_json=json)
+
+
+@app.command()
 def tune(
     drive: Drive,
     profile: Profile,
@@ -215,7 +235,10 @@ def tune(
 @app.command()
 def identify(
     files: Annotated[
-        list[Path], typer.Argument(help="Standstill recordings: CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE.")
+        list[Path],
+        typer.Argument(
+            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE."
+        ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
     estimator: Annotated[str, typer.Option(help="pao | lyapunov | nls")] = "pao",
@@ -276,7 +299,7 @@ def diagnose(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Standstill recordings of one motor, or tables of locked-rotor or no-load points: columns frequency_hz, "
+            help="Recordings of one motor, at standstill or running (a start tells most), or tables of locked-rotor or no-load points: columns frequency_hz, "
             "voltage_line_v, current_line_a, power_w, and winding_resistance_uv_ohm where it is known."
         ),
     ],

@@ -1,4 +1,4 @@
-"""What the simulation gets wrong about recordings of one motor at standstill, or about tables of test points, by name."""
+"""What the simulation gets wrong about recordings of one motor, at standstill or running, or about tables of test points, by name."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.intake import plate_metadata, require_one_motor, standstill, without_copies
+from commissioner.operations.running import diagnosed, is_running
 from commissioner.operations.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
 PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
@@ -48,11 +50,13 @@ class DiagnoseRequest:
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """`document` is the contract's JSON; of several tables of points, each one's own lies under `tables`. `seen`: None of points."""
+    """`document` is the contract's JSON; of several tables of points, each one's own lies under `tables`. `seen`: of recordings at
+    standstill, `running`: of a running motor."""
 
     document: DiagnosisDocument
     out: Path | None
     seen: Diagnosis | None = None
+    running: RunningDiagnosis | None = None
 
     @property
     def is_refused(self) -> bool:
@@ -68,9 +72,9 @@ def withdrawn(steps: Iterable[Step], left: Collection[str]) -> list[str]:
 
 
 def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = always) -> Diagnosed:
-    """Recordings together; where all files are tables of test points, each on its own.
+    """Recordings together, of one motor at standstill or running; where all files are tables of test points, each on its own.
 
-    Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor at standstill.
+    Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
     `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
     """
     said = read_mapping(request.mapping) if request.mapping else None
@@ -79,6 +83,9 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
         folder_to_write(request.out)
     if all(is_points_table(list(t.columns)) for t in tables):
         return _points(tables, request.motor, request.out)
+    if any(is_running(t) for t in tables):
+        document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
+        return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
     return _recordings(tables, request, observe, go_on)
 
 

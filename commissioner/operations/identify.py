@@ -1,11 +1,11 @@
-"""A motor identified from standstill recordings, with the estimators that a live run uses."""
+"""A motor identified from recordings: at standstill with the estimators that a live run uses, or running."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -49,6 +49,26 @@ class Identified:
     found: Identification
     nameplate: Nameplate
     files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class IdentifiedRunning:
+    """Of a running motor; nothing is written into a drive from it."""
+
+    document: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+
+def identify_any(request: IdentifyRequest, observe: Observe = nobody) -> Identified | IdentifiedRunning:
+    """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine."""
+    from commissioner.operations.running import identified, is_running
+
+    said = read_mapping(request.mapping) if request.mapping else None
+    tables = [contract_table(path, said) for path in request.files]
+    if not any(is_running(t) for t in tables):
+        return identify(request, observe)
+    observe(Began("identifying"))
+    return IdentifiedRunning(identified(tables, request.motor), request.files)
 
 
 def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:

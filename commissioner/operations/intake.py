@@ -13,17 +13,15 @@ from commissioner.recordings.table import Table, to_standstill
 from commissioner.records import StandstillRecording
 from commissioner.settings import load_motor
 
-RUNNING_COLUMNS = ("voltage_u_v", "voltage_uv_v", "speed_rad_per_s")
 STANDSTILL_COLUMNS = frozenset(
     ["time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v"]
 )
 
 
 def standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[StandstillRecording], list[str]]:
-    """The tables as recordings; a running motor is refused, unknown columns are named and left out."""
+    """The tables as recordings; unknown columns are named and left out."""
     remarks, recordings = [], []
     for table in tables:
-        _refuse_running(table)
         unknown = sorted(set(table.columns) - STANDSTILL_COLUMNS)
         if unknown:
             remarks.append(f"{Path(table.source).name}: unknown columns left out: {', '.join(unknown)}.")
@@ -31,18 +29,6 @@ def standstill(tables: Sequence[Table], motor: str | None) -> tuple[list[Standst
         remarks += [f"{Path(table.source).name}: {note.what}." for note in recording.notes]
         recordings.append(replace(recording, metadata={**recording.metadata, **plate_metadata(motor)}))
     return recordings, remarks
-
-
-def _refuse_running(table: Table) -> None:
-    running = [c for c in RUNNING_COLUMNS if c in table.columns]
-    if running and "voltage_axis_v" not in table.columns:
-        raise DataRefused(
-            f"{table.source}: this is a recording of a running motor (column {running[0]})",
-            step="diagnose",
-            value=", ".join(table.columns),
-            limit="a standstill recording or a table of test points",
-            remedy="use `commissioner monitor` for a running motor",
-        )
 
 
 def plate_metadata(motor: str | None) -> dict[str, float | str]:

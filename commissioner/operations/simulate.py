@@ -20,6 +20,7 @@ from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.running import is_running_model, played
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
 from commissioner.settings import load_motor
 
@@ -68,6 +69,13 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     """Writes the recording. ConfigurationError where the model cannot be played or runs away."""
     check_ending(request.out)
     _check_size(request.seconds, request.noise_a)
+    running = _running_model(request.model)
+    if running is not None:
+        observe(Began("playing"))
+        samples, names = played(
+            running, request.model, request.out, request.like, request.noise_a, request.seed, is_plain=request.plain
+        )
+        return Simulated(str(request.out), samples, 1, names)
     motor = _motor(request.model, request.plain)
     facts = _facts(motor.plate)
     if request.like is None:
@@ -86,6 +94,18 @@ def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     write_table(request.out, columns, {**keys, "sample_period_s": facts.sample_period_s, "kind": "standstill"})
     effects = tuple(sorted({t.effect for t in motor.model.terms if t.effect}))
     return Simulated(str(request.out), int(columns["time_s"].shape[0]), len(segments), effects)
+
+
+def _running_model(name: str) -> Mapping[str, Any] | None:
+    """The document of a running diagnosis' model; None for everything else."""
+    path = Path(name)
+    if path.suffix != ".json" or not path.is_file() or path.stat().st_size > MAX_BYTES:
+        return None
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError):
+        return None
+    return document if isinstance(document, dict) and is_running_model(document) else None
 
 
 def _played(name: str, play: Callable[[], dict[str, Any]]) -> dict[str, Any]:

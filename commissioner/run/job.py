@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from commissioner.errors import RequestRefused
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
+from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import DriveLimits, StreamPace
@@ -43,7 +44,13 @@ def open_drive(url: str, profile: DriveProfile, plan: ProcedurePlan) -> Iterator
 
 
 def make_job(
-    profile: DriveProfile, nameplate: Nameplate, plan: ProcedurePlan, port: ModbusPort, *, write_back: bool
+    profile: DriveProfile,
+    nameplate: Nameplate,
+    plan: ProcedurePlan,
+    port: Port,
+    *,
+    write_back: bool,
+    now_s: Callable[[], float] = time.monotonic,
 ) -> Job:
     """The job with the link's measured latency: what the guard predicts across."""
     inverter = Inverter(port, profile)
@@ -58,23 +65,23 @@ def make_job(
         parameter_factors=factors,
         write_back=write_back,
         link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
-        pace=_pace(profile, port),
+        pace=_pace(profile, port, now_s),
     )
 
 
-def _pace(profile: DriveProfile, port: ModbusPort) -> StreamPace | None:
+def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> StreamPace | None:
     """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now."""
     layout = profile.window
     if layout is None:
         return None
     times_s = []
     for _ in range(PACE_PROBES):
-        began_s = time.monotonic()
+        began_s = now_s()
         try:
             port.read(layout.address, layout.words)
         except RequestRefused:
             return None
-        times_s.append(time.monotonic() - began_s)
+        times_s.append(now_s() - began_s)
     return StreamPace(min(times_s), layout.data_registers // len(CHANNELS), layout.words)
 
 

@@ -7,7 +7,6 @@ journals, on the disk, what energises or writes before it goes out.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Generator
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -171,7 +170,7 @@ class Runner:
             case ask.Tell(record=record):
                 self._tell(record)
             case ask.Wait(seconds=seconds):
-                time.sleep(seconds)
+                self._inverter.sleep(seconds)
             case ask.Enable():
                 self._enable()
             case ask.Disarm(reason=reason):
@@ -208,7 +207,7 @@ class Runner:
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
         limits = progress.facts.drive_limits
-        began_s = time.monotonic()
+        began_s = self._inverter.now_s()
         cursor = self._inverter.enable()
         self._inverter.port.stats.longest_gap_s = 0.0
         sensors = SensorWatch(limits.current_a if limits else math.inf)

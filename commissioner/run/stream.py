@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -55,14 +54,14 @@ class Stream:
                 break
             block = _joined(block, more)
         age_s = self._age_s(block)
-        if age_s > LATE_S and time.monotonic() - self._asked_s > LATE_S:
+        if age_s > LATE_S and self._inverter.now_s() - self._asked_s > LATE_S:
             self.ask_status()
             age_s = self._age_s(block)
         return replace(block, age_s=age_s)
 
     def ask_status(self) -> None:
         """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
-        self._asked_s = time.monotonic()
+        self._asked_s = self._inverter.now_s()
         status = self._inverter.read_status()
         stop_if(judge_status(status, self._watch))
         if self._clock is not None and status.samples_produced > 0:
@@ -70,9 +69,9 @@ class Stream:
         self.sensors.claim(status)
 
     def _await_block(self, longest_s: float) -> SampleBlock | None:
-        deadline = time.monotonic() + longest_s
+        deadline = self._inverter.now_s() + longest_s
         while True:
-            asked_s = time.monotonic()
+            asked_s = self._inverter.now_s()
             if asked_s > deadline:
                 raise DriveFault(
                     "the drive sends no samples", step="stream", value=f"nothing for {longest_s:g} s",
@@ -85,11 +84,11 @@ class Stream:
             if self._has_ended:
                 stop_if(judge_status(self._inverter.read_status(), self._watch))
                 return None
-            time.sleep(EMPTY_FETCH_PAUSE_S)
+            self._inverter.sleep(EMPTY_FETCH_PAUSE_S)
 
     def _fetch(self) -> SampleBlock | None:
         """One window. A window that is not full ends with the newest sample, which pins the drive's clock."""
-        asked_s = time.monotonic()
+        asked_s = self._inverter.now_s()
         window = self._inverter.fetch(self._cursor)
         self._cursor, self._has_ended = window.cursor, window.has_ended
         block = window.block
@@ -103,7 +102,7 @@ class Stream:
 
     def _age_s(self, block: SampleBlock) -> float:
         assert self._clock is not None
-        return self._clock.age_s(block.first_index + block.count, time.monotonic())
+        return self._clock.age_s(block.first_index + block.count, self._inverter.now_s())
 
 
 def stop_if(reason: StopReason | None) -> None:

@@ -55,7 +55,8 @@ def ready_url(kind: str, address: str, options: Options) -> str:
 class Drive:
     """The firmware with its pace and its faults; answers register requests."""
 
-    def __init__(self, scenario: Scenario, options: Options) -> None:
+    def __init__(self, scenario: Scenario, options: Options, *, keeps_motor_time: bool = False) -> None:
+        """`keeps_motor_time`: the watchdog lives in motor time at `max` too, for a client without a wall clock."""
         self.plan = Plan([parse(text) for text in (*scenario.faults, *options.faults)])
         self.speed = options.speed
         self.map: DriveMap = load_map(shift=scenario.map_shift or self.plan.map_shift)
@@ -72,7 +73,7 @@ class Drive:
             Memory(options.nvm, factory),
             options.seed,
             StateLog(options.state_log),
-            time.monotonic if options.speed == 0.0 else None,
+            time.monotonic if options.speed == 0.0 and not keeps_motor_time else None,
         )
         self.firmware.before_command = lambda command: self.plan.before_command(command, self.firmware)
         self.plan.arm(self.firmware)
@@ -109,21 +110,28 @@ class Drive:
     ) -> ExcCodes | None:
         """pymodbus's hook for every access: writes go to the firmware, reads are refreshed from it."""
         if values is not None:
-            if function != 23:
-                self.pass_time()
-            return _exception(self.firmware.registers.write(address, list(values)))
+            return _exception(self.write(address, list(values), takes_time=function != 23))
         if function == 6:  # its own echo
             return None
-        is_window = address == self.map.window_address
-        if is_window:
-            self.fill_window(count)
-        else:
-            self.pass_time()
-        words = self.firmware.registers.read(address, count)
+        words = self.read(address, count)
         if isinstance(words, Answer):
             return _exception(words)
         registers[address - start : address - start + count] = words
         return None
+
+    def read(self, address: int, count: int) -> list[int] | Answer:
+        """Registers as they are once the request's time has passed."""
+        if address == self.map.window_address:
+            self.fill_window(count)
+        else:
+            self.pass_time()
+        return self.firmware.registers.read(address, count)
+
+    def write(self, address: int, values: list[int], *, takes_time: bool = True) -> Answer:
+        """Registers written; in a write and read of one transaction the read alone takes time."""
+        if takes_time:
+            self.pass_time()
+        return self.firmware.registers.write(address, values)
 
 
 def _exception(answer: Answer) -> ExcCodes | None:

@@ -45,3 +45,34 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
         console.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")
     for remark in document["remarks"]:
         console.print(f"- {remark}")
+
+
+def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
+    """Of a running motor: the same table with what the noise alone allows, inertia and load of a start, remarks."""
+    from commissioner.cli.screens.screen import out, table
+
+    rows = []
+    for label, key, unit, factor in ROWS:
+        quantity = document["parameters"][key]
+        value, std = factor * quantity["value"], factor * quantity["std"]
+        bound = factor * document["bound_std"][key]
+        rows.append((label, f"{value:.5g}", f"{std:.2g} ({std / value:.2%})", f"{bound:.2g}", unit))
+    if document["inertia_kg_m2"]:
+        value, std = document["inertia_kg_m2"]["value"], document["inertia_kg_m2"]["std"]
+        rows.append(("inertia J", f"{value:.4g}", f"{std:.2g} ({std / value:.2%})", "", "kg m2"))
+    out.print(
+        table(
+            "Identified from " + ", ".join(sources),
+            ("per phase, star equivalent", "value", "std error", "least by noise", "unit"),
+            rows,
+        )
+    )
+    flux = document["holds_for_stator_flux_wb"]
+    out.print(
+        f"L_M holds for {flux:.3g} Wb peak stator flux. Residual {document['residual_over_noise']:.3g} x the noise; "
+        f"speed {document['speed']}; {document['duration_s']:.1f} s used."
+    )
+    for name, value in document["load"].items():
+        out.print(f"load of the start: {name.replace('_', ' ').removesuffix(' nm')} {value:.3g} N m")
+    for remark in document["remarks"]:
+        out.print(f"- {remark}")

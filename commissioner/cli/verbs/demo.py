@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-import queue
-import subprocess
-import sys
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from commissioner.cli.angles import parse_axes
 from commissioner.cli.verbs.run import run
-from commissioner.errors import LinkUnreachable
 from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
-
-START_S = 120.0
-"""The simulator compiles its kernels at the first start; later starts take about a second."""
+from commissioner.study.own_process import simulated_inverter
 
 
 def demo(
@@ -41,55 +31,3 @@ def demo(
             url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0
         )
         run(request, yes=True, as_json=as_json)
-
-
-@contextmanager
-def simulated_inverter(scenario: str, speed: str, seed: int) -> Iterator[str]:
-    """The drive URL of a running `python -m sim`; the process ends with the context."""
-    command = [sys.executable, "-m", "sim", "--scenario", scenario, "--tcp", "0", "--speed", speed, "--seed", str(seed)]
-    # its own process group: Ctrl-C in the terminal must reach the service, not cut the drive off under it
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
-        start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
-    )  # fmt: skip
-    try:
-        yield f"tcp://127.0.0.1:{_port(process)}?device=1"
-    finally:
-        process.terminate()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _port(process: subprocess.Popen[str]) -> int:
-    """The port the simulator prints as `listening tcp 127.0.0.1:PORT`."""
-    lines: queue.Queue[str] = queue.Queue()
-    assert process.stdout is not None
-    assert process.stderr is not None
-    stdout = process.stdout
-
-    def collect() -> None:
-        for line in stdout:
-            lines.put(line)
-
-    threading.Thread(target=collect, daemon=True).start()
-    deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline:
-        try:
-            line = lines.get(timeout=0.1)
-        except queue.Empty:
-            if process.poll() is not None:
-                break
-            continue
-        if line.startswith("listening tcp "):
-            return int(line.rsplit(":", 1)[1])
-    said = "" if process.poll() is None else process.stderr.read().strip()
-    raise LinkUnreachable(
-        "the simulated inverter did not start",
-        step="start simulator",
-        value=said.splitlines()[-1] if said else "no answer",
-        limit=f"listening within {START_S:g} s",
-        remedy="run `python -m sim --tcp 0` by hand to see what it says",
-    )

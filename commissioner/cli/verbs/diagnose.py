@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from commissioner.cli.screens.diagnosis import show
 from commissioner.cli.screens.diagnosis_progress import Progress
+from commissioner.cli.screens.running import show as show_running
 from commissioner.cli.screens.screen import emit
 from commissioner.cli.screens.search import show as show_search
 from commissioner.errors import DataRefused
@@ -16,6 +17,8 @@ def diagnose(request: DiagnoseRequest, *, as_json: bool, why: bool = False) -> N
     done = carry_out(request, Progress(is_quiet=as_json))
     if as_json:
         emit(done.document)
+    elif done.running is not None:
+        show_running(done.document, done.out)
     else:
         show(done.document, done.out)
         if why:

@@ -1,22 +1,25 @@
-"""`commissioner identify FILE...`: the motor's parameters from standstill recordings."""
+"""`commissioner identify FILE...`: the motor's parameters from recordings at standstill or of a running motor."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.identification import show
+from commissioner.cli.screens.identification import show, show_running
 from commissioner.errors import UsageError
-from commissioner.operations.identify import IdentifyRequest
+from commissioner.operations.identify import IdentifiedRunning, IdentifyRequest
 from commissioner.operations.identify import identify as carry_out
+from commissioner.operations.identify import identify_any as of_any_kind
 
 
 def identify(request: IdentifyRequest, *, as_json: bool) -> None:
-    """Identify a motor from standstill recordings, with the estimators a live run uses."""
+    """Identify a motor from standstill recordings, with the estimators a live run uses, or from a start or loads of a running one."""
     with screen.busy("identifying"):
-        done = carry_out(request)
+        done = of_any_kind(request)
     if as_json:
         screen.emit(done.document)
+    elif isinstance(done, IdentifiedRunning):
+        show_running(done.document, [str(path) for path in done.files])
     else:
         show(done.document, [str(path) for path in done.files])
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as fisher
 
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.circuits import Extension, candidates_for, fit_points, held_out, scales
 from commissioner.diagnose.points.table import Array, Points
@@ -173,10 +174,11 @@ def _slow(slow: SlowRotor | None) -> dict[str, Quantity]:
 
 def _with_bars(causes: Sequence[PointCause], slow: SlowRotor) -> list[PointCause]:
     """With the displacement of current that the frequencies show, where the plain rise with f squared did not."""
-    if any(c.name == "rotor_skin_effect" for c in causes):
+    bars = next(n for n, c in CATALOGUE.items() if c.in_points and c.in_points.acts_on == "resistance")
+    if any(c.name == bars for c in causes):
         return list(causes)
     sizes = {"resistance_rise_over_range": (*slow.rise_over_range, "1")}
-    return [*causes, PointCause("rotor_skin_effect", sizes, slow.p_value, 0.0)]
+    return [*causes, PointCause(bars, sizes, slow.p_value, 0.0)]
 
 
 def _verdict(

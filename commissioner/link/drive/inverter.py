@@ -70,7 +70,8 @@ class Inverter:
         self.journal = journal
         self._items = Items(port, profile)
         self.claim = Claim(self._items)
-        self._sleep, self._clock = sleep, clock
+        self.sleep, self.now_s = sleep, clock
+        """Whoever waits for this drive, or asks how old its samples are, asks here: a drive in motor time has a clock of its own."""
         self._heartbeat = 0
         self._watchdog_ms = 0.0
         self._supervision: dict[str, Value] = {}
@@ -236,7 +237,7 @@ class Inverter:
     def disarm(self) -> DisarmReport:
         """De-energise by every path until the drive's status confirms it, else by its watchdog. Never raises a
         CommissionerError; idempotent; legal in every state."""
-        report = de_energise(self._items, self._watchdog_ms / 1000, self._sleep)
+        report = de_energise(self._items, self._watchdog_ms / 1000, self.sleep)
         if report.is_confirmed:
             self.port.read_retries = self._read_retries
         return report
@@ -277,7 +278,7 @@ class Inverter:
 
     def tuner(self, tuning: Tuning, operator: Operator) -> Tuner:
         """By which the drive tunes itself."""
-        return Tuner(self._items, tuning, operator, self.journal, sleep=self._sleep, clock=self._clock)
+        return Tuner(self._items, tuning, operator, self.journal, sleep=self.sleep, clock=self.now_s)
 
     def read_watchdog_ms(self) -> float:
         """What the drive's own supervision of the link is set to."""
@@ -292,7 +293,7 @@ class Inverter:
         return self._write_back().restore(snapshot, expected_present)
 
     def _write_back(self) -> WriteBack:
-        return WriteBack(self._items, self.journal, sleep=self._sleep, clock=self._clock)
+        return WriteBack(self._items, self.journal, sleep=self.sleep, clock=self.now_s)
 
     # --- steps --------------------------------------------------------------------------------------------------
     def _keep_claim(self) -> None:
@@ -337,7 +338,7 @@ class Inverter:
     def _go(self, command: int, wanted: DriveState) -> None:
         """Give the command and watch the status, feeding the watchdog, until the state is there."""
         self._items.write({"control_word": command})
-        end = self._clock() + STATE_DEADLINE_S
+        end = self.now_s() + STATE_DEADLINE_S
         while True:
             self.beat()
             status = self.read_status()
@@ -351,7 +352,7 @@ class Inverter:
                     limit=status.trip_limit,
                     remedy=f"remove the cause of: {status.fault_text}",
                 )
-            if self._clock() > end:
+            if self.now_s() > end:
                 raise DriveFault(
                     f"the drive does not reach '{wanted.value}'",
                     step="enable",
@@ -359,7 +360,7 @@ class Inverter:
                     limit=f"within {STATE_DEADLINE_S:g} s",
                     remedy="check enable inputs and remote control",
                 )
-            self._sleep(POLL_S)
+            self.sleep(POLL_S)
 
     def _fetch_once(self, cursor: StreamCursor) -> Window:
         self._heartbeat = (self._heartbeat + 1) & 0xFFFF

@@ -1,0 +1,376 @@
+"""The fit of one machine to windows: simulation, exact sensitivities, Levenberg-Marquardt, covariance, what was held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.kernels.march import STATES, march, tangents
+from commissioner.estimation.noise import Noise, plain_noise, through_machine
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
+from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
+from commissioner.estimation.record import STATES as RECORD_STATES
+
+Array = NDArray[np.float64]
+BUSY = RECORD_STATES.index("transient")
+FIRST = (0, 1, 2, 3)
+"""Numbers of a window's first state that are free: both fluxes. (8 is the speed, where the shaft is modelled and already turns.)"""
+LARGEST_STEP = 0.7
+"""Of a logarithm in one step: a factor of 2."""
+ENDED = 0.05
+"""Change of chi-square below which a fit has ended; a name needs 36."""
+SLOW = 0.3
+"""Of the last step's gain: a step that gains more asks for a new Jacobian."""
+EDGE = 2
+"""Samples at each end of a window that an interpolated delay has no neighbours for."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One free number: `kind` p (a number of the machine), x (first state of a window), k (knot of the load torque)."""
+
+    kind: str
+    index: int
+    window: int = 0
+
+    @property
+    def name(self) -> str:
+        """For covariance tables."""
+        return NAMES[self.index] if self.kind == "p" else f"{self.kind}{self.window}.{self.index}"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Numbers in fit coordinates (logarithms of the positive ones), first states (windows, states), knots of the load and their
+    times (windows, knots)."""
+
+    theta: Array
+    first: Array
+    knots: Array
+    knot_times_s: Array
+    has_shaft: bool = False
+
+    def places(self, window: int, count: int, period_s: float) -> Array:
+        """Where the samples and what lies between them fall among the window's knots."""
+        if not self.has_shaft:
+            return np.zeros(2 * count - 1)
+        times = self.knot_times_s[window]
+        return np.asarray(np.interp(0.5 * period_s * np.arange(2 * count - 1), times, np.arange(times.size)))
+
+    def physical(self) -> Array:
+        """As the kernel takes them."""
+        p = self.theta.copy()
+        for k in LOGARITHMIC:
+            p[k] = np.exp(p[k])
+        return p
+
+    def slope(self) -> Array:
+        """d physical / d theta."""
+        d = np.ones(COUNT)
+        for k in LOGARITHMIC:
+            d[k] = np.exp(self.theta[k])
+        return d
+
+    def value(self, name: str) -> float:
+        """A number by name, SI or relative."""
+        return float(self.physical()[AT[name]])
+
+    def moved(self, columns: Sequence[Column], step: Array) -> Machine:
+        """With the columns' numbers changed by `step`."""
+        theta, first, knots = self.theta.copy(), self.first.copy(), self.knots.copy()
+        for column, s in zip(columns, step, strict=True):
+            if column.kind == "p":
+                theta[column.index] += s
+            elif column.kind == "x":
+                first[column.window, column.index] += s
+            else:
+                knots[column.window, column.index] += s
+        return replace(self, theta=theta, first=first, knots=knots)
+
+    def with_values(self, values: dict[str, float]) -> Machine:
+        """With numbers set, in physical units."""
+        theta = self.theta.copy()
+        for name, value in values.items():
+            k = AT[name]
+            theta[k] = np.log(value) if k in LOGARITHMIC else value
+        return replace(self, theta=theta)
+
+
+def plain_machine(four: Sequence[float], record: Record, *, inertia: float = 0.0, has_shaft: bool = False) -> Machine:
+    """Four numbers, nothing added, motors at rest or with the flux of their voltage."""
+    theta = np.zeros(COUNT)
+    values = dict(DEFAULTS) | dict(zip(NAMES[:4], four, strict=True)) | ({"inertia": inertia} if inertia else {})
+    times = knot_times(record) if has_shaft else np.zeros((len(record.windows), 2))
+    first = np.zeros((len(record.windows), STATES))
+    for k, w in enumerate(record.windows):
+        if not w.is_from_rest:
+            first[k, 0:4] = [w.voltage[0, 1], -w.voltage[0, 0]] * 2 / np.array(record.scales.frequency_rad_per_s)
+            first[k, 8] = (1 - record.plate.rated_slip) * record.scales.frequency_rad_per_s
+    return Machine(theta, first, np.zeros(times.shape), times, has_shaft).with_values(values)
+
+
+CALM_S, BUSY_S, AROUND_S = 0.15, 5e-3, 0.03
+"""Between knots of an unknown load where nothing changes, and around a load step, which reaches so far."""
+
+
+def knot_times(record: Record) -> Array:
+    """(windows, knots), denser where the current changes after the start; short rows are filled up far beyond the end."""
+    rows = []
+    for w in record.windows:
+        end = float(w.time_s[-1])
+        times = set(np.arange(0.0, end + CALM_S, CALM_S))
+        changes = np.flatnonzero((w.state == BUSY) & (np.roll(w.state, 1) != BUSY))
+        for first in changes:
+            last = first + int(np.argmax(w.state[first:] != BUSY))
+            low, high = w.time_s[first] - AROUND_S, w.time_s[max(last, first)] + AROUND_S
+            times |= set(np.arange(max(low, 0.0), min(high, end), BUSY_S))
+        rows.append(np.array(sorted(times)))
+    widest = max(r.size for r in rows)
+    return np.array([np.concatenate([r, r[-1] + 1e3 * (1.0 + np.arange(widest - r.size))]) for r in rows])
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`until[k]`: samples of window k that are fitted; what follows is held out."""
+
+    record: Record
+    noise: Noise
+    until: tuple[int, ...]
+
+    @property
+    def period(self) -> float:
+        return self.record.period_s
+
+    def cut(self, seconds: float) -> Problem:
+        """Only so much of each window, for a fit that begins with little."""
+        shorter = tuple(min(u, max(round(seconds / self.period), 60)) for u in self.until)
+        windows = tuple(first_part(w, u) for w, u in zip(self.record.windows, shorter, strict=True))
+        return replace(self, record=replace(self.record, windows=windows), until=shorter)
+
+
+def problem_of(record: Record, held_out: float = 0.3) -> Problem:
+    """White noise, and the last share of each window held out."""
+    until = tuple(w.count if held_out == 0.0 else round((1.0 - held_out) * w.count) for w in record.windows)
+    return Problem(record, plain_noise(record.sigma_a, record.has_zero), until)
+
+
+def simulate(problem: Problem, machine: Machine) -> list[tuple[Array, Array]]:
+    """Current (n, 3) and shaft (n, 2: electrical speed, torque) of each window."""
+    out = []
+    p, scales = machine.physical(), problem.record.scales.as_tuple()
+    for k, w in enumerate(problem.record.windows):
+        run, shaft = np.empty((w.count, 3)), np.empty((w.count, 2))
+        x = machine.first[k].copy()
+        march(
+            p,
+            scales,
+            x,
+            w.voltage,
+            w.speed,
+            machine.knots[k],
+            machine.places(k, w.count, problem.period),
+            problem.period,
+            machine.has_shaft,
+            run,
+            shaft,
+        )
+        out.append((run, shaft))
+    return out
+
+
+def residuals(problem: Problem, machine: Machine) -> list[Array]:
+    """Measured less simulated, whitened, each window (n, 2 or 3); a run that flies away counts as enormous."""
+    out = []
+    for w, (run, _) in zip(problem.record.windows, simulate(problem, machine), strict=True):
+        with np.errstate(all="ignore"):
+            rest = problem.noise.white(w.current - np.nan_to_num(run, nan=1e6, posinf=1e6, neginf=-1e6))
+        rest[:EDGE] = 0.0
+        rest[-EDGE:] = 0.0
+        out.append(np.clip(rest, -1e8, 1e8))
+    return out
+
+
+def fitted_part(problem: Problem, parts: Sequence[Array]) -> Array:
+    """The fitted samples of all windows in one row; (C, n, m) gives (C, all)."""
+    return np.concatenate(
+        [x[..., :u, :].reshape(*x.shape[:-2], -1) for x, u in zip(parts, problem.until, strict=True)], axis=-1
+    )
+
+
+def held_part(problem: Problem, parts: Sequence[Array]) -> Array:
+    """The held-out samples in one row."""
+    return np.concatenate([x[u:].reshape(-1) for x, u in zip(parts, problem.until, strict=True)])
+
+
+def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> Array:
+    """Whitened sensitivities of the simulated current, (columns, fitted samples x channels)."""
+    p, slope, scales = machine.physical(), machine.slope(), problem.record.scales.as_tuple()
+    parts = []
+    for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
+        own = [j for j, c in enumerate(columns) if c.kind == "p" or c.window == k]
+        dp, dx, dk = (
+            np.zeros((len(own), COUNT)),
+            np.zeros((len(own), STATES)),
+            np.zeros((len(own), machine.knots.shape[1])),
+        )
+        for row, j in enumerate(own):
+            column = columns[j]
+            if column.kind == "p":
+                dp[row, column.index] = slope[column.index]
+            elif column.kind == "x":
+                dx[row, column.index] = 1.0
+            else:
+                dk[row, column.index] = 1.0
+        run, shaft = np.empty((len(own), u, 3)), np.empty((len(own), u))
+        tangents(
+            p, scales, machine.first[k], dp, dx, dk, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1], machine.knots[k],
+            machine.places(k, u, problem.period), problem.period, machine.has_shaft, run, shaft,
+        )  # fmt: skip
+        white = np.zeros((len(columns), u, 3 if problem.record.has_zero else 2))
+        white[own] = problem.noise.white(np.nan_to_num(run))
+        white[:, :EDGE] = 0.0
+        if u == w.count:
+            white[:, -EDGE:] = 0.0
+        parts.append(white.reshape(len(columns), -1))
+    return np.concatenate(parts, axis=1)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """`rest`: whitened residual of the fitted part, `jacobian` where it ended (columns, samples); `held`: chi-square of the held-out part."""
+
+    machine: Machine
+    columns: tuple[Column, ...]
+    chi2: float
+    rest: Array
+    jacobian: Array
+    held: float
+    held_count: int
+
+    @property
+    def count(self) -> int:
+        """Fitted numbers of the recording."""
+        return int(self.rest.size)
+
+    @property
+    def scale(self) -> float:
+        """Chi-square a sample, never below 1."""
+        return max(self.chi2 / max(self.count - len(self.columns), 1), 1.0)
+
+    def covariance(self) -> Array:
+        """Of the columns' numbers in fit coordinates, widened by what is left."""
+        return np.asarray(np.linalg.pinv(_normalised(self.jacobian @ self.jacobian.T)) * self.scale)
+
+    def std(self, name: str) -> float:
+        """Of a number in its own unit; 0 where it is not free."""
+        place = [j for j, c in enumerate(self.columns) if c.kind == "p" and c.index == AT[name]]
+        if not place:
+            return 0.0
+        return float(np.sqrt(self.covariance()[place[0], place[0]]) * self.machine.slope()[AT[name]])
+
+
+def _normalised(gram: Array) -> Array:
+    """Against columns that do nothing: they get no information instead of a singular matrix."""
+    return gram + np.diag(1e-12 * np.maximum(np.diag(gram), 1e-30))
+
+
+def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:
+    """The named numbers, both fluxes of every window, the speed of one that turns already, knots of the load."""
+    out = [Column("p", AT[name]) for name in names]
+    for k, w in enumerate(record.windows):
+        out += [Column("x", j, k) for j in FIRST]
+        if machine.has_shaft and not w.is_from_rest:
+            out.append(Column("x", 8, k))
+    if knots:
+        for k, w in enumerate(record.windows):
+            out += [Column("k", j, k) for j, t in enumerate(machine.knot_times_s[k]) if t < w.time_s[-1] + CALM_S]
+    return tuple(out)
+
+
+def refine(
+    problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = 12, first_jacobian: Array | None = None,
+    tolerance: float = ENDED, is_final: bool = True,
+) -> Fit:  # fmt: skip
+    """Levenberg-Marquardt from `machine`; a given first Jacobian is used for the first steps.
+
+    A Jacobian serves as long as steps with it shrink fast (a simulation costs a thirtieth of it). `is_final`: end with a
+    fresh one.
+    """
+    parts = residuals(problem, machine)
+    rest = fitted_part(problem, parts)
+    chi2, damping, j, is_fresh, before = float(rest @ rest), 0.0, first_jacobian, False, np.inf
+    for _ in range(most):
+        if j is None:
+            j, is_fresh, before = jacobian(problem, machine, columns), True, np.inf
+        trial = machine.moved(columns, _step(j, rest, columns, damping))
+        trial_parts = residuals(problem, trial)
+        trial_rest = fitted_part(problem, trial_parts)
+        gained = chi2 - float(trial_rest @ trial_rest)
+        if gained > 0.0:
+            machine, parts, rest, chi2 = trial, trial_parts, trial_rest, chi2 - gained
+            damping *= 0.1
+            if gained < tolerance * max(chi2 / rest.size, 1.0):
+                break
+            if gained > SLOW * before or (before == np.inf and not is_fresh):
+                j = None
+            is_fresh, before = False, gained
+        elif not is_fresh:
+            if j is not None and before < np.inf and -gained < tolerance:
+                break
+            j = None
+        elif -gained < tolerance or damping > 1e6:
+            break
+        else:
+            damping = max(10.0 * damping, 1e-3)
+    if j is None or (is_final and not is_fresh):
+        j = jacobian(problem, machine, columns)
+    held = held_part(problem, parts)
+    return Fit(machine, tuple(columns), chi2, rest, j, float(held @ held), int(held.size))
+
+
+def refreshed(problem: Problem, fit: Fit) -> Fit:
+    """The same fit with the Jacobian of where it ended."""
+    return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
+
+
+def _step(j: Array, rest: Array, columns: Sequence[Column], damping: float) -> Array:
+    gram = j @ j.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    scaled = gram / np.outer(size, size) + (damping + 1e-11) * np.eye(size.size)
+    try:
+        step = np.linalg.solve(scaled, (j @ rest) / size) / size
+    except np.linalg.LinAlgError:
+        step = np.linalg.lstsq(scaled, (j @ rest) / size, rcond=None)[0] / size
+    largest = max(
+        (abs(s) for c, s in zip(columns, step, strict=True) if c.kind == "p" and c.index in LOGARITHMIC), default=0.0
+    )
+    return np.asarray(step * min(1.0, LARGEST_STEP / max(largest, 1e-30)))
+
+
+def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
+    """The same problem, weighted by what noise of voltage, speed and current leaves in this machine's residual."""
+    record = problem.record
+    rng = np.random.default_rng(seed)
+    noisy = []
+    for w in record.windows:
+        shaken = np.stack([between(record.sigma_v * rng.standard_normal(w.count)) for _ in range(2)], axis=1)
+        speed = w.speed.copy()
+        if record.sigma_w:
+            speed[:, 0] += between(smoothed(record.sigma_w * rng.standard_normal(w.count), SMOOTH_S, 0, problem.period))
+        noisy.append(replace(w, voltage=w.voltage + shaken, speed=speed))
+    clean = replace(machine, theta=machine.theta.copy())
+    plain, moved = (
+        simulate(problem, clean),
+        simulate(replace(problem, record=replace(record, windows=tuple(noisy))), clean),
+    )
+    shown = np.concatenate([(b[0] - a[0])[:, :2] for a, b in zip(plain, moved, strict=True)])
+    if not np.isfinite(shown).all():
+        raise DataRefused(
+            "the fitted machine runs away from its own voltage", step="fit", value="no finite current", limit="a stable machine",
+            remedy="check the plate's rated values and the scale of voltages and currents",
+        )  # fmt: skip
+    return replace(problem, noise=through_machine(shown, record.sigma_a, record.has_zero, rng))

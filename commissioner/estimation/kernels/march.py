@@ -1,0 +1,242 @@
+"""The inverse-Gamma machine in stator coordinates with everything that may be added to it, one Runge-Kutta step a sample.
+
+Inverse Gamma after Slemon 1989 (DOI 10.1109/28.44251): psi_s = L_sigma i + psi_R, psi_R = L_M (i + i_R),
+d psi_s/dt = u - R_s i, d psi_R/dt = -R_R i_R + j w psi_R. The voltage between samples is cubic: a linear one errs by a tenth
+of the noise. The kernel is compiled for real numbers and for complex ones: derivatives by the complex step (Squire, Trapp 1998,
+DOI 10.1137/S003614459631241X) are exact to the last digit, from the same lines. Vectors are pairs of numbers, amplitude-invariant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from commissioner.compiled import forget_stale_kernels
+from commissioner.estimation.numbers import AT
+
+forget_stale_kernels(__file__.replace("\\", "/").rpartition("/")[0], "numbers.py")
+
+FAST = {"reassoc", "arcp", "contract", "nsz"}
+_kernel = njit(cache=True, error_model="numpy", fastmath=FAST, nogil=True)
+_inlined = njit(inline="always", error_model="numpy", fastmath=FAST)
+
+STATES = 10
+"""psi_s, psi_R, current of the bars' slow part, heat of stator and rotor, electrical speed and angle."""
+R_S, R_R, L_SIGMA, L_M = (
+    AT["stator_resistance"],
+    AT["rotor_resistance"],
+    AT["leakage_inductance"],
+    AT["magnetizing_inductance"],
+)
+SAT_S, SAT_R = AT["stator_saturation_1"], AT["rotor_saturation_1"]
+SOFT, BOW, KNEE, BAR, CORNER, IRON = (
+    AT["leakage_softness"],
+    AT["leakage_bend"],
+    AT["leakage_knee"],
+    AT["bar_resistance"],
+    AT["bar_corner"],
+    AT["iron_conductance"],
+)
+HEAT_S, HEAT_R, CAGE, LOOP, LINE = (
+    AT["stator_heat"],
+    AT["rotor_heat"],
+    AT["cage_asymmetry_re"],
+    AT["loop_conductance_u"],
+    AT["line_re"],
+)
+DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["voltage_gain_re"], AT["voltage_offset_re"]
+W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
+GAIN, OFFSET = AT["current_gain_v"], AT["current_offset_u"]
+INERTIA, CONSTANT, FAN, RIPPLE = AT["inertia"], AT["load_constant"], AT["load_fan"], AT["load_ripple_cos"]
+MOST_FLUX = 6.0
+"""Square of the flux over rated flux beyond which the law of the iron goes on with its last value: a fit on its way."""
+HALF_3 = 0.5 * np.sqrt(3.0)
+
+
+@_kernel
+def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, shaft):
+    """Stator current (n, 3: alpha, beta, zero as the sensors show it) into `out`, speed and torque into `shaft` (n, 2).
+
+    `voltage` (2n - 1, 2) and `speed` (2n - 1, 2: electrical speed, its derivative) at samples and between them; with
+    `is_free` the speed follows from the shaft and a load torque between `knots` (of rated torque), at `places` (2n - 1) among them.
+    `x` is the state at the first sample and is overwritten. Types follow `p`.
+    """
+    current, volt, w_n, torque_n, pairs = scales
+    flux2 = 1.0 / (volt / w_n) ** 2
+    n = out.shape[0]
+    one = p[0] * 0.0
+    per_leak, per_main = 1.0 / p[L_SIGMA], 1.0 / p[L_M]
+    has_s = (p[SAT_S] != 0.0) or (p[SAT_S + 1] != 0.0) or (p[SAT_S + 2] != 0.0)
+    has_r = (p[SAT_R] != 0.0) or (p[SAT_R + 1] != 0.0) or (p[SAT_R + 2] != 0.0)
+    has_soft, has_bar, has_heat = p[SOFT] != 0.0, p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
+    has_cage = (p[CAGE] != 0.0) or (p[CAGE + 1] != 0.0)
+    has_loop = False
+    for j in range(6):
+        has_loop = has_loop or p[LOOP + j] != 0.0
+    has_line = (p[LINE] != 0.0) or (p[LINE + 1] != 0.0)
+    has_dead = p[DEAD] != 0.0
+    has_ripple = (p[W_RIPPLE] != 0.0) or (p[W_RIPPLE + 1] != 0.0)
+    per_knee2 = 1.0 / (p[L_SIGMA] * p[KNEE] * current) ** 2
+    iron = p[IRON] * current / volt
+    loop_scale, hot = current / volt, 1.0 / (9.0 * current * current)
+    dead_knee = (p[DEAD_KNEE] * current) ** 2
+    per_inertia = pairs * torque_n / p[INERTIA]
+    h = period
+    k = np.empty((4, STATES), dtype=p.dtype)
+    y = np.empty(STATES, dtype=p.dtype)
+    for q in range(n):
+        for stage in range(4):
+            if stage == 0:
+                m = 2 * q
+                for j in range(STATES):
+                    y[j] = x[j]
+            else:
+                if q == n - 1:
+                    break
+                m = 2 * q + (2 if stage == 3 else 1)
+                part = h if stage == 3 else 0.5 * h
+                for j in range(STATES):
+                    y[j] = x[j] + part * k[stage - 1, j]
+            # speed
+            if is_free:
+                w = y[8]
+                k[stage, 8] = one
+            else:
+                w = speed[m, 0] * (1.0 - p[W_GAIN]) + p[W_LAG] * speed[m, 1]
+                k[stage, 8] = one
+                if has_ripple:
+                    w += w_n * (p[W_RIPPLE] * np.cos(y[9] / pairs) + p[W_RIPPLE + 1] * np.sin(y[9] / pairs))
+            # terminal voltage
+            ma, mb = voltage[m, 0], voltage[m, 1]
+            ua = ma + p[V_GAIN] * ma + p[V_GAIN + 1] * mb + volt * p[V_OFFSET]
+            ub = mb - p[V_GAIN] * mb + p[V_GAIN + 1] * ma + volt * p[V_OFFSET + 1]
+            # currents
+            la, lb = (y[0] - y[2]) * per_leak, (y[1] - y[3]) * per_leak
+            if has_soft:
+                z = ((y[0] - y[2]) ** 2 + (y[1] - y[3]) ** 2) * per_knee2
+                z = z / (1.0 + z)
+                grown = 1.0 + p[SOFT] * z * (1.0 + p[BOW] * z)
+                la, lb = la * grown, lb * grown
+            main_a, main_b = y[2] * per_main, y[3] * per_main
+            if has_r:
+                z = (y[2] * y[2] + y[3] * y[3]) * flux2
+                if z.real > MOST_FLUX:
+                    z = one + MOST_FLUX
+                grown = 1.0 + z * (p[SAT_R] + z * (p[SAT_R + 1] + z * p[SAT_R + 2]))
+                main_a, main_b = main_a * grown, main_b * grown
+            ra, rb = main_a - la, main_b - lb
+            ia, ib = la, lb
+            if has_s:
+                z = (y[0] * y[0] + y[1] * y[1]) * flux2
+                if z.real > MOST_FLUX:
+                    z = one + MOST_FLUX
+                grown = per_main * z * (p[SAT_S] + z * (p[SAT_S + 1] + z * p[SAT_S + 2]))
+                ia, ib = ia + y[0] * grown, ib + y[1] * grown
+            if has_loop:
+                for j in range(3):
+                    ca = 1.0 if j == 0 else -0.5
+                    cb = 0.0 if j == 0 else (HALF_3 if j == 1 else -HALF_3)
+                    one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (
+                        y[0] * ca + y[1] * cb
+                    )
+                    ia, ib = ia + loop_scale * one_loop * ca, ib + loop_scale * one_loop * cb
+            r_s = p[R_S] * (1.0 + p[HEAT_S] * y[6])
+            if iron != 0.0:
+                shrink = 1.0 / (1.0 + iron * r_s)
+                ia, ib = (ia + iron * ua) * shrink, (ib + iron * ub) * shrink
+            if has_line:
+                da = p[R_S] * (p[LINE] * ia + p[LINE + 1] * ib)
+                db = p[R_S] * (p[LINE + 1] * ia - p[LINE] * ib)
+                ua, ub = ua - da, ub - db
+            if has_dead:
+                for j in range(3):
+                    ca = 1.0 if j == 0 else -0.5
+                    cb = 0.0 if j == 0 else (HALF_3 if j == 1 else -HALF_3)
+                    own = ia * ca + ib * cb
+                    lost = 2.0 / 3.0 * volt * p[DEAD] * own / np.sqrt(own * own + dead_knee)
+                    ua, ub = ua - lost * ca, ub - lost * cb
+            if stage == 0:
+                out[q, 0], out[q, 1] = ia, ib
+                shaft[q, 0] = w
+                shaft[q, 1] = 1.5 * pairs * (y[2] * lb - y[3] * la)
+            # slopes
+            k[stage, 0], k[stage, 1] = ua - r_s * ia, ub - r_s * ib
+            r_r = p[R_R] * (1.0 + p[HEAT_R] * y[7])
+            fa, fb = r_r * ra, r_r * rb
+            if has_bar:
+                fa, fb = fa + p[R_R] * p[BAR] * (ra - y[4]), fb + p[R_R] * p[BAR] * (rb - y[5])
+                k[stage, 4] = p[CORNER] * (ra - y[4]) - w * y[5]
+                k[stage, 5] = p[CORNER] * (rb - y[5]) + w * y[4]
+            else:
+                k[stage, 4], k[stage, 5] = one, one
+            if has_cage:
+                c, s = np.cos(2.0 * y[9]), np.sin(2.0 * y[9])
+                aa, ab = p[CAGE] * c - p[CAGE + 1] * s, p[CAGE] * s + p[CAGE + 1] * c
+                fa, fb = fa + p[R_R] * (aa * ra + ab * rb), fb + p[R_R] * (ab * ra - aa * rb)
+            k[stage, 2] = -fa - w * y[3]
+            k[stage, 3] = -fb + w * y[2]
+            if has_heat:
+                k[stage, 6], k[stage, 7] = hot * (ia * ia + ib * ib), hot * (ra * ra + rb * rb)
+            else:
+                k[stage, 6], k[stage, 7] = one, one
+            if is_free:
+                torque = 1.5 * pairs * (y[2] * lb - y[3] * la)
+                share = w / w_n
+                low = min(int(places[m]), knots.shape[0] - 2)
+                part = places[m] - low
+                load = knots[low] * (1.0 - part) + knots[low + 1] * part
+                load += p[CONSTANT] * share / np.sqrt(share * share + 1e-4) + p[FAN] * share * share
+                load += p[RIPPLE] * np.cos(y[9] / pairs) + p[RIPPLE + 1] * np.sin(y[9] / pairs)
+                k[stage, 8] = per_inertia * (torque / torque_n - load)
+            k[stage, 9] = w
+        if q < n - 1:
+            for j in range(STATES):
+                x[j] += h / 6.0 * (k[0, j] + 2.0 * (k[1, j] + k[2, j]) + k[3, j])
+    _chain(p, current, period, out)
+
+
+@_inlined
+def _chain(p, current, period, out):
+    """What the current's sensors make of it: age, gains against their mean, offsets; alpha, beta, zero."""
+    n = out.shape[0]
+    if p[DELAY] != 0.0:
+        s = p[DELAY] / period
+        # cubic through the samples n-2 ... n+1, at n - s
+        w0 = s * (s * s - 1.0) / 6.0
+        w1 = -(s + 1.0) * s * (s - 2.0) / 2.0
+        w2 = (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0
+        w3 = -s * (s - 1.0) * (s - 2.0) / 6.0
+        for j in range(2):
+            older, old, now = out[0, j], out[0, j], out[0, j]
+            for q in range(n):
+                ahead = out[q + 1, j] if q < n - 1 else now
+                mixed = w0 * older + w1 * old + w2 * now + w3 * ahead
+                older, old, now = old, now, ahead
+                out[q, j] = mixed
+    gv, gw = p[GAIN], p[GAIN + 1]
+    ou, ov, ow = current * p[OFFSET], current * p[OFFSET + 1], current * p[OFFSET + 2]
+    for q in range(n):
+        a, b = out[q, 0], out[q, 1]
+        u = a * (1.0 - gv - gw) + ou
+        v = (-0.5 * a + HALF_3 * b) * (1.0 + gv) + ov
+        w = (-0.5 * a - HALF_3 * b) * (1.0 + gw) + ow
+        out[q, 0] = (2.0 * u - v - w) / 3.0
+        out[q, 1] = (v - w) / np.sqrt(3.0)
+        out[q, 2] = (u + v + w) / 3.0
+
+
+@_kernel
+def tangents(p, scales, x0, dp, dx, dk, voltage, speed, knots, places, period, is_free, out, dshaft):
+    """Derivatives along directions (C, ...) of parameters, first state and knots; `out` (C, n, 3) and `dshaft` (C, n)."""
+    step = 1e-30
+    n = out.shape[1]
+    run, shaft = np.empty((n, 3), dtype=np.complex128), np.empty((n, 2), dtype=np.complex128)
+    for c in range(out.shape[0]):
+        march(
+            p + 1j * step * dp[c], scales, x0 + 1j * step * dx[c], voltage, speed, knots + 1j * step * dk[c], places, period,
+            is_free, run, shaft,
+        )  # fmt: skip
+        for q in range(n):
+            for j in range(3):
+                out[c, q, j] = run[q, j].imag / step
+            dshaft[c, q] = shaft[q, 0].imag / step

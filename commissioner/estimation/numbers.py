@@ -1,0 +1,56 @@
+"""The numbers of the machine and of what may be added to it: their places in the kernel's array, start values, coordinates.
+
+Additions are relative, so that 0 is none and 1 is large: conductances of rated current over rated phase peak, fluxes of rated
+flux, torques of rated torque. Numbers that must stay positive are fitted as logarithms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+NAMES = (
+    "stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance",
+    "stator_saturation_1", "stator_saturation_2", "stator_saturation_3",
+    "rotor_saturation_1", "rotor_saturation_2", "rotor_saturation_3",
+    "leakage_softness", "leakage_bend", "leakage_knee", "bar_resistance", "bar_corner", "iron_conductance", "stator_heat", "rotor_heat",
+    "cage_asymmetry_re", "cage_asymmetry_im",
+    "loop_conductance_u", "loop_susceptance_u", "loop_conductance_v", "loop_susceptance_v", "loop_conductance_w", "loop_susceptance_w",
+    "line_re", "line_im", "dead_voltage", "dead_knee", "voltage_gain_re", "voltage_gain_im", "voltage_offset_re", "voltage_offset_im",
+    "speed_gain", "speed_lag", "speed_ripple_cos", "speed_ripple_sin", "delay", "current_gain_v", "current_gain_w",
+    "current_offset_u", "current_offset_v", "current_offset_w",
+    "inertia", "load_constant", "load_fan", "load_ripple_cos", "load_ripple_sin",
+)  # fmt: skip
+AT = {name: k for k, name in enumerate(NAMES)}
+COUNT = len(NAMES)
+FOUR = (0, 1, 2, 3)
+LOGARITHMIC = frozenset(
+    AT[n]
+    for n in (
+        "stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance", "leakage_knee", "bar_corner",
+        "dead_knee", "inertia",
+    )
+)  # fmt: skip
+OF_LINEAR_CHAIN = frozenset(k for k in range(AT["delay"], AT["current_offset_w"] + 1))
+"""Numbers of the current's chain: they act on a current that is already simulated."""
+DEFAULTS = {"leakage_knee": 2.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
+"""Leakage flux of so many times rated current; corner of the bars in rad/s; of rated peak current; kg m^2."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What the additions are relative to: rated peak current, phase peak voltage, frequency, torque, and the pole pairs."""
+
+    current_a: float
+    voltage_v: float
+    frequency_rad_per_s: float
+    torque_nm: float
+    pole_pairs: int
+
+    @property
+    def flux_wb(self) -> float:
+        """Rated peak stator flux."""
+        return self.voltage_v / self.frequency_rad_per_s
+
+    def as_tuple(self) -> tuple[float, ...]:
+        """As the kernel takes them."""
+        return (self.current_a, self.voltage_v, self.frequency_rad_per_s, self.torque_nm, float(self.pole_pairs))

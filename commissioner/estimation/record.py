@@ -1,0 +1,321 @@
+"""Windows of a running recording as the fit takes them: vectors, voltage between the samples, smoothed speed, states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.numbers import Scales
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording
+
+Array = NDArray[np.float64]
+STATES = ("off", "start", "steady", "transient", "coasting")
+"""What a stretch of 20 ms is: no voltage and no current; speeding up; nothing changes; a load step or a ramp; current without voltage."""
+BLOCK_S = 0.02
+OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
+"""Of rated peak: below both the contactor is open."""
+SMOOTH_S, SLOPE_S = 4e-3, 8e-3
+"""Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
+LEAST_S, LEAST_RATE = 0.2, 40.0
+"""Shortest window; fewest samples a period of the supply."""
+MOST_SAMPLES = 60_000
+"""Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
+NOISY_VOLTAGE = 0.15
+"""Sample-to-sample noise over rated peak beyond which a voltage is pulses, not a waveform."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """`current` (n, 3: alpha, beta, zero); `voltage`, `speed` (2n - 1, 2) at samples and between; speed electrical and its slope."""
+
+    time_s: Array
+    current: Array
+    voltage: Array
+    speed: Array
+    state: NDArray[np.int64]
+    is_from_rest: bool
+    source: str = ""
+
+    @property
+    def count(self) -> int:
+        """Samples."""
+        return int(self.time_s.size)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Windows of one motor. `has_zero`: three currents were measured; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
+    of the electrical speed before smoothing."""
+
+    windows: tuple[Window, ...]
+    period_s: float
+    scales: Scales
+    plate: Nameplate
+    has_speed: bool
+    has_zero: bool
+    is_commanded: bool
+    sigma_a: tuple[float, float, float]
+    sigma_v: float
+    sigma_w: float = 0.0
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def has_start(self) -> bool:
+        """Whether a window begins at rest."""
+        return any(w.is_from_rest for w in self.windows)
+
+
+def scales_of(plate: Nameplate) -> Scales:
+    """Rated peaks and torque of the plate."""
+    torque = plate.rated_power_w / (2 * np.pi * plate.rated_speed_rpm / 60.0)
+    return Scales(
+        plate.rated_current_peak_a,
+        float(np.sqrt(2 / 3) * plate.rated_voltage_v),
+        plate.rated_frequency_rad_per_s,
+        torque,
+        plate.pole_pairs,
+    )
+
+
+def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
+    """The recordings' windows. DataRefused names what cannot carry a fit: rate, length, pulses, crossed phases, no current."""
+    scales = scales_of(plate)
+    period = recordings[0].sample_period_s
+    windows: list[Window] = []
+    remarks: list[str] = []
+    has_speed = all(r.speed_rad_per_s is not None for r in recordings)
+    has_zero = all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
+    sigmas = []
+    for one in recordings:
+        if abs(one.sample_period_s / period - 1.0) > 1e-6:
+            raise _refused(
+                f"{one.source}: sampled at another rate than the first file",
+                one.sample_period_s,
+                period,
+                "diagnose them one by one",
+            )
+        current, voltage = _currents(one), _voltages(one)
+        _check(one, voltage, scales)
+        sigmas.append([*(noise_of(current[:, k]) for k in range(3)), noise_of(voltage[:, 0]), noise_of(voltage[:, 1])])
+        if _is_crossed(current, voltage):
+            raise _refused(
+                f"{one.source}: currents and voltages turn against each other",
+                "opposite",
+                "one phase order",
+                "exchange two current channels, or two voltages, with --map",
+            )
+        if _turns_backwards(voltage):
+            current, voltage = current * [1, -1, 1], voltage * [1, -1]
+            remarks.append(
+                f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another."
+            )
+        windows += _windows(one, current, voltage, plate, has_speed, scales)
+    if not windows:
+        raise _refused(
+            "no stretch with voltage is long enough",
+            0.0,
+            f"{LEAST_S} s",
+            "record a start, load steps, or a second of steady running",
+        )
+    if sum(w.count for w in windows) > MOST_SAMPLES:
+        most = MOST_SAMPLES // len(windows)
+        windows = [first_part(w, min(most, w.count)) for w in windows]
+        remarks.append(f"Of each stretch the first {most * period:.3g} s are used.")
+    if not has_zero:
+        remarks.append(
+            "Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see."
+        )
+    sigma = np.median(np.array(sigmas), axis=0)
+    floor = 1e-6 * scales.current_a
+    commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
+    return Record(
+        tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
+        float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
+        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks),
+    )  # fmt: skip
+
+
+def _speed_noise(recordings: Sequence[RunningRecording], plate: Nameplate) -> float:
+    """Of the electrical speed, rad/s."""
+    return float(
+        np.median([noise_of(r.speed_rad_per_s) * plate.pole_pairs for r in recordings if r.speed_rad_per_s is not None])
+    )
+
+
+def _refused(what: str, value: object, limit: object, remedy: str) -> DataRefused:
+    return DataRefused(what, step="read running recording", value=value, limit=limit, remedy=remedy)
+
+
+def noise_of(x: Array) -> float:
+    """Standard deviation of white noise from sixth differences, which no harmonic of the supply passes (robust)."""
+    d = np.diff(x, 6)
+    return float(np.median(np.abs(d)) / 0.6745 / np.sqrt(924.0)) if d.size else 0.0
+
+
+def _currents(one: RunningRecording) -> Array:
+    phases = np.array(one.currents_a)
+    absent = [k for k in range(3) if not np.isfinite(phases[k]).any()]
+    for k in absent:
+        phases[k] = -sum(phases[j] for j in range(3) if j != k)
+    return _vector(phases)
+
+
+def _voltages(one: RunningRecording) -> Array:
+    volts = np.array(one.voltages_v)
+    for k in range(3):
+        if not np.isfinite(volts[k]).any():
+            volts[k] = -sum(volts[j] for j in range(3) if j != k)
+    if one.voltages_are_line_to_line:
+        uv, vw, wu = volts - volts.mean(axis=0)
+        volts = np.array([(uv - wu) / 3.0, (vw - uv) / 3.0, (wu - vw) / 3.0])
+    return _vector(volts)[:, :2]
+
+
+def _vector(x: Array) -> Array:
+    u, v, w = x
+    return np.stack([(2 * u - v - w) / 3.0, (v - w) / np.sqrt(3.0), (u + v + w) / 3.0], axis=1)
+
+
+def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
+    per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
+    if per_period < LEAST_RATE:
+        raise _refused(
+            f"{one.source}: {per_period:.0f} samples a period of the supply are too few",
+            1.0 / one.sample_period_s,
+            f"{LEAST_RATE * scales.frequency_rad_per_s / 6.283:.0f} samples a second",
+            "record faster: 5 kHz or more",
+        )
+    sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
+    if sigma > NOISY_VOLTAGE * scales.voltage_v:
+        raise _refused(
+            f"{one.source}: the voltages are pulses of an inverter, not their means", sigma, NOISY_VOLTAGE * scales.voltage_v,
+            "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages",
+        )  # fmt: skip
+
+
+def _turns_backwards(voltage: Array) -> bool:
+    v = voltage[:, 0] + 1j * voltage[:, 1]
+    return bool(np.sum(np.imag(np.conj(v[:-1]) * v[1:])) < 0)
+
+
+def _is_crossed(current: Array, voltage: Array) -> bool:
+    """Whether the two turn in opposite directions where both are there."""
+    both = []
+    for x in (voltage, current):
+        v = x[:, 0] + 1j * x[:, 1]
+        both.append(np.sum(np.imag(np.conj(v[:-4:4]) * v[4::4])) / max(np.sum(np.abs(v) ** 2), 1e-30))
+    return bool(both[0] * both[1] < 0 and abs(both[1]) > 0.3 * abs(both[0]))
+
+
+def _windows(
+    one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
+) -> Iterator[Window]:
+    """Stretches without gap and with voltage; after a closing the window begins one sample later."""
+    finite = np.isfinite(current).all(axis=1) & np.isfinite(voltage).all(axis=1)
+    on = np.hypot(*voltage.T) > OFF_VOLTAGE * scales.voltage_v
+    span = max(round(2e-3 / one.sample_period_s), 1)
+    on = np.convolve(on, np.ones(2 * span + 1), "same") > 0.5 if on.any() else on
+    on &= np.hypot(*voltage.T) > 1e-9 * scales.voltage_v
+    steps = np.diff(one.time_s, prepend=one.time_s[0] - one.sample_period_s)
+    is_break = (steps > 1.5 * one.sample_period_s) | (steps <= 0)
+    usable = on & finite
+    begins = np.flatnonzero(usable & (~np.roll(usable, 1) | is_break | (np.arange(usable.size) == 0)))
+    for first in begins:
+        after = np.flatnonzero(~usable[first:] | (is_break[first:] & (np.arange(usable.size - first) > 0)))
+        last = first + (int(after[0]) if after.size else usable.size - first)
+        closing = first > 0 and not on[first - 1] and not is_break[first]
+        threshold = OFF_VOLTAGE * scales.voltage_v
+        begin = int(first)
+        if closing:
+            begin += int(np.argmax(np.hypot(*voltage[first:last].T) > threshold)) + 1
+        if (last - begin) * one.sample_period_s < LEAST_S:
+            continue
+        yield _window(one, current, voltage, slice(begin, int(last)), plate, has_speed, bool(closing), scales)
+
+
+def _window(
+    one: RunningRecording,
+    current: Array,
+    voltage: Array,
+    part: slice,
+    plate: Nameplate,
+    has_speed: bool,
+    closing: bool,
+    scales: Scales,
+) -> Window:
+    time = one.time_s[part] - one.time_s[part.start]
+    u = voltage[part]
+    if has_speed and one.speed_rad_per_s is not None:
+        raw = one.speed_rad_per_s[part] * plate.pole_pairs
+        speed = np.stack(
+            [
+                between(smoothed(raw, SMOOTH_S, 0, one.sample_period_s)),
+                between(smoothed(raw, SLOPE_S, 1, one.sample_period_s)),
+            ],
+            axis=1,
+        )
+    else:
+        speed = np.zeros((2 * time.size - 1, 2))
+    is_from_rest = closing and (not has_speed or abs(speed[:20, 0].mean()) < 0.02 * scales.frequency_rad_per_s)
+    window = Window(
+        time,
+        current[part],
+        np.stack([between(u[:, 0]), between(u[:, 1])], axis=1),
+        speed,
+        np.zeros(time.size, np.int64),
+        is_from_rest,
+        one.source,
+    )
+    return replace(window, state=_states(window, scales, one.sample_period_s))
+
+
+def first_part(w: Window, count: int) -> Window:
+    """The window's first samples."""
+    return replace(
+        w, time_s=w.time_s[:count], current=w.current[:count], voltage=w.voltage[: 2 * count - 1], speed=w.speed[: 2 * count - 1],
+        state=w.state[:count],
+    )  # fmt: skip
+
+
+def smoothed(x: Array, span_s: float, order: int, period: float) -> Array:
+    """The signal, or its derivative of an order, by quadratics over a span: no phase shift."""
+    length = max(2 * round(0.5 * span_s / period) + 1, 5)
+    return np.asarray(savgol_filter(x, length, 2, deriv=order, delta=period, mode="interp"))
+
+
+def between(x: Array) -> Array:
+    """The signal at its samples and, by a cubic, midway between them: (2n - 1,)."""
+    out = np.empty(2 * x.size - 1)
+    out[::2] = x
+    out[3:-3:2] = (9.0 * (x[1:-2] + x[2:-1]) - (x[:-3] + x[3:])) / 16.0
+    out[1] = (3.0 * x[0] + 6.0 * x[1] - x[2]) / 8.0
+    out[-2] = (3.0 * x[-1] + 6.0 * x[-2] - x[-3]) / 8.0
+    return out
+
+
+def _states(window: Window, scales: Scales, period: float) -> NDArray[np.int64]:
+    """One of `STATES` for every sample, decided over blocks of a period of the supply."""
+    block = max(round(BLOCK_S / period), 1)
+    size = np.hypot(window.current[:, 0], window.current[:, 1])
+    volts = np.hypot(*window.voltage[::2].T)
+    out = np.zeros(window.count, np.int64)
+    means = [float(size[k : k + block].mean()) for k in range(0, window.count, block)]
+    started = not window.is_from_rest
+    for j, mean in enumerate(means):
+        part = slice(j * block, (j + 1) * block)
+        before, after = means[max(j - 1, 0)], means[min(j + 1, len(means) - 1)]
+        moves = max(abs(after - mean), abs(mean - before)) > 0.03 * max(mean, 0.2 * scales.current_a)
+        if volts[part].mean() < OFF_VOLTAGE * scales.voltage_v:
+            out[part] = STATES.index("coasting" if mean > OFF_CURRENT * scales.current_a else "off")
+        elif not started and (moves or mean > 2.0 * scales.current_a):
+            out[part] = STATES.index("start")
+        else:
+            started = True
+            out[part] = STATES.index("transient" if moves else "steady")
+    return out

@@ -1,0 +1,1 @@
+"""The page of a running motor's diagnosis or identification."""

@@ -1,0 +1,107 @@
+"""A running diagnosis in words: headline, what it means, what to do, sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.report.page import Tone
+from commissioner.running.causes import CATALOGUE
+
+Document = Mapping[str, Any]
+INTERVAL = 1.96
+UNITS = {"us": "µs", "ohm": "Ω"}
+
+
+def spoken(name: str) -> str:
+    """`rotor_skin_effect` as `rotor skin effect`."""
+    return name.replace("_", " ")
+
+
+def class_name(cause: Mapping[str, Any]) -> str:
+    """The name, or the names that the data cannot tell apart."""
+    return " or ".join(spoken(n) for n in (cause["name"], *cause["equivalent"]))
+
+
+def number(value: float, digits: int = 3) -> str:
+    """So many significant digits without an exponent where that is readable."""
+    if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    import math
+
+    places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    return f"{round(value, places):.{places}f}"
+
+
+def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
+    """`1.23 ± 0.04 %`: relative sizes in percent, others in their unit."""
+    value, std, unit = entry["value"], entry["std"], entry["unit"]
+    factor, tail = (100.0, " %") if unit == "" else (1.0, f" {UNITS.get(unit, unit)}")
+    if short or not std:
+        return f"{number(value * factor)}{tail}"
+    return f"{number(value * factor)} ± {number(INTERVAL * std * factor, 2)}{tail}"
+
+
+def main_size(cause: Mapping[str, Any]) -> str:
+    """The one that is spoken of, without interval."""
+    return quantity(next(iter(cause["parameters"].values())), short=True)
+
+
+def sentence(cause: Mapping[str, Any]) -> str:
+    """What the cause does, with its size; of a class, that it is one of them."""
+    said = CATALOGUE[cause["name"]].says.format(size=main_size(cause).lstrip("-"))
+    key, first = next(iter(cause["parameters"].items()))
+    phase = next((part for part in key.split("_") if part in ("u", "v", "w")), "")
+    for one in ("phase", "line", "current sensor", "voltage sensor") if phase else ():
+        for article in ("One", "A"):
+            said = said.replace(f"{article} {one} ", f"{one.capitalize()} {phase} ")
+    said += " (less)" if first["value"] < 0.0 and "differently" in said else ""
+    return said if not cause["equivalent"] else f"{said} ({class_name(cause)}: these data cannot say which)"
+
+
+def headline(document: Document) -> str:
+    """The verdict in one sentence."""
+    causes = document["causes"]
+    if document["verdict"] == "refused":
+        return "These data cannot carry an answer."
+    if document["verdict"] == "unexplained":
+        known = f" Known beside it: {', '.join(class_name(c) for c in causes)}." if causes else ""
+        return f"Something is in these data that no cause in the catalogue makes.{known}"
+    if not causes:
+        return "Nothing significant: the plain four-parameter simulation already fits to within the noise."
+    share = document["gain"]["held_out"]
+    share = document["gain"]["explained_share"] if share is None else share
+    others = f" With {len(causes) - 1} lesser cause{'s' if len(causes) > 2 else ''} it" if len(causes) > 1 else " It"
+    return f"{sentence(causes[0])}.{others} explains {100.0 * max(share, 0.0):.1f} % of the simulation's error."
+
+
+def tone(document: Document) -> Tone:
+    """Green where nothing is open."""
+    tones: dict[str, Tone] = {"refused": "bad", "unexplained": "bad", "not_distinguishable": "warn"}
+    return tones.get(document["verdict"], "good")
+
+
+def meaning(document: Document) -> list[str]:
+    """What each cause means, a paragraph each."""
+    if document["verdict"] == "refused":
+        error = document.get("error", {})
+        return [str(document["reason"]), f"Seen: {error.get('value')}; expected: {error.get('limit')}."]
+    out = [str(document["reason"])] if document["verdict"] in ("unexplained", "not_distinguishable") else []
+    return out + [f"{spoken(c['name']).capitalize()}: {CATALOGUE[c['name']].meaning}" for c in document["causes"]]
+
+
+def actions(document: Document) -> list[tuple[str, str]]:
+    """Who does what: of every cause its remedy, then the next recording."""
+    rows = [
+        ("for the measurement" if CATALOGUE[c["name"]].is_of_measurement else "for the motor and drive", CATALOGUE[c["name"]].remedy)
+        for c in document["causes"]
+    ]  # fmt: skip
+    plan = document["next_experiment"]
+    return [
+        *rows,
+        *(
+            [("next test", f"To tell {' from '.join(spoken(n) for n in plan['splits'])}: {plan['do']}.")]
+            if plan
+            else []
+        ),
+    ]

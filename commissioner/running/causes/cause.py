@@ -1,0 +1,79 @@
+"""What a cause is: its numbers in the machine, how they read, what it is mistaken for, what is said and done about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from commissioner.estimation.numbers import Scales
+from commissioner.estimation.record import Record
+
+Values = Mapping[str, float]
+Sizes = dict[str, tuple[float, str]]
+"""Name to value and unit; the first one is the size that is spoken of."""
+PHASES = "uvw"
+
+
+@dataclass(frozen=True)
+class Form:
+    """One way in which a cause can be there. `numbers` are screened from zero; `spare` ones are freed once it is accepted."""
+
+    name: str
+    numbers: tuple[str, ...]
+    spare: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Confounder:
+    """Who looks alike, and what a plant can record to tell them apart."""
+
+    name: str
+    told_apart_by: str = ""
+    is_always_tied: bool = False
+
+
+@dataclass(frozen=True)
+class Cause:
+    """`says` has a `{size}`. `range`: of the first size, what physics allows; outside it is another cause in disguise.
+
+    `allows`: what else physics demands of its numbers. `scenario`: entry of [effects] in the simulator; derivatives are those of
+    the kernel's lines, exact by complex step.
+    """
+
+    name: str
+    title: str
+    says: str
+    meaning: str
+    remedy: str
+    physics: str
+    signature: str
+    source: str
+    forms: tuple[Form, ...]
+    sizes: Callable[[Values, Scales], Sizes]
+    range: tuple[float, float]
+    confounders: tuple[Confounder, ...] = ()
+    scenario: Callable[[Values, Scales], dict[str, Any]] | None = None
+    needs: Callable[[Record], bool] = field(default=lambda _: True)
+    is_of_measurement: bool = False
+    allows: Callable[[Values], bool] = field(default=lambda _: True)
+
+    def is_plausible(self, values: Values, scales: Scales) -> bool:
+        """Whether the first size lies in the range physics allows."""
+        size = next(iter(self.sizes(values, scales).values()))[0]
+        return bool(np.isfinite(size) and self.range[0] <= size <= self.range[1] and self.allows(values))
+
+
+def in_phases(re: float, im: float) -> tuple[float, float, float]:
+    """A vector that turns twice as unequal parts of three phases, sum zero: g = sum over k of g_k exp(2 j phi_k) / 3."""
+    g = complex(re, im)
+    return tuple(float(2.0 * (g * np.exp(-4j * np.pi * k / 3.0)).real) for k in range(3))  # type: ignore[return-value]
+
+
+def one_of_three(parts: tuple[float, float, float]) -> tuple[int, float]:
+    """The phase that differs most from the two others, and by how much from their mean."""
+    apart = [1.5 * p for p in parts]  # sum zero: p - (-p / 2)
+    k = int(np.argmax(np.abs(apart)))
+    return k, apart[k]

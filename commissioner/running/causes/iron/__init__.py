@@ -1,0 +1,1 @@
+"""Causes of the iron: one file each."""

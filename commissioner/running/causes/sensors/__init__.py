@@ -1,0 +1,1 @@
+"""Causes of the measurement: one file each."""

@@ -1,0 +1,22 @@
+"""A speed signal whose scale is wrong: a tachogenerator, an analogue output. An encoder that counts pulses cannot have it."""
+
+from __future__ import annotations
+
+from commissioner.running.causes.cause import Cause, Form
+
+CAUSE = Cause(
+    name="speed_sensor_gain",
+    title="Gain of the speed sensor",
+    says="The speed is read {size} too high",
+    meaning="The measurement's error, not the motor's: the slip is wrong by much more than that.",
+    remedy="Correct the scale of the speed; ask what the sensor is: counted pulses cannot read a speed too high.",
+    physics="w = w_read (1 - g)",
+    signature="no load most; the opposite of iron loss",
+    source="definition",
+    forms=(Form("", ("speed_gain",)),),
+    sizes=lambda v, s: {"gain": (v["speed_gain"], "")},
+    range=(-0.2, 0.2),
+    scenario=lambda v, s: {"size": v["speed_gain"]},
+    needs=lambda record: record.has_speed,
+    is_of_measurement=True,
+)

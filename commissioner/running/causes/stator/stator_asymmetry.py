@@ -1,0 +1,53 @@
+"""Shorted turns in one phase: a loop beside the magnetizing branch takes a current of its own."""
+
+from __future__ import annotations
+
+import math
+
+from commissioner.estimation.numbers import Scales
+from commissioner.running.causes.cause import PHASES, Cause, Confounder, Form, Sizes, Values
+
+
+def _sizes(v: Values, _: Scales) -> Sizes:
+    loops = {p: math.hypot(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in PHASES}
+    worst = max(loops, key=lambda p: loops[p])
+    sign = math.copysign(1.0, v[f"loop_conductance_{worst}"])
+    return {f"current_in_{worst}_of_rated": (sign * loops[worst], "")}
+
+
+def _scenario(v: Values, s: Scales) -> dict[str, float]:
+    ((name, (size, _)),) = _sizes(v, s).items()
+    return {"size": size, "phase": PHASES.index(name.split("_")[2])}
+
+
+MOST_LAG = 1.7
+"""Of the loop's current behind its voltage, tangent: few turns are a resistance first. A voltage sensor's gain looks like a pure reactance."""
+
+
+def _is_loop(v: Values) -> bool:
+    loops = [(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in PHASES]
+    return all(g >= 0.0 and -0.3 * g <= b <= MOST_LAG * g for g, b in loops)
+
+
+CAUSE = Cause(
+    name="stator_asymmetry",
+    title="Asymmetry of the stator (turn fault)",
+    says="One phase of the stator takes {size} of rated current beside its own, in proportion to the voltage: as shorted turns do",
+    meaning="A fault of the motor: shorted turns heat where they are and grow.",
+    remedy="Stop the motor soon and measure the winding; do not start it again before.",
+    physics="i += (g u_k + b w psi_sk) n_k: a loop of resistance and leakage on phase k, driven by that phase's flux",
+    signature="a negative-sequence current in proportion to the voltage that the voltage's own unbalance does not explain",
+    source="Patel, Chandorkar (locus of the negative sequence against load); Radecki, DOI 10.5277/PED160111",
+    forms=tuple(Form(f"phase {p}", (f"loop_conductance_{p}", f"loop_susceptance_{p}")) for p in PHASES),
+    sizes=_sizes,
+    range=(0.0, 2.0),
+    allows=_is_loop,
+    confounders=(
+        Confounder(
+            "voltage_gain_mismatch",
+            "a start; or exchange two voltage probes and record again: what follows the probe is the probe's",
+        ),
+        Confounder("line_resistance", "a start, or two loads"),
+    ),
+    scenario=_scenario,
+)

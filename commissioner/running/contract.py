@@ -1,0 +1,116 @@
+"""The JSON of a running diagnosis: the keys that a standstill one promises, and what a running one adds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from commissioner.motor.circuit import Quantity
+from commissioner.running.causes import CATALOGUE
+from commissioner.running.diagnosis import Diagnosis, NamedCause
+
+CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; magnetizing inductance at no flux where saturation is named"
+NEVER_NAMEABLE = (
+    "common gain of the current sensors | common gain of the voltage sensors | all impedances",
+    "delay | first-order lag of the current sensors",
+    "resistance in all lines | R_s",
+)
+
+
+def as_document(seen: Diagnosis, model_file: str | None = None) -> dict[str, Any]:
+    """Plain JSON types."""
+    gain, left, found, record = seen.gain, seen.left, seen.found, seen.record
+    document: dict[str, Any] = {
+        "verdict": seen.verdict.value,
+        "reason": seen.reason,
+        "kind": "recording",
+        "test": "running",
+        "convention": CONVENTION,
+        "causes": [_cause(c) for c in seen.causes],
+        "gain": {
+            "held_out": gain.held_out if gain else None,
+            "rmse_before_a": gain.rmse_before_a if gain else None,
+            "rmse_after_a": gain.rmse_after_a if gain else None,
+            "noise_floor_a": gain.noise_floor_a if gain else None,
+            "explained_share": gain.explained_share if gain else None,
+            "structured_error_over_noise": left.sigma if left else None,
+        },
+        "noise": None if record is None else {
+            "source": "sixth differences, and the voltage's noise through the fitted machine", "is_known": True, "is_white": False,
+            "sigma_a": list(record.sigma_a),
+        },
+        "parameters_before": _quantities(seen.parameters_before),
+        "parameters_after": _quantities(seen.parameters_after),
+        "below_materiality": [],
+        "detection_limits": _limits(seen),
+        "cannot_tell": list(NEVER_NAMEABLE) if found else [],
+        "left_by_state_over_noise": dict(left.by_state) if left else {},
+        "excitation": _excitation(seen),
+        "audit": [],
+        "remarks": list(seen.remarks),
+        "is_complete": found.is_complete if found else True,
+        "next_experiment": None if seen.next_experiment is None else {
+            "do": seen.next_experiment.do, "steps": list(seen.next_experiment.steps), "splits": list(seen.next_experiment.splits),
+            "repeats": seen.next_experiment.repeats, "command": seen.next_experiment.command,
+        },
+        "model_file": model_file,
+    }  # fmt: skip
+    if seen.refusal is not None:
+        document["error"] = seen.refusal.as_dict()
+    return document
+
+
+def _excitation(seen: Diagnosis) -> dict[str, Any]:
+    """What the recording has that separates causes: seconds of each state, speed measured, currents measured."""
+    record = seen.record
+    if record is None:
+        return {}
+    from commissioner.estimation.record import STATES
+
+    seconds = {
+        name: float(sum((w.state == k).sum() for w in record.windows)) * record.period_s
+        for k, name in enumerate(STATES)
+    }
+    return {
+        "seconds": {k: v for k, v in seconds.items() if v},
+        "has_speed": record.has_speed,
+        "has_three_currents": record.has_zero,
+        "has_start": record.has_start,
+    }
+
+
+def _cause(c: NamedCause) -> dict[str, Any]:
+    entry = CATALOGUE[c.name]
+    return {
+        "name": c.name,
+        "title": entry.title,
+        "form": c.form,
+        "parameters": {k: {"value": v, "std": s, "unit": u} for k, (v, s, u) in c.sizes.items()},
+        "gain_share": c.gain_share,
+        "confidence": c.confidence,
+        "equivalent": list(c.equivalent),
+        "strength_over_noise": c.strength_sigma,
+        "delta_chi2": c.delta_chi2,
+        "alternatives": dict(c.rivals),
+        "found_by": "fit",
+        "is_of_measurement": entry.is_of_measurement,
+    }
+
+
+def _limits(seen: Diagnosis) -> dict[str, dict[str, Any]]:
+    """Smallest size of what was not found, six standard deviations beside all that was."""
+    if seen.found is None or seen.record is None:
+        return {}
+    out = {}
+    for name, number in seen.found.limits.items():
+        if not number < 1e3:
+            continue
+        cause = CATALOGUE[name]
+        own = dict.fromkeys((n for f in cause.forms for n in f.numbers), 0.0) | {cause.forms[0].numbers[0]: number}
+        key, (size, unit) = next(iter(cause.sizes({**seen.numbers(), **own}, seen.record.scales).items()))
+        out[name] = {"value": abs(size), "unit": unit, "of": key}
+    return out
+
+
+def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:
+    return {name: {"value": q.value, "std": q.std} for name, q in values.items()}

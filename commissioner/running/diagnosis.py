@@ -1,0 +1,244 @@
+"""The whole diagnosis of running recordings: one call, one result with the numbers that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.fit import Fit, problem_of
+from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.record import Record, prepare
+from commissioner.motor.circuit import Quantity
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording
+from commissioner.running.causes import CATALOGUE, always_tied
+from commissioner.running.experiment import Experiment, next_experiment
+from commissioner.running.lack import Lack, lack_of_fit, rms_errors
+from commissioner.running.rules import RULES, Rules
+from commissioner.running.search import Found, Named, Step, search
+
+UNEXPLAINED_SIGMA, FAR_OFF_SIGMA, LEAST_SHARE = 0.3, 1.0, 0.97
+"""Of the noise, left where no cause is named; left however much was explained; share of the error that causes must explain else."""
+BURST_SIGMA, BURST_SHARE = 1.0, 0.97
+"""The same of the worst 20 ms: a law of another form leaves something in the first cycles of a start."""
+MOST_SURE = 0.99
+HELD_OUT = 0.3
+"""Share of each window that is simulated on and not fitted. None where the load, and so the speed, must be fitted all along."""
+MOSTLY_GUESSES = 0.8
+"""Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
+LEAST_ERROR = 0.1
+"""Power of the held-out error over the noise's, below which there is nothing to gain there."""
+
+
+class Verdict(Enum):
+    EXPLAINED = "explained"
+    NOTHING_SIGNIFICANT = "nothing_significant"
+    NOT_DISTINGUISHABLE = "not_distinguishable"
+    UNEXPLAINED = "unexplained"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class NamedCause:
+    """`sizes`: value, standard deviation, unit; the first is spoken of. `rivals`: chi-square lost with another in its place."""
+
+    name: str
+    form: str
+    sizes: Mapping[str, tuple[float, float, str]]
+    gain_share: float
+    delta_chi2: float
+    strength_sigma: float
+    confidence: float
+    equivalent: tuple[str, ...]
+    rivals: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Rms errors of the simulated current vector on what was held out, and the share of the error that is gone there."""
+
+    held_out: float | None
+    rmse_before_a: float
+    rmse_after_a: float
+    noise_floor_a: float
+    explained_share: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything the report shows. `found` is None where the data were refused."""
+
+    verdict: Verdict
+    reason: str
+    causes: tuple[NamedCause, ...] = ()
+    gain: Gain | None = None
+    left: Lack | None = None
+    before: Lack | None = None
+    parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
+    parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
+    next_experiment: Experiment | None = None
+    found: Found | None = None
+    record: Record | None = None
+    remarks: tuple[str, ...] = ()
+    refusal: DataRefused | None = None
+
+    def numbers(self) -> dict[str, float]:
+        """Of the final machine, by name; empty where the data were refused."""
+        return (
+            dict(zip(NAMES, (float(x) for x in self.found.fit.machine.physical()), strict=True)) if self.found else {}
+        )
+
+
+def diagnose(
+    recordings: Sequence[RunningRecording],
+    plate: Nameplate,
+    *,
+    excluded: Sequence[str] = (),
+    rules: Rules = RULES,
+    observe: Callable[[Step], None] = lambda _: None,
+    go_on: Callable[[], bool] = lambda: True,
+) -> Diagnosis:
+    """Names what a four-parameter simulation gets wrong about recordings of one running motor.
+
+    Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason. `go_on` is asked between
+    causes; once it says no, the answer is given with what was found so far, and says so.
+    """
+    try:
+        record = prepare(recordings, plate)
+        found = search(
+            problem_of(record, HELD_OUT if record.has_speed else 0.0),
+            excluded=excluded,
+            rules=rules,
+            observe=observe,
+            go_on=go_on,
+        )
+    except DataRefused as refusal:
+        return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", refusal=refusal)
+    return _conclude(record, found, rules)
+
+
+def _conclude(record: Record, found: Found, rules: Rules) -> Diagnosis:
+    left, before = lack_of_fit(found.problem, found.fit.machine), lack_of_fit(found.problem, found.nominal.machine)
+    causes = tuple(sorted((_cause(found, one, rules) for one in found.accepted), key=lambda c: -c.gain_share))
+    gain = _gain(found)
+    verdict, reason = _verdict(causes, left, gain)
+    remarks = list(record.remarks)
+    if verdict is Verdict.UNEXPLAINED and causes and gain.explained_share < MOSTLY_GUESSES:
+        guesses = ", ".join(c.name.replace("_", " ") for c in causes)
+        remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
+        causes = ()
+        verdict, reason = _verdict(causes, left, gain)
+    if not found.is_complete:
+        remarks.append(
+            "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
+        )
+    if not record.has_start:
+        remarks.append(
+            "No start in these data: saturation, deep bars, leakage and gains are hard to tell apart without one."
+        )
+    if not record.has_speed:
+        remarks.append(
+            "No speed column: the speed is that of a shaft with the fitted load, nothing is held out; iron loss and heating of the rotor are hard to see."
+        )
+    return Diagnosis(
+        verdict, reason, causes, gain, left, before, _parameters(found.nominal), _parameters(found.fit),
+        next_experiment(verdict.value, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
+    )  # fmt: skip
+
+
+def _gain(found: Found) -> Gain:
+    fitted_before, before = rms_errors(found.problem, found.nominal.machine)
+    fitted_after, after = rms_errors(found.problem, found.fit.machine)
+    floor = found.problem.noise.total
+    chi2 = (found.nominal.chi2 - found.nominal.count, found.fit.chi2 - found.fit.count)
+    share = 1.0 - max(chi2[1], 0.0) / max(chi2[0], 1e-9) if chi2[0] > 0 and found.accepted else 0.0
+    held = None
+    if found.accepted and before**2 > (1.0 + LEAST_ERROR) * floor**2:
+        held = 1.0 - max(after**2 - floor**2, 0.0) / (before**2 - floor**2)
+    return Gain(held, before or fitted_before, after or fitted_after, floor, float(np.clip(share, 0.0, 1.0)))
+
+
+def _cause(found: Found, one: Named, rules: Rules) -> NamedCause:
+    gain, rivals = found.gain[one.cause], found.rivals[one.cause]
+    close = max(rules.tie * found.fit.scale, rules.tie_share * gain)
+    tied = [name for name, lost in rivals.items() if lost < close]
+    equivalent = tuple(dict.fromkeys((*always_tied(one.cause), *tied)))
+    nearest = min((lost for name, lost in rivals.items() if name not in equivalent), default=gain)
+    sure = MOST_SURE * (1.0 - np.exp(-0.5 * min(nearest, gain) / (found.fit.scale * 5.0)))
+    total = max(found.nominal.chi2 - found.fit.chi2, 1e-9)
+    return NamedCause(
+        one.cause, one.form.name, _sizes(found, one), float(min(gain / total, 1.0)), gain, float(np.sqrt(gain / found.fit.count)),
+        float(sure), equivalent, rivals,
+    )  # fmt: skip
+
+
+def _sizes(found: Found, one: Named) -> dict[str, tuple[float, float, str]]:
+    """With standard deviations from the covariance of all that was free."""
+    machine, scales, cause = found.fit.machine, found.problem.record.scales, CATALOGUE[one.cause]
+    values = dict(zip(NAMES, machine.physical(), strict=True))
+    own = {n: j for j, c in enumerate(found.fit.columns) if c.kind == "p" for n in [NAMES[c.index]]}
+    covariance, slope = found.fit.covariance(), machine.slope()
+    sizes = cause.sizes(values, scales)
+    gradient = {name: np.zeros(len(found.fit.columns)) for name in sizes}
+    for number, j in own.items():
+        h = 1e-5 * max(abs(values[number]), 1e-4)
+        for sign in (1.0, -1.0):
+            moved = cause.sizes({**values, number: values[number] + sign * h}, scales)
+            for name in sizes:
+                gradient[name][j] += sign * moved.get(name, sizes[name])[0] / (2.0 * h) * slope[AT[number]]
+    return {
+        name: (float(value), float(np.sqrt(max(gradient[name] @ covariance @ gradient[name], 0.0))), unit)
+        for name, (value, unit) in sizes.items()
+    }
+
+
+def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Verdict, str]:
+    is_off = left.sigma > UNEXPLAINED_SIGMA and (not causes or gain.explained_share < LEAST_SHARE)
+    in_bursts = left.burst_sigma > BURST_SIGMA and (not causes or gain.explained_share < BURST_SHARE)
+    if is_off or in_bursts or left.sigma > FAR_OFF_SIGMA:
+        names = (
+            f" The data are consistent with {', '.join(c.name for c in causes)}, but something else is in them too."
+            if causes
+            else ""
+        )
+        where = f" Most of it lies at {left.burst_at_s:.2f} s." if left.burst_sigma > 2.0 * max(left.sigma, 0.1) else ""
+        size = max(left.sigma, left.burst_sigma if in_bursts else 0.0)
+        return (
+            Verdict.UNEXPLAINED,
+            f"A structured error of {size:.2g} times the noise remains that no cause in the catalogue makes.{where}{names}",
+        )
+    if not causes:
+        return Verdict.NOTHING_SIGNIFICANT, "The four-parameter model reproduces the recording to within its noise."
+    tied = [c for c in causes if c.equivalent]
+    if tied:
+        return (
+            Verdict.NOT_DISTINGUISHABLE,
+            f"These data cannot tell apart: {'; '.join(' or '.join((c.name, *c.equivalent)) for c in tied)}.",
+        )
+    if left.sigma > 0.0:
+        return (
+            Verdict.EXPLAINED,
+            f"The named causes leave {left.sigma:.2g} times the noise, {1.0 - gain.explained_share:.1%} of the error power that there was to explain.",
+        )
+    return Verdict.EXPLAINED, "The named causes leave nothing above the noise."
+
+
+def _parameters(fit: Fit) -> dict[str, Quantity]:
+    out = {}
+    for name, key in zip(
+        NAMES[:4],
+        ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"),
+        strict=True,
+    ):
+        out[key] = Quantity(fit.machine.value(name), fit.std(name))
+    time_constant = fit.machine.value("magnetizing_inductance") / fit.machine.value("rotor_resistance")
+    covariance = fit.covariance()
+    spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
+    out["rotor_time_constant_s"] = Quantity(time_constant, float(time_constant * np.sqrt(max(spread, 0.0))))
+    if fit.machine.has_shaft and any(c.kind == "p" and c.index == AT["inertia"] for c in fit.columns):
+        out["inertia_kg_m2"] = Quantity(fit.machine.value("inertia"), fit.std("inertia"))
+    return out

@@ -1,0 +1,87 @@
+"""The extended model: numbers that `simulate` plays, and the same as a scenario for the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from commissioner.estimation.fit import Machine
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
+from commissioner.estimation.record import Record
+from commissioner.motor.circuit import Gamma, InverseGamma
+from commissioner.motor.nameplate import Nameplate
+from commissioner.running.causes import CATALOGUE
+from commissioner.running.search import Found
+
+FORMAT = "commissioner extended running model 1"
+
+
+def model_document(found: Found, record: Record) -> dict[str, Any]:
+    """What `model.json` holds. `numbers`: those of the machine that are not none; relative ones as in the chapter `running`."""
+    machine = found.fit.machine
+    values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
+    kept = {n: v for n, v in values.items() if v != 0.0 and (n in NAMES[:4] or n == "inertia" or v != DEFAULTS.get(n))}
+    return {
+        "format": FORMAT,
+        "kind": "running",
+        "nameplate": {k: v for k, v in asdict(record.plate).items() if v is not None},
+        "sample_period_s": record.period_s,
+        "numbers": kept,
+        "has_shaft": machine.has_shaft,
+        "effects": [one.cause for one in found.accepted],
+        "effect_numbers": {one.cause: list(one.numbers(with_spare=True)) for one in found.accepted},
+        "scenario": scenario(found, record),
+    }
+
+
+def scenario(found: Found, record: Record) -> dict[str, Any]:
+    """The simulator's document: Gamma circuit, mains of the plate, a start with two load steps, the causes' sizes."""
+    machine, scales, plate = found.fit.machine, record.scales, record.plate
+    values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
+    gamma = Gamma.from_inverse_gamma(InverseGamma(*(values[n] for n in NAMES[:4])))
+    inertia = (
+        values["inertia"]
+        if machine.has_shaft
+        else plate.inertia_kg_m2 or 0.5 * scales.torque_nm * scales.pole_pairs / scales.frequency_rad_per_s
+    )
+    effects = {
+        one.cause: entry(values, scales)
+        for one in found.accepted
+        if (entry := CATALOGUE[one.cause].scenario) is not None
+    }
+    return {
+        "kind": "running",
+        "nameplate": {k: v for k, v in asdict(plate).items() if v is not None and k != "inertia_kg_m2"},
+        "machine": {
+            "stator_resistance_ohm": gamma.stator_resistance_ohm, "rotor_resistance_ohm": gamma.rotor_resistance_ohm,
+            "leakage_inductance_h": gamma.leakage_inductance_h, "inductance_h": gamma.stator_inductance_h,
+            "inertia_kg_m2": inertia, "pole_pairs": plate.pole_pairs,
+        },
+        "supply": {"voltage_v": plate.rated_voltage_v, "frequency_hz": plate.rated_frequency_hz, "unbalance": 0.005, "fifth": 0.005},
+        "course": {
+            "duration_s": 3.0, "rate_hz": 1.0 / record.period_s, "constant_nm": 0.1 * scales.torque_nm,
+            "steps": [[1.0, 0.4 * scales.torque_nm], [2.0, 0.4 * scales.torque_nm]],
+        },
+        "sensors": {"current_noise_a": record.sigma_a[0], "voltage_noise_v": record.sigma_v},
+        "effects": effects,
+    }  # fmt: skip
+
+
+def machine_of(document: Mapping[str, Any], *, is_plain: bool) -> tuple[Machine, Scales, Nameplate]:
+    """The machine of a `model.json`. KeyError, ValueError, TypeError where it is none."""
+    if document.get("format") != FORMAT:
+        raise ValueError(f"format {document.get('format')!r}, expected {FORMAT!r}")
+    plate = Nameplate(**document["nameplate"])
+    from commissioner.estimation.record import scales_of
+
+    left_out = {n for names in document["effect_numbers"].values() for n in names} if is_plain else set()
+    theta = np.zeros(COUNT)
+    machine = Machine(theta, np.zeros((1, 10)), np.zeros((1, 2)), np.zeros((1, 2)), bool(document["has_shaft"]))
+    values = {**DEFAULTS, **{str(n): float(v) for n, v in document["numbers"].items() if n not in left_out}}
+    unknown = [n for n in values if n not in AT]
+    if unknown:
+        raise ValueError(f"number {unknown[0]!r} is not one of the machine's")
+    return machine.with_values(values), scales_of(plate), plate

@@ -1,0 +1,239 @@
+"""Four parameters and the inertia from recordings of a running motor: a direct start, load steps, several steady loads.
+
+With a speed column the electrical fit uses it, and inertia and load of the start follow from torque against speed. Without one
+the shaft is part of the fit (constant and fan load, from rest), up to the first load step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
+from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.record import STATES, Record, first_part, prepare
+from commissioner.motor.circuit import InverseGamma, Quantity, TModel, to_t_model
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording
+from commissioner.running.lack import Lack, lack_of_fit
+from commissioner.running.nominal import FOUR, with_shaft, with_speed
+
+Array = NDArray[np.float64]
+KEYS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+SPEED_STEP_S = 4e-3
+"""Between speeds that count as independent: the span over which they were smoothed."""
+AFTER_START_S = 0.15
+LEAST_OVER_NOISE = 0.3
+"""Of the noise, left by the four numbers, from which a remark sends the reader to `diagnose`."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """`bound`: smallest standard deviations that the noise allows (Cramer-Rao); those of `parameters` are widened by what is left."""
+
+    parameters: Mapping[str, Quantity]
+    bound: Mapping[str, float]
+    covariance: Array
+    inertia: Quantity | None
+    load: Mapping[str, float]
+    t_model: TModel
+    left: Lack
+    chi2: float
+    stator_flux_wb: float
+    record: Record
+    fit: Fit
+    remarks: tuple[str, ...]
+
+
+def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identified:
+    """DataRefused where the recordings cannot carry four parameters."""
+    record = prepare(recordings, plate)
+    if not record.has_speed and record.has_start:
+        record = _until_first_step(record)
+    problem = problem_of(record, 0.0)
+    fit = with_speed(problem) if record.has_speed else with_shaft(problem, smooth_load=record.has_start)
+    problem = with_noise_of(problem, fit.machine)
+    fit = refine(problem, fit.machine, fit.columns, most=20)
+    covariance = _of_four(fit)
+    if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
+        worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
+        raise DataRefused(
+            f"the recording says nothing about the {worst}", step="identify", value=float(np.sqrt(covariance.diagonal().max())),
+            limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque",
+        )  # fmt: skip
+    left = lack_of_fit(problem, fit.machine)
+    inertia, load = _shaft(problem, fit, covariance)
+    four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
+    absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
+    return Identified(
+        _parameters(four, covariance), _bounds(four, covariance / fit.scale), covariance, inertia, load, to_t_model(four, absolute), left,
+        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, fit),
+    )  # fmt: skip
+
+
+def _until_first_step(record: Record) -> Record:
+    """The start and what follows it, as long as the load is smooth."""
+    windows = []
+    for w in record.windows:
+        steps = np.flatnonzero(w.state == STATES.index("transient"))
+        after_start = (
+            steps[steps > np.flatnonzero(w.state == STATES.index("start")).max(initial=0) + 2]
+            if w.is_from_rest
+            else steps
+        )
+        quiet = round(0.1 / record.period_s)
+        later = after_start[
+            after_start > np.flatnonzero(w.state == STATES.index("steady")).min(initial=w.count) + quiet
+        ]
+        end = int(later[0]) - round(0.04 / record.period_s) if later.size else w.count
+        windows.append(first_part(w, max(end, round(0.2 / record.period_s))) if w.is_from_rest else w)
+    return replace(record, windows=tuple(windows))
+
+
+def _of_four(fit: Fit) -> Array:
+    """Covariance of the logarithms of R_s, R_R, L_sigma, L_M."""
+    own = [next(j for j, c in enumerate(fit.columns) if c.kind == "p" and c.index == AT[n]) for n in FOUR]
+    return fit.covariance()[np.ix_(own, own)]
+
+
+def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
+    out = {
+        k: Quantity(v, float(v * np.sqrt(covariance[j, j])))
+        for j, (k, v) in enumerate(zip(KEYS, four.as_tuple(), strict=True))
+    }
+    spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
+    t = four.rotor_time_constant_s
+    return {**out, "rotor_time_constant_s": Quantity(t, float(t * np.sqrt(max(spread, 0.0))))}
+
+
+def _bounds(four: InverseGamma, covariance: Array) -> dict[str, float]:
+    return {k: q.std for k, q in _parameters(four, covariance).items()}
+
+
+def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | None, dict[str, float]]:
+    """Inertia and load of a start: from the fit where the shaft is in it, else from torque against measured speed."""
+    record = problem.record
+    torque = record.scales.torque_nm
+    if not record.has_start:
+        return None, {}
+    if fit.machine.has_shaft:
+        load = {
+            "constant_nm": fit.machine.value("load_constant") * torque,
+            "fan_at_synchronous_nm": fit.machine.value("load_fan") * torque,
+        }
+        return Quantity(fit.machine.value("inertia"), fit.std("inertia")), load
+    own = _inertia(problem, fit.machine)
+    if own is None:
+        return None, {}
+    values, std = own
+    spread = 0.0
+    for step in np.linalg.cholesky(covariance + 1e-18 * np.eye(4)).T:
+        theta = fit.machine.theta.copy()
+        theta[: len(NAMES[:4])] += step
+        moved = _inertia(problem, replace(fit.machine, theta=theta))
+        spread += (moved[0][0] - values[0]) ** 2 if moved else 0.0
+    load = {"constant_nm": float(values[1]), "fan_at_synchronous_nm": float(values[2])}
+    return Quantity(float(values[0]), float(np.hypot(std, np.sqrt(spread)))), load
+
+
+def _inertia(problem: Problem, machine: Machine) -> tuple[Array, float] | None:
+    """(J, constant, fan) and the standard deviation of J from J w = J w0 + integral of (torque - constant - fan (w/w_s)^2)."""
+    record = problem.record
+    for w, (_, shaft) in zip(record.windows, simulate(problem, machine), strict=True):
+        if not w.is_from_rest:
+            continue
+        last = int(np.flatnonzero(w.state == STATES.index("start")).max(initial=0)) + round(
+            AFTER_START_S / problem.period
+        )
+        last = min(last, w.count)
+        pairs, h = record.scales.pole_pairs, problem.period
+        speed = w.speed[: 2 * last - 1 : 2, 0] / pairs
+        share = speed * pairs / record.scales.frequency_rad_per_s
+        sums = [
+            np.concatenate([[0.0], np.cumsum(0.5 * h * (x[1:] + x[:-1]))])
+            for x in (shaft[:last, 1], np.sign(share) * (np.abs(share) > 0.01), share * np.abs(share))
+        ]
+        every = max(round(SPEED_STEP_S / h), 1)
+        # w = (1/J) I_torque - (c/J) I_constant - (f/J) I_fan + w0; the ripple of an encoder is fitted beside it
+        angle = np.cumsum(speed) * h
+        design = np.stack(
+            [sums[0], -sums[1], -sums[2], np.ones(last), np.cos(angle) * share, np.sin(angle) * share], axis=1
+        )[every:-every:every]
+        target = speed[every:-every:every]
+        if target.size < 20:
+            return None
+        solved, *_ = np.linalg.lstsq(design, target, rcond=None)
+        rest = target - design @ solved
+        inverse = np.linalg.pinv(design.T @ design) * float(rest @ rest) / (target.size - 6)
+        j = 1.0 / solved[0]
+        return np.array([j, solved[1] * j, solved[2] * j]), float(j * j * np.sqrt(inverse[0, 0]))
+    return None
+
+
+def _flux(record: Record) -> float:
+    """Peak stator flux at which the magnetizing inductance holds: voltage over frequency of the last steady stretch."""
+    w = record.windows[-1]
+    u = w.voltage[::2, 0] + 1j * w.voltage[::2, 1]
+    tail = u[-max(round(0.1 / record.period_s), 10) :]
+    turn = float(np.abs(np.angle(np.sum(np.conj(tail[:-1]) * tail[1:])))) / record.period_s
+    return float(np.median(np.abs(tail)) / max(turn, 1e-9))
+
+
+def _remarks(record: Record, left: Lack, fit: Fit) -> tuple[str, ...]:
+    out = list(record.remarks)
+    worst = max(left.sigma, left.burst_sigma)
+    if worst > LEAST_OVER_NOISE:
+        out.append(
+            f"The four numbers leave {worst:.2g} times the noise: their intervals are widened, and `commissioner diagnose` says what is missing (saturation, deep bars, sensors)."
+        )
+    if not record.has_speed and record.has_start:
+        out.append(
+            "No speed column: inertia and load come from the run-up, a constant torque and one that grows with the square of speed."
+        )
+    if not record.has_start:
+        out.append("No start: the inertia is not in these data, and R_s is the least certain of the four.")
+    return tuple(out)
+
+
+def as_document(seen: Identified) -> dict[str, object]:
+    """The contract's keys, and the inertia, the bound and the covariance beside them."""
+    flux = seen.stator_flux_wb
+    at_flux = ("magnetizing_inductance_h", "rotor_time_constant_s")
+    t = seen.t_model
+    seconds = {
+        name: float(sum((w.state == k).sum() for w in seen.record.windows)) * seen.record.period_s
+        for k, name in enumerate(STATES)
+    }
+    return {
+        "outcome": "identified",
+        "reason": "Fitted to a running motor's currents and voltages.",
+        "kind": "running",
+        "convention": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
+        "estimator": "least squares on a running machine",
+        "parameters": {k: {"value": q.value, "std": q.std} | ({"at_stator_flux_wb": flux} if k in at_flux else {}) for k, q in seen.parameters.items()},
+        "inertia_kg_m2": None if seen.inertia is None else {"value": seen.inertia.value, "std": seen.inertia.std},
+        "load": dict(seen.load),
+        "bound_std": dict(seen.bound),
+        "covariance": {"of": [f"log {k}" for k in KEYS], "matrix": seen.covariance.tolist()},
+        "holds_for_stator_flux_wb": flux,
+        "t_model": {
+            "stator_resistance_ohm": _measured(t.stator_resistance_ohm), "rotor_resistance_ohm": _measured(t.rotor_resistance_ohm),
+            "stator_leakage_h": _measured(t.stator_leakage_h), "rotor_leakage_h": _measured(t.rotor_leakage_h),
+            "magnetizing_inductance_h": _measured(t.magnetizing_inductance_h), "assumption": t.assumption,
+        },
+        "residual_over_noise": float(np.sqrt(seen.chi2)),
+        "left_over_noise": seen.left.sigma,
+        "speed": "measured" if seen.record.has_speed else "from the shaft",
+        "seconds": {k: v for k, v in seconds.items() if v},
+        "duration_s": float(sum(w.count for w in seen.record.windows)) * seen.record.period_s,
+        "remarks": list(seen.remarks),
+        "written": [],
+    }  # fmt: skip
+
+
+def _measured(q: Quantity) -> dict[str, float]:
+    return {"value": q.value, "std": q.std}

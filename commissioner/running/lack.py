@@ -1,0 +1,63 @@
+"""What is left after the causes, over the record: in all, in bursts, by state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.estimation.fit import Machine, Problem, residuals, simulate
+from commissioner.estimation.record import BLOCK_S, STATES
+
+Array = NDArray[np.float64]
+TRUSTED = 1.06
+"""Chi-square a sample up to which nothing is left: the noise's own size is known to three hundredths."""
+BURST = 7.0
+"""Standard deviations of a block's chi-square that chance does not reach in thousands of blocks."""
+
+
+@dataclass(frozen=True)
+class Lack:
+    """In units of the noise: of the whole record, and of its worst 20 ms; `by_state` likewise."""
+
+    sigma: float
+    burst_sigma: float
+    burst_at_s: float
+    by_state: Mapping[str, float]
+
+
+def lack_of_fit(problem: Problem, machine: Machine) -> Lack:
+    """From the whitened residual of the whole record, held-out part included."""
+    parts = residuals(problem, machine)
+    block = max(round(BLOCK_S / problem.period), 8)
+    worst, at, total, count = 0.0, 0.0, 0.0, 0
+    sums = dict.fromkeys(STATES, 0.0)
+    counts = dict.fromkeys(STATES, 0)
+    for w, rest in zip(problem.record.windows, parts, strict=True):
+        square = np.sum(rest**2, axis=1)
+        width = rest.shape[1]
+        total, count = total + float(square.sum()), count + rest.size
+        for k, name in enumerate(STATES):
+            chosen = w.state == k
+            sums[name] += float(square[chosen].sum())
+            counts[name] += int(chosen.sum()) * width
+        whole = square[: square.size // block * block].reshape(-1, block).mean(axis=1) / width
+        limit = 1.0 + BURST * np.sqrt(2.0 / (block * width))
+        if whole.size and whole.max() - limit > worst:
+            worst, at = float(whole.max() - limit), float(np.argmax(whole) * block * problem.period)
+    return Lack(
+        float(np.sqrt(max(total / max(count, 1) - TRUSTED, 0.0))), float(np.sqrt(worst)), at,
+        {n: float(np.sqrt(max(sums[n] / counts[n] - 1.0, 0.0))) for n in STATES if counts[n] > 2 * block},
+    )  # fmt: skip
+
+
+def rms_errors(problem: Problem, machine: Machine) -> tuple[float, float]:
+    """Of the simulated current vector, A, of the fitted part and of the held-out one."""
+    fitted, held = [], []
+    for (run, _), w, u in zip(simulate(problem, machine), problem.record.windows, problem.until, strict=True):
+        error = (w.current - run)[:, :2]
+        fitted.append(error[:u])
+        held.append(error[u:])
+    return tuple(float(np.sqrt(np.mean(np.concatenate(x) ** 2))) if any(map(len, x)) else 0.0 for x in (fitted, held))  # type: ignore[return-value]

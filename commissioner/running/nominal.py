@@ -1,0 +1,103 @@
+"""The four-parameter machine fitted to a running recording: with the measured speed, or with a shaft of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.estimation.fit import Fit, Machine, Problem, columns_of, plain_machine, refine, with_noise_of
+from commissioner.estimation.numbers import NAMES
+from commissioner.estimation.record import Record
+from commissioner.motor.nameplate import prior
+
+PREFIXES_S = (0.04, 0.1, 0.25, 0.5, 0.95)
+"""A fit with unknown shaft grows with these: from all at once 20 of 60 ended in a wrong valley, so none of 60."""
+FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
+"""What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
+RUN_UP_TORQUE = 2.0
+"""Mean accelerating torque of a start, of rated."""
+FOUR = NAMES[:4]
+STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
+"""Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
+WRONG_VALLEY = 300.0
+"""Chi-square a sample above which another start is tried: strong causes leave 20 to 100, wrong valleys thousands."""
+LEAST_CHI2 = 1e4
+"""Chi-square a sample beyond which nothing has been fitted."""
+
+
+def nominal(problem: Problem) -> tuple[Problem, Fit]:
+    """The problem with noise that went through the machine, and the fit. DataRefused where no machine fits at all."""
+    record = problem.record
+    fit = with_speed(problem) if record.has_speed else with_shaft(problem)
+    problem = with_noise_of(problem, fit.machine)
+    fit = refine(problem, fit.machine, fit.columns)
+    four = prior(record.plate).typical.as_tuple()
+    off = [abs(np.log(fit.machine.value(n) / v)) for n, v in zip(FOUR, four, strict=True)]
+    if fit.chi2 / fit.count > LEAST_CHI2 * 100 or max(off) > np.log(30.0):
+        worst = FOUR[int(np.argmax(off))]
+        raise DataRefused(
+            f"no machine near the plate's values makes these currents: {worst.replace('_', ' ')} would be {fit.machine.value(worst):.3g} (SI)",
+            step="fit of four parameters", value=fit.machine.value(worst), limit=f"within 30 times {dict(zip(FOUR, four, strict=True))[worst]:.3g}",
+            remedy="check the scale and the phase order of currents and voltages, and the plate",
+        )  # fmt: skip
+    return problem, fit
+
+
+def with_speed(problem: Problem) -> Fit:
+    """The measured speed is an input; the encoder's ripple at shaft frequency is always free."""
+    record = problem.record
+    numbers = (*FOUR, "speed_ripple_cos", "speed_ripple_sin")
+    typical = np.array(prior(record.plate).typical.as_tuple())
+    best: Fit | None = None
+    for factors in STARTS:
+        machine = plain_machine((typical * factors).tolist(), record)
+        for seconds in (0.1, 0.4):
+            machine = _settled(problem.cut(seconds), machine, numbers)
+        fit = refine(problem, machine, columns_of(numbers, record, machine), most=25)
+        best = fit if best is None or fit.chi2 < best.chi2 else best
+        if best.chi2 < WRONG_VALLEY * best.count:
+            break
+    assert best is not None
+    return best
+
+
+def _settled(part: Problem, machine: Machine, numbers: tuple[str, ...]) -> Machine:
+    record = part.record
+    return refine(part, machine, columns_of(numbers, record, machine), most=15, tolerance=5.0).machine
+
+
+def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
+    """Speed from the shaft: inertia (from a start) and load are fitted too, first to little of the recording, then to more.
+
+    `smooth_load`: constant and fan only, as a start from rest has them. Else knots, denser around load steps.
+    """
+    record = problem.record
+    torque, w = record.scales.torque_nm, record.scales.frequency_rad_per_s / record.scales.pole_pairs
+    inertia = record.plate.inertia_kg_m2 or RUN_UP_TORQUE * torque * _run_up_s(record) / w
+    machine = plain_machine(prior(record.plate).typical.as_tuple(), record, inertia=inertia, has_shaft=True)
+    numbers: tuple[str, ...] = FOUR
+    if record.has_start:
+        numbers = (*FOUR, "inertia")
+        for seconds in PREFIXES_S:
+            if seconds < record.windows[0].time_s[-1]:
+                own = (
+                    FOUR if seconds < 0.05 else (*numbers, *(name for name, least in FREED_FROM_S if seconds >= least))
+                )
+                machine = _settled(problem.cut(seconds), machine, own)
+    if smooth_load:
+        numbers = (*numbers, "load_constant", "load_fan", "load_ripple_cos", "load_ripple_sin")
+        return refine(problem, machine, columns_of(numbers, record, machine), most=25)
+    return refine(
+        problem,
+        machine,
+        columns_of((*numbers, "load_ripple_cos", "load_ripple_sin"), record, machine, knots=True),
+        most=25,
+    )
+
+
+def _run_up_s(record: Record) -> float:
+    """How long the current is that of a start, s."""
+    for w in record.windows:
+        if w.is_from_rest:
+            return max(float(np.sum(w.state == 1)) * record.period_s, 0.05)
+    return 0.3

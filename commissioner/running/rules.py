@@ -1,0 +1,33 @@
+"""The decisions of the search, each with its value and what it decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Chi-squares are those of whitened residuals, divided by what is left a sample where that is above 1."""
+
+    least_gain: float = 36.0
+    """A cause gains at least so much: six standard deviations. 30 nulls had no score above 25."""
+    each_further_number: float = 10.0
+    """And so much more for every further number of its form."""
+    least_share: float = 0.01
+    """Of the first cause's gain; less is what the first one's law leaves."""
+    hold_out_loss: float = 9.0
+    """Chi-square by which the held-out part may get worse (and a hundredth of the gain)."""
+    tie: float = 10.0
+    """Chi-square below which two names fit alike."""
+    tie_share: float = 0.004
+    """Of the cause's gain: a closer rival is a tie although noise alone would part them (models are not that exact)."""
+    least_cosine: float = 0.85
+    """Canonical correlation from which a rival is tried in a cause's place."""
+    tried: int = 5
+    """Candidates refitted in each round."""
+    most_causes: int = 6
+    material_sigma: float = 0.03
+    """Strength over noise below which a cause is not named."""
+
+
+RULES = Rules()

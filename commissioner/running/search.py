@@ -1,0 +1,318 @@
+"""The search: nominal fit, noise through the machine, then causes forward, exchanged, backward, and whoever fits alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.estimation.fit import (
+    Column,
+    Fit,
+    Machine,
+    Problem,
+    jacobian,
+    refine,
+    refreshed,
+    with_noise_of,
+)
+from commissioner.estimation.numbers import AT, NAMES
+from commissioner.running.causes import CATALOGUE, always_tied
+from commissioner.running.causes.cause import Form
+from commissioner.running.nominal import nominal
+from commissioner.running.rules import RULES, Rules
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A cause in one of its forms."""
+
+    cause: str
+    form: Form
+
+    def numbers(self, *, with_spare: bool) -> tuple[str, ...]:
+        """Those that are fitted."""
+        return (*self.form.numbers, *(self.form.spare if with_spare else ()))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One decision of the search: `screened`, `accepted`, `refused`, `exchanged`, `dropped`."""
+
+    what: str
+    cause: str
+    form: str
+    gain: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search leaves: nominal and final fit, the causes taken in, gain of each, rivals (chi-square lost by taking them instead)."""
+
+    problem: Problem
+    nominal: Fit
+    fit: Fit
+    accepted: tuple[Named, ...]
+    gain: dict[str, float]
+    rivals: dict[str, dict[str, float]]
+    limits: dict[str, float]
+    steps: tuple[Step, ...]
+    is_complete: bool
+
+
+@dataclass
+class Search:
+    """Fits with sets of causes; remembers the decisions."""
+
+    problem: Problem
+    base: Fit
+    excluded: frozenset[str]
+    rules: Rules
+    observe: Callable[[Step], None]
+    go_on: Callable[[], bool]
+    steps: list[Step] = field(default_factory=list)
+
+    def say(self, step: Step) -> None:
+        """Remember, and tell who listens."""
+        self.steps.append(step)
+        self.observe(step)
+
+    def candidates(self, without: Iterable[str]) -> list[Named]:
+        """Every form that this recording could show."""
+        record, known = self.problem.record, {*without, *self.excluded}
+        return [
+            Named(c.name, form) for c in CATALOGUE.values() if c.name not in known and c.needs(record) for form in c.forms
+        ]  # fmt: skip
+
+    def columns(self, causes: Sequence[Named]) -> tuple[Column, ...]:
+        """All that is free with these causes."""
+        own = [Column("p", AT[n]) for c in causes for n in c.numbers(with_spare=True)]
+        return (*self.base.columns, *own)
+
+    def fitted(self, start: Machine, causes: Sequence[Named], *, first: Array | None = None) -> Fit:
+        """With these causes free; `first`: Jacobian for the first step, without spare numbers then."""
+        if first is not None:
+            own = [Column("p", AT[n]) for c in causes[-1:] for n in c.form.numbers]
+            before = self.columns(causes[:-1])
+            start = refine(self.problem, start, (*before, *own), most=1, first_jacobian=first, is_final=False).machine
+        start = self._inside(start, causes)
+        return refine(self.problem, start, self.columns(causes), most=10, is_final=False)
+
+    def _inside(self, machine: Machine, causes: Sequence[Named]) -> Machine:
+        """A first step that left what a sign allows begins from little instead."""
+        for one in causes:
+            first = one.form.numbers[0]
+            if one.form.spare and machine.value(first) <= 0.0:
+                machine = machine.with_values({first: 0.02})
+        return machine
+
+    def is_plausible(self, fit: Fit, causes: Iterable[Named]) -> bool:
+        """Whether every cause has a size that physics allows."""
+        values = dict(zip(NAMES, fit.machine.physical(), strict=True))
+        return all(CATALOGUE[c.cause].is_plausible(values, self.problem.record.scales) for c in causes)
+
+
+def search(
+    problem: Problem,
+    *,
+    excluded: Sequence[str] = (),
+    rules: Rules = RULES,
+    observe: Callable[[Step], None] = lambda _: None,
+    go_on: Callable[[], bool] = lambda: True,
+) -> Found:
+    """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted."""
+    problem, base = nominal(problem)
+    seeking = Search(problem, base, frozenset(excluded), rules, observe, go_on)
+    fit, accepted, is_complete = base, (), True
+    for round_ in range(rules.most_causes):
+        if not go_on():
+            is_complete = False
+            break
+        taken = _forward(seeking, fit, accepted)
+        if taken is None:
+            break
+        fit, accepted = taken
+        if round_ == 0:  # weights of a machine that is nearly right
+            seeking.problem = with_noise_of(replace(problem), fit.machine)
+            seeking.base = base = refine(seeking.problem, base.machine, base.columns)
+            fit = refine(seeking.problem, fit.machine, fit.columns)
+        fit, accepted = _exchanged(seeking, fit, accepted)
+    fit, accepted = _backward(seeking, fit, accepted)
+    gain, rivals = _judged(seeking, fit, accepted)
+    return Found(
+        seeking.problem,
+        seeking.base,
+        fit,
+        accepted,
+        gain,
+        rivals,
+        _limits(seeking, fit, accepted),
+        tuple(seeking.steps),
+        is_complete,
+    )
+
+
+def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[float, Named, Array]]:
+    """Linear gain of each form beside all that is free, best first, with its own sensitivities."""
+    columns = [Column("p", AT[n]) for c in causes for n in c.form.numbers]
+    if not columns:
+        return []
+    all_own = jacobian(seeking.problem, fit.machine, columns)
+    basis, _ = np.linalg.qr(fit.jacobian.T)
+    rest = fit.rest - basis @ (basis.T @ fit.rest)
+    out, at = [], 0
+    for one in causes:
+        size = len(one.form.numbers)
+        own = all_own[at : at + size]
+        at += size
+        apart = own - (own @ basis) @ basis.T
+        gram = apart @ apart.T + np.diag(1e-9 * np.maximum(np.sum(own * own, axis=1), 1e-30))
+        best = np.linalg.solve(gram, apart @ rest)
+        values = dict(zip(NAMES, fit.machine.physical(), strict=True)) | dict(zip(one.form.numbers, best, strict=True))
+        gain = float(best @ (apart @ rest))
+        if size == 1 and not CATALOGUE[one.cause].is_plausible(values, seeking.problem.record.scales):
+            lowest = CATALOGUE[one.cause].range[0]
+            gain = 0.0 if lowest == 0.0 and best[0] < 0.0 else gain
+        out.append((gain, one, own))
+    return sorted(out, key=lambda item: -item[0])
+
+
+def _needed(seeking: Search, one: Named) -> float:
+    rules = seeking.rules
+    return rules.least_gain + rules.each_further_number * (len(one.numbers(with_spare=True)) - 1)
+
+
+def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit, tuple[Named, ...]] | None:
+    """The cause that gains most and holds on what was kept aside; None where none does."""
+    rules = seeking.rules
+    screened = _screen(seeking, fit, seeking.candidates(c.cause for c in accepted))
+    tried: list[tuple[float, Named, Fit]] = []
+    for gain, one, own in screened[: rules.tried]:
+        seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
+        if gain / fit.scale < 0.6 * rules.least_gain:
+            continue
+        first = np.concatenate([fit.jacobian, own])
+        other = seeking.fitted(fit.machine, (*accepted, one), first=first)
+        tried.append((fit.chi2 - other.chi2, one, other))
+    tried.sort(key=lambda item: -item[0])
+    first_gain = max(seeking.base.chi2 - fit.chi2, 0.0)
+    for gain, one, other in tried:
+        why = _refusal(seeking, fit, other, (*accepted, one), gain, first_gain)
+        if not why:
+            seeking.say(Step("accepted", one.cause, one.form.name, gain / other.scale))
+            return refreshed(seeking.problem, other), (*accepted, one)
+        seeking.say(Step("refused", one.cause, one.form.name, gain / other.scale, why))
+    return None
+
+
+def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gain: float, first_gain: float) -> str:
+    """Why the last of these causes is not taken in; empty where it is."""
+    rules = seeking.rules
+    if gain / other.scale < _needed(seeking, causes[-1]):
+        return "gains too little"
+    if gain < rules.least_share * first_gain:
+        return "gains less than what the first cause's law leaves"
+    if np.sqrt(gain / fit.count) < rules.material_sigma:
+        return "too small to matter"
+    if not seeking.is_plausible(other, causes):
+        return "its size is one that physics does not allow"
+    worse = other.held - fit.held
+    if worse / max(fit.held / max(fit.held_count, 1), 1.0) > rules.hold_out_loss + 0.01 * gain:
+        return "what was held out gets worse"
+    return ""
+
+
+def _exchanged(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]]:
+    """Each cause against whoever looks alike: the better one stays."""
+    for k, one in enumerate(accepted[:-1]):  # the last one has just won against all
+        others = tuple(c for j, c in enumerate(accepted) if j != k)
+        for lost, rival, other in _rivals(seeking, fit, accepted, k, most=2):
+            if lost < -seeking.rules.tie * other.scale and seeking.is_plausible(other, (*others, rival)):
+                seeking.say(Step("exchanged", one.cause, rival.form.name, -lost / other.scale, rival.cause))
+                return refreshed(seeking.problem, other), (*others, rival)
+    return fit, accepted
+
+
+def _backward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]]:
+    """Without each cause that the others make needless."""
+    for one in accepted if len(accepted) > 1 else ():
+        others = tuple(c for c in accepted if c != one)
+        less = seeking.fitted(_without(fit.machine, one), others)
+        if (less.chi2 - fit.chi2) / fit.scale < _needed(seeking, one):
+            seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale))
+            return _backward(seeking, refreshed(seeking.problem, less), others)
+    return fit, accepted
+
+
+def _without(machine: Machine, one: Named) -> Machine:
+    return machine.with_values(dict.fromkeys(one.form.numbers, 0.0))
+
+
+def _rivals(seeking: Search, fit: Fit, accepted: Sequence[Named], k: int, most: int) -> list[tuple[float, Named, Fit]]:
+    """Fits with cause k replaced by those that look alike: (chi-square lost, rival, fit)."""
+    one, names = accepted[k], {c.cause for c in accepted}
+    own_names = set(one.numbers(with_spare=True))
+    own = np.array([j for j, c in enumerate(fit.columns) if c.kind == "p" and NAMES[c.index] in own_names])
+    kept = np.array([j for j in range(len(fit.columns)) if j not in set(own.tolist())])
+    basis, _ = np.linalg.qr(fit.jacobian[kept].T)
+    mine = fit.jacobian[own] - (fit.jacobian[own] @ basis) @ basis.T
+    candidates = [c for c in seeking.candidates(names) if c.cause not in always_tied(one.cause)]
+    candidates += [Named(one.cause, f) for f in CATALOGUE[one.cause].forms if f != one.form]
+    columns = [Column("p", AT[n]) for c in candidates for n in c.form.numbers]
+    theirs = jacobian(seeking.problem, fit.machine, columns)
+    theirs = theirs - (theirs @ basis) @ basis.T
+    alike, at = [], 0
+    for c in candidates:
+        size = len(c.form.numbers)
+        alike.append((_canonical(mine, theirs[at : at + size]), c))
+        at += size
+    alike.sort(key=lambda item: -item[0])
+    out = []
+    others = tuple(c for j, c in enumerate(accepted) if j != k)
+    bare = _without(fit.machine, one)
+    for cosine, rival in alike[:most]:
+        if cosine < seeking.rules.least_cosine:
+            break
+        other = seeking.fitted(seeking.fitted(bare, others).machine, (*others, rival))
+        out.append((other.chi2 - fit.chi2, rival, other))
+    return out
+
+
+def _canonical(a: Array, b: Array) -> float:
+    qa, qb = np.linalg.qr(a.T)[0], np.linalg.qr(b.T)[0]
+    return float(np.linalg.svd(qa.T @ qb, compute_uv=False).max(initial=0.0))
+
+
+def _judged(
+    seeking: Search, fit: Fit, accepted: Sequence[Named]
+) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Of each cause: chi-square that comes back without it, and what each rival in its place loses."""
+    gain, rivals = {}, {}
+    for k, one in enumerate(accepted):
+        others = tuple(c for c in accepted if c != one)
+        gain[one.cause] = max(seeking.fitted(_without(fit.machine, one), others).chi2 - fit.chi2, 0.0)
+        rivals[one.cause] = {}
+        for lost, rival, other in _rivals(seeking, fit, accepted, k, most=4):
+            if rival.cause != one.cause and seeking.is_plausible(other, (*others, rival)):
+                known = rivals[one.cause].get(rival.cause, np.inf)
+                rivals[one.cause][rival.cause] = min(known, max(lost, 0.0))
+    return gain, rivals
+
+
+def _limits(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> dict[str, float]:
+    """Six standard deviations of each cause that was not found, in its first number's unit, beside all that was."""
+    basis, _ = np.linalg.qr(fit.jacobian.T)
+    out: dict[str, float] = {}
+    causes = seeking.candidates(c.cause for c in accepted)
+    columns = [Column("p", AT[c.form.numbers[0]]) for c in causes]
+    own = jacobian(seeking.problem, fit.machine, columns)
+    apart = own - (own @ basis) @ basis.T
+    for one, x in zip(causes, apart, strict=True):
+        limit = 6.0 * np.sqrt(fit.scale) / max(float(np.linalg.norm(x)), 1e-30)
+        out[one.cause] = min(out.get(one.cause, np.inf), limit)
+    return out

@@ -1,0 +1,56 @@
+"""One recording looked at, by the verb the study names: the same operations as on the command line."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from commissioner.errors import CommissionerError
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.study.specification import Case
+
+
+def looked_at(case: Case) -> dict[str, Any]:
+    """The row of one file. One that is refused is a row that says why."""
+    began = time.process_time()
+    row: dict[str, Any] = {"case": case.number, "file": Path(case.file).name, "outcome": "", "reason": ""}
+    try:
+        row |= {"identify": _identified, "diagnose": _diagnosed, "monitor": _monitored}[case.kind](Path(case.file))
+    except CommissionerError as error:
+        row |= {"outcome": error.outcome, "reason": error.what}
+    return row | {"cpu_s": time.process_time() - began}
+
+
+def _identified(path: Path) -> dict[str, Any]:
+    from commissioner.operations.identify import IdentifyRequest, identify
+
+    document: Any = identify(IdentifyRequest((path,))).document
+    told = {"outcome": document["outcome"], "reason": document["reason"]}
+    for name in PARAMETERS:
+        measured = (document.get("parameters") or {}).get(name, {})
+        told |= {f"{name}_value": measured.get("value"), f"{name}_std": measured.get("std")}
+    return told
+
+
+def _diagnosed(path: Path) -> dict[str, Any]:
+    from commissioner.operations.diagnose import DiagnoseRequest, diagnose
+
+    document: Any = diagnose(DiagnoseRequest((path,))).document
+    causes = " ".join(cause["name"] for cause in document["causes"])
+    return {
+        "outcome": document["verdict"],
+        "reason": document["reason"],
+        "causes": causes,
+        "held_out": document["gain"]["held_out"],
+    }
+
+
+def _monitored(path: Path) -> dict[str, Any]:
+    from commissioner.operations.monitor import MonitorRequest, monitor
+
+    document: Any = monitor(MonitorRequest(path)).document
+    return {
+        "outcome": "monitored", "mean_speed_rad_per_s": document["mean_speed_rad_per_s"],
+        "mean_torque_nm": document["mean_torque_nm"],
+    }  # fmt: skip

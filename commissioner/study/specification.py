@@ -1,0 +1,109 @@
+"""The study file: strict TOML in, the cases out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from commissioner.errors import ConfigurationError
+from commissioner.settings import read_toml
+
+MOST_CASES = 1_000_000
+Names = list[str] | Literal["all"]
+
+
+class Specification(BaseModel):
+    """`study FILE.toml`; keys and their meaning: contracts of the product, Campaigns."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Literal["commission", "identify", "diagnose", "monitor"]
+    runs: Annotated[int, Field(ge=1, le=MOST_CASES, description="number of commissionings, 1 ... 1e6")] = 1
+    motors: Annotated[list[str], Field(min_length=1)] | Literal["all"] = "all"
+    spread: Annotated[float, Field(ge=0, le=0.5, description="relative variation of the machines, 0 ... 0.5")] = 0.0
+    effects: list[str] | Literal["none", "any"] = "none"
+    noise_a: Annotated[float, Field(ge=0, le=100, description="amperes rms, 0 ... 100")] | None = None
+    links: Literal["memory", "tcp"] = "memory"
+    faults: list[str] = []
+    axes_deg: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=12)] | None = (
+        None
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    files: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row to be: everything that decides it."""
+
+    number: int
+    seed: int
+    kind: str
+    motor: str
+    spread: float
+    effects: tuple[str, ...]
+    noise_a: float | None
+    links: str
+    faults: tuple[str, ...]
+    axes_deg: tuple[float, ...]
+    file: str = ""
+
+
+def load_study(path: Path) -> Specification:
+    """ConfigurationError with file, key, value and what would be right."""
+    try:
+        return Specification.model_validate(read_toml(path))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        field = Specification.model_fields.get(str(first["loc"][0])) if first["loc"] else None
+        wanted = field.description if field is not None and field.description else str(first["msg"])
+        if first["type"] == "extra_forbidden":
+            wanted = "no such key; known keys: " + ", ".join(sorted(Specification.model_fields))
+        raise ConfigurationError(file=str(path), key=key, value=_shown(first), expected=wanted) from error
+
+
+def _shown(problem: Any) -> object:
+    return None if problem["type"] == "missing" else problem["input"]
+
+
+def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Case]:
+    """In order; the same file gives the same cases. ConfigurationError: an unknown motor, or no file fits."""
+    if study.kind != "commission":
+        return _of_files(study, path)
+    names = list(motors) if study.motors == "all" else list(study.motors)
+    for name in names:
+        if name not in motors and not Path(name).is_file():
+            raise ConfigurationError(
+                file=str(path), key="motors", value=name, expected=f"a file, or one of: {', '.join(motors)}"
+            )
+    effects = (study.effects,) if isinstance(study.effects, str) else tuple(study.effects)
+    seeds = np.random.default_rng(study.seed).integers(0, 2**31, study.runs)
+    return [
+        Case(
+            number, int(seed), study.kind, names[number % len(names)], study.spread, effects, study.noise_a, study.links,
+            tuple(study.faults), tuple(study.axes_deg or ()),
+        )
+        for number, seed in enumerate(seeds)
+    ]  # fmt: skip
+
+
+def _of_files(study: Specification, path: Path) -> list[Case]:
+    is_pattern = study.files and not Path(study.files).is_absolute()
+    files = sorted(path.parent.glob(study.files)) if is_pattern else []
+    if not files:
+        raise ConfigurationError(
+            file=str(path),
+            key="files",
+            value=study.files or None,
+            expected="a pattern, relative to the study file, that fits recordings",
+        )
+    return [
+        Case(number, study.seed, study.kind, "", 0.0, (), None, "file", (), (), str(name))
+        for number, name in enumerate(files)
+    ]

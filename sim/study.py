@@ -1,0 +1,123 @@
+"""Motors for campaigns: a row of the machine table on a drive of its size, everything moved by a seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.physics.effects import CATALOGUE
+from sim.scenario import Scenario, ScenarioError, build, read_document, table_machine, table_rows
+from sim.wire.in_process import Station
+
+LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
+MOST_EFFECTS = 3
+NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+
+
+class Drawn:
+    """One motor behind its drive, and the truth about it."""
+
+    def __init__(self, motor: str, scenario: Scenario, seed: int, faults: Sequence[str]) -> None:
+        self.motor, self.scenario, self.document = motor, scenario, scenario.document
+        self.station = Station(scenario, seed, tuple(faults))
+        self.effects = [effect.name for effect in scenario.plant.effects]
+        plate = scenario.plant.nameplate
+        self.plate: Mapping[str, Any] = {
+            "rated_power_w": plate.rated_power_w, "rated_voltage_v": plate.rated_voltage_v,
+            "rated_frequency_hz": plate.rated_frequency_hz, "rated_current_a": plate.rated_current_a,
+            "rated_speed_rpm": plate.rated_speed_rpm, "power_factor": plate.power_factor, "pole_pairs": plate.pole_pairs,
+            "connection": "star",
+        }  # fmt: skip
+
+    @property
+    def highest_flux_wb(self) -> float:
+        return self.station.highest_flux_wb
+
+    def parameters_at(self, stator_flux_wb: float) -> Mapping[str, float]:
+        """Secant inverse-Gamma values at a peak stator flux; the stator's resistance with that of the devices."""
+        truth = self.station.truth()
+        rows = truth["inverse_gamma"]["over_flux"]
+        flux = [row["stator_flux_wb"] for row in rows]
+        values = {
+            name: float(np.interp(stator_flux_wb, flux, [row["secant"][name] for row in rows])) for name in NAMES[1:]
+        }
+        return {NAMES[0]: float(truth["apparent_stator_resistance_ohm"]), **values}
+
+
+class Factory:
+    """The packaged simulator, by the entry point `commissioner.simulators`."""
+
+    def motors(self) -> list[str]:
+        """Rows of the machine table that a low-voltage drive of up to 75 kW would feed."""
+        low, high = VOLTAGES
+        return [r["id"] for r in table_rows() if low <= float(r["V_LL"]) <= high and float(r["P_kW"]) <= LARGEST_KW]
+
+    def draw(
+        self,
+        motor: str,
+        seed: int,
+        *,
+        spread: float,
+        effects: Sequence[str],
+        noise_a: float | None,
+        faults: Sequence[str],
+    ) -> Drawn:
+        """ValueError where the motor or an effect is unknown, or the plant cannot be."""
+        random = np.random.default_rng([seed, 5])
+        try:
+            document = read_document(motor) if Path(motor).is_file() else _document(motor, random, spread, noise_a)
+            plate = document.get("nameplate", {})
+            document["effects"] = {**document.get("effects", {}), **_effects(effects, plate, random)}
+            return Drawn(motor, build(document, motor), seed, faults)
+        except ScenarioError as error:
+            raise ValueError(str(error)) from error
+
+
+def _document(motor: str, random: np.random.Generator, spread: float, noise_a: float | None) -> dict[str, Any]:
+    saturation = float(random.uniform(0.2, 0.5))
+    plate, machine = table_machine(motor, saturation)
+    machine = {name: value * float(random.uniform(1.0 - spread, 1.0 + spread)) for name, value in machine.items()}
+    peak_a = math.sqrt(2.0) * float(plate["rated_current_a"])
+    return {
+        "name": motor,
+        "nameplate": plate,
+        "machine": {**machine, "saturation_at_rated_flux": saturation, "saturation_order": 7.0, "saturation_shape": "power"},
+        "power_stage": {
+            "dead_time_s": float(random.uniform(1e-6, 3.5e-6)), "dead_time_knee_a": 0.024 * peak_a, "threshold_v": 1.2,
+            "threshold_knee_a": 0.016 * peak_a, "slope_ohm": 0.02 * 7.07 / peak_a,
+        },
+        "sensors": {
+            "full_scale_a": 2.2 * peak_a, "noise_a": 0.0014 * peak_a if noise_a is None else noise_a,
+            "offset_a": [float(v) for v in random.uniform(-0.004, 0.004, 3) * peak_a],
+        },
+        "drive": {"rated_current_a": 1.4 * float(plate["rated_current_a"]), "hardware_current_limit_a": 2.0 * peak_a},
+    }  # fmt: skip
+
+
+def _effects(wanted: Sequence[str], plate: Mapping[str, Any], random: np.random.Generator) -> dict[str, Any]:
+    """Named effects, or up to three of any, each of a size between the catalogue's ends."""
+    if tuple(wanted) in ((), ("none",)):
+        return {}
+    if tuple(wanted) == ("any",):
+        names = [
+            str(n) for n in random.choice(sorted(CATALOGUE), int(random.integers(1, MOST_EFFECTS + 1)), replace=False)
+        ]
+    else:
+        names = list(wanted)
+    unknown = [name for name in names if name not in CATALOGUE]
+    if unknown:
+        raise ValueError(f"effects: {unknown[0]} is unknown; known: {', '.join(sorted(CATALOGUE))}")
+    scale = float(plate.get("rated_current_a", 5.0)) / 5.0
+    drawn: dict[str, Any] = {}
+    for name in names:
+        kind = CATALOGUE[name]
+        size = math.exp(random.uniform(math.log(kind.smallest), math.log(kind.largest)))
+        drawn[name] = {
+            "size": size * (scale if kind.unit == "A" else 1.0),
+            "shape": str(random.choice(list(kind.shapes))),
+        }
+    return drawn

@@ -1,0 +1,110 @@
+"""The blind protocol, short: what is hidden is named with its size, and nothing is where nothing is."""
+
+import numpy as np
+import pytest
+
+from commissioner.running.diagnosis import Verdict, diagnose
+from commissioner.running.identification import identify
+from tests.running_effects.cases import Case, taken, true_size
+from tests.running_effects.protocol import failures, false_names, run, table
+
+NAMED = {
+    "magnetizing_saturation": 0.15, "rotor_skin_effect": 0.4, "iron_loss": 0.05, "rotor_asymmetry": 0.05, "stator_asymmetry": 0.05,
+    "line_resistance": 0.1, "sensor_gain_mismatch": 0.05, "voltage_gain_mismatch": 0.05, "speed_sensor_gain": 0.05,
+    "speed_sensor_lag": 0.1,
+}  # fmt: skip
+"""Cause and the error that its size may have: of the saturation's and the bars' the law differs from the simulator's."""
+
+
+@pytest.mark.parametrize("seed", [5000, 5007])
+def test_nothing_is_named_where_nothing_is_hidden(seed):
+    row = run(Case(seed, "null"))
+    assert row["verdict"] == "nothing_significant"
+    assert not row["causes"]
+
+
+SHORT = ("magnetizing_saturation", "iron_loss", "rotor_asymmetry", "stator_asymmetry", "voltage_gain_mismatch")
+"""In the default run; the others under the mark `campaign`."""
+
+
+@pytest.mark.parametrize("name", [n if n in SHORT else pytest.param(n, marks=pytest.mark.campaign) for n in NAMED])
+def test_one_cause_is_named_with_its_size_and_nothing_else_is(name):
+    case = Case(77, "one", only=name)
+    scenario = case.scenario()
+    recording, plate, truth = taken(scenario, case.seed)
+    seen = diagnose([recording], plate)
+    assert [c.name for c in seen.causes] == [name], seen.reason
+    assert seen.verdict in (Verdict.EXPLAINED, Verdict.NOT_DISTINGUISHABLE)
+    effect = truth["effects"][0]
+    size, std, _ = next(iter(seen.causes[0].sizes.values()))
+    assert abs(size / true_size(effect, scenario) - 1.0) < NAMED[name] + 4.0 * std / abs(size)
+    if effect["phase"] != "u" and name in (
+        "stator_asymmetry",
+        "line_resistance",
+        "sensor_gain_mismatch",
+        "voltage_gain_mismatch",
+    ):
+        assert effect["phase"] in next(iter(seen.causes[0].sizes)).split("_")
+
+
+@pytest.mark.parametrize("name", ["sensor_lag"])
+def test_a_delay_and_a_lag_are_one_class(name):
+    seen = diagnose(*_one(name))
+    assert seen.verdict is Verdict.NOT_DISTINGUISHABLE
+    assert {seen.causes[0].name, *seen.causes[0].equivalent} == {"sampling_delay", "sensor_lag"}
+    assert seen.next_experiment is not None
+
+
+def _one(name):
+    case = Case(78, "one", only=name)
+    recording, plate, _ = taken(case.scenario(), case.seed)
+    return [recording], plate
+
+
+def test_slots_that_no_catalogue_names_are_called_unexplained():
+    row = run(Case(6008, "absent"))
+    assert row["truth"][0]["name"] == "slot_modulation"
+    assert row["verdict"] == "unexplained"
+
+
+def test_a_start_is_identified_as_well_as_its_noise_allows():
+    """Errors of the four over their bound (Cramer-Rao), six machines: root mean square at most 1.3, with white chi-square."""
+    ratios, inertia = [], []
+    for seed in range(6):
+        recording, plate, truth = taken(Case(seed, "null").scenario(), seed)
+        found = identify([recording], plate)
+        for (key, bound), true in zip(list(found.bound.items())[:4], truth["inverse_gamma"].values(), strict=True):
+            ratios.append((found.parameters[key].value - true) / bound)
+        inertia.append(found.inertia.value / truth["inertia_kg_m2"] - 1.0)
+        assert found.chi2 < 1.06
+    assert np.sqrt(np.mean(np.square(ratios))) < 1.3
+    assert np.max(np.abs(inertia)) < 0.01
+
+
+def test_a_start_without_speed_gives_the_four_and_the_inertia():
+    recording, plate, truth = taken(Case(1, "null", has_speed=False).scenario(), 1)
+    found = identify([recording], plate)
+    for key, true in truth["inverse_gamma"].items():
+        assert abs(found.parameters[key].value / true - 1.0) < max(4.0 * found.parameters[key].std / true, 0.002)
+    assert abs(found.inertia.value / truth["inertia_kg_m2"] - 1.0) < 0.02
+
+
+def test_the_table_counts_what_the_rows_say():
+    base = {"course": "start", "power_w": 1.0, "verdict": "explained", "held_out": 0.9, "cpu_s": 1.0, "seed": 1}
+    cause = {"name": "iron_loss", "equivalent": [], "size": ["w", [1.0, 0.1, "W"]], "delta_chi2": 100.0}
+    effect = {"name": "iron_loss", "size": 0.02, "in_class": True, "named": True, "strength": 0.5, "size_error": 0.02}
+    rows = [
+        {**base, "stratum": "one", "truth": [effect], "causes": [cause]},
+        {
+            **base,
+            "stratum": "one",
+            "truth": [{**effect, "name": "dead_time", "in_class": False, "named": False}],
+            "causes": [cause],
+        },
+        {**base, "stratum": "null", "truth": [], "causes": [cause]},
+    ]
+    assert false_names(rows[1]) == ["iron_loss"]
+    text = table(rows)
+    assert "| nulls with a name | 1 of 1 |" in text
+    assert "0.500 (1 false of 2)" in text
+    assert len(failures(rows)) == 2

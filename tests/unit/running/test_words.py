@@ -1,0 +1,28 @@
+"""What a technician reads of a running diagnosis."""
+
+from commissioner.report.running.words import headline, quantity, sentence
+
+CAUSE = {
+    "name": "stator_asymmetry", "equivalent": [], "form": "phase v", "confidence": 0.99, "gain_share": 1.0,
+    "parameters": {"current_in_v_of_rated": {"value": 0.0386, "std": 0.0002, "unit": ""}},
+}  # fmt: skip
+
+
+def test_the_phase_stands_in_the_sentence():
+    assert sentence(CAUSE).startswith("Phase v of the stator takes 3.86 % of rated current")
+
+
+def test_a_tie_says_so():
+    late = {
+        **CAUSE,
+        "name": "sampling_delay",
+        "equivalent": ["sensor_lag"],
+        "parameters": {"delay_us": {"value": 50.0, "std": 1.0, "unit": "us"}},
+    }
+    assert "sampling delay or sensor lag" in sentence(late)
+    assert quantity(late["parameters"]["delay_us"]) == "50.0 ± 2.0 µs"
+
+
+def test_the_headline_states_the_share_that_was_kept_aside():
+    document = {"verdict": "explained", "causes": [CAUSE], "gain": {"held_out": 0.987, "explained_share": 0.999}}
+    assert headline(document).endswith("It explains 98.7 % of the simulation's error.")

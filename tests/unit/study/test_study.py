@@ -1,0 +1,162 @@
+"""Campaigns: the file, the rows that survive a kill, the summary, and the port without a wire."""
+
+import json
+import math
+
+import pyarrow.parquet as pq
+import pytest
+
+from commissioner.errors import ConfigurationError, RequestRefused, UsageError
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.in_process import InProcessPort
+from commissioner.study.rows import ENDED, TABLE, Rows
+from commissioner.study.simulators import simulator
+from commissioner.study.specification import cases_of, load_study
+from commissioner.study.summary import page, summarise
+from commissioner.study.workers import carried_out, here
+
+MOTORS = ["a", "b", "c"]
+
+
+def study_file(tmp_path, text):
+    path = tmp_path / "study.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_the_same_file_gives_the_same_cases_and_every_motor_its_turn(tmp_path):
+    path = study_file(tmp_path, 'kind = "commission"\nruns = 6\nmotors = "all"\nseed = 5\n')
+    cases = cases_of(load_study(path), path, MOTORS)
+    assert cases == cases_of(load_study(path), path, MOTORS)
+    assert [case.motor for case in cases] == MOTORS + MOTORS
+    assert len({case.seed for case in cases}) == 6
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ('kind = "dance"', "kind"),
+        ('kind = "commission"\nruns = 0', "runs"),
+        ('kind = "commission"\nspread = 2.0', "spread"),
+        ('kind = "commission"\nmoters = "all"', "moters"),
+        ('kind = "commission"\nmotors = ["nobody"]', "motors"),
+        ('kind = "identify"', "files"),
+        ('kind = "identify"\nfiles = "*.nothing"', "files"),
+        ('kind = "commission"\nnoise_a = nan', "noise_a"),
+    ],
+)
+def test_a_file_that_cannot_be_carried_out_names_its_key(tmp_path, text, key):
+    path = study_file(tmp_path, text + "\n")
+    with pytest.raises(ConfigurationError) as refused:
+        cases_of(load_study(path), path, MOTORS)
+    assert key in str(refused.value)
+
+
+def test_rows_survive_a_kill_in_the_midst_of_a_line(tmp_path):
+    rows = Rows(tmp_path, {"seed": 1}, resume=False)
+    for case in (2, 0):
+        rows.add({"case": case, "outcome": "commissioned"})
+    rows.close()
+    with (tmp_path / ENDED).open("a", encoding="utf-8") as file:
+        file.write('{"case": 1, "outco')
+    again = Rows(tmp_path, {"seed": 1}, resume=True)
+    assert sorted(again.ended) == [0, 2]
+    again.add({"case": 1, "outcome": "rejected"})
+    again.close()
+    assert pq.read_table(tmp_path / TABLE)["case"].to_pylist() == [0, 1, 2]
+    last = Rows(tmp_path, {"seed": 1}, resume=True)
+    assert sorted(last.ended) == [0, 1, 2]
+    last.close()
+
+
+def test_rows_of_another_study_are_never_mixed(tmp_path):
+    rows = Rows(tmp_path, {"seed": 1}, resume=False)
+    rows.add({"case": 0, "outcome": "x"})
+    rows.close()
+    with pytest.raises(UsageError, match="another study"):
+        Rows(tmp_path, {"seed": 2}, resume=True)
+    with pytest.raises(UsageError) as refused:
+        Rows(tmp_path, {"seed": 1}, resume=False)
+    assert "--resume" in refused.value.remedy
+
+
+def row(case, outcome="commissioned", off=0.0, **more):
+    values = {
+        "stator_resistance_ohm_true": 2.0,
+        "stator_resistance_ohm_value": 2.0 * (1 + off),
+        "stator_resistance_ohm_std": 0.01,
+    }
+    return {"case": case, "outcome": outcome, "reason": "r", "cpu_s": 1.0, "peak_flux_fraction": 0.9} | values | more
+
+
+def test_the_summary_is_that_of_its_rows():
+    rows = [row(k, off=0.001 * k) for k in range(11)] + [row(11, "rejected", 9.0, peak_flux_fraction=0.97)]
+    seen = summarise(rows)
+    assert seen.outcomes == {"commissioned": 11, "rejected": 1}
+    assert seen.reasons == {"rejected: r": 1}
+    assert seen.worst_flux_fraction == 0.97
+    (errors,) = seen.errors
+    assert errors.count == 11
+    assert errors.quantiles == pytest.approx((0.005, 0.0095, 0.01))
+    assert errors.coverage == pytest.approx(10 / 11)  # 1.96 * 0.01 of 2.0 is 0.98 %
+    text = page(rows, "<b>Study</b>")
+    assert "&lt;b&gt;Study" in text
+    assert "91.7 %" in text
+
+
+def test_a_port_without_a_wire_speaks_to_the_simulator_by_the_drive_file():
+    drawn = simulator().draw("haumer_132m04", 3, spread=0.0, effects=(), noise_a=None, faults=())
+    port, profile = InProcessPort(drawn.station), load_profile("simulated")
+    magic = profile.item("status_word")
+    before = drawn.station.now_s
+    assert len(port.read(magic.address, 1)) == 1
+    assert drawn.station.now_s > before
+    with pytest.raises(RequestRefused) as refused:
+        port.read(60000, 1)
+    assert refused.value.value == 2
+    assert port.stats.requests == 2
+    assert math.isfinite(port.stats.latency_s(1.0))
+
+
+def test_spread_moves_the_truth_and_not_the_plate():
+    draws = [
+        simulator().draw("haumer_132m04", seed, spread=0.2, effects=(), noise_a=None, faults=()) for seed in (1, 2)
+    ]
+    assert draws[0].plate == draws[1].plate
+    first, second = (draw.parameters_at(0.5) for draw in draws)
+    assert first != second
+    assert set(first) == {
+        "stator_resistance_ohm",
+        "rotor_resistance_ohm",
+        "leakage_inductance_h",
+        "magnetizing_inductance_h",
+    }
+
+
+def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
+    path = study_file(tmp_path, 'kind = "commission"\nmotors = ["haumer_132m04"]\neffects = ["no_such_effect"]\n')
+    (case,) = cases_of(load_study(path), path, simulator().motors())
+    told = carried_out(case)
+    assert told["outcome"] == "impossible"
+    assert "no_such_effect" in told["reason"]
+
+
+def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):
+    text = 'kind = "commission"\nruns = 2\nmotors = ["haumer_132m04", "abb_2k2"]\nspread = 0.1\naxes_deg = [0.0]\nseed = 4\n'
+    path = study_file(tmp_path, text)
+    cases = cases_of(load_study(path), path, simulator().motors())
+    alone = {told["case"]: told for told in map(carried_out, cases)}
+    shared = {told["case"]: told for told in here(cases, 2)}
+    for case, told in alone.items():
+        assert {k: v for k, v in told.items() if k != "cpu_s"} == {
+            k: v for k, v in json.loads(json.dumps(shared[case])).items() if k != "cpu_s"
+        }
+        assert told["outcome"] == "commissioned", told["reason"]
+        assert told["peak_flux_fraction"] <= 1.02
+        for name in (
+            "stator_resistance_ohm",
+            "rotor_resistance_ohm",
+            "leakage_inductance_h",
+            "magnetizing_inductance_h",
+        ):
+            assert told[f"{name}_value"] == pytest.approx(told[f"{name}_true"], rel=0.02), name
