@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.campaigns.plate import FACTORS, case, scaled
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.motor.plate_match import contradiction, plate_point, rated_point
+from tests.campaigns.intake.plate import FACTORS, case, scaled
 from tests.support.standstill import usable_motors
 
 HONEST = [m for m in usable_motors() if not check(m.plate)]
