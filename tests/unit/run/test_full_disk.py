@@ -3,6 +3,7 @@
 import dataclasses
 import errno
 import os
+import time
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -38,6 +39,8 @@ class FullFolder(RunFolder):
 
 class Drive:
     """Stands for the inverter; counts what it is told."""
+
+    sleep, now_s = staticmethod(time.sleep), staticmethod(time.monotonic)
 
     def __init__(self):
         self.disarmed = 0

@@ -24,6 +24,8 @@ from commissioner.settings import load_motor
 class Drive:
     """Stands for an inverter whose status goes on saying `operation enabled`, from its n-th switching off on."""
 
+    sleep, now_s = staticmethod(time.sleep), staticmethod(time.monotonic)
+
     def __init__(self, live_from):
         self.live_from, self.disarmed = live_from, 0
         self.port = SimpleNamespace(stats=LinkStats())
