@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from commissioner.errors import ConfigurationError, DataRefused, UsageError
+from commissioner.errors import ConfigurationError, UsageError
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.recordings.plate import plate_of
 from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
@@ -75,9 +75,9 @@ def test_star_and_delta_are_read_as_plates_and_drives_write_them(tmp_path, writt
 
 def test_a_ring_is_no_connection_in_a_recording_either():
     numbers = {key: value for key, value in tomllib.loads(PLATE).items() if isinstance(value, float | int)}
-    with pytest.raises(DataRefused) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         nameplate_from(numbers | {"connection": "ring"})
-    assert "star (Y, wye) or delta" in str(caught.value.limit)
+    assert "star (Y, wye) or delta" in str(caught.value.as_dict())
 
 
 def test_broken_toml_and_missing_files_are_named(tmp_path):

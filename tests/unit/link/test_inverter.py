@@ -414,7 +414,7 @@ def test_the_watchdogs_work_is_confirmed_when_the_drive_is_back(bench):
         bench.drive.state = "fault" if seconds > 0.4 else bench.drive.state
         original(seconds)
 
-    bench.inverter._sleep = bite
+    bench.inverter.sleep = bite
     report = bench.inverter.disarm()
     assert report.is_confirmed and report.waited_for_watchdog
 
