@@ -39,7 +39,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--scenario", default="default", help="name of a scenario, or a TOML file")
     parser.add_argument("--tcp", type=_port, default=-1, metavar="PORT", help="serve Modbus TCP; 0 = any free port")
     parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
-    parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--baud", type=int, default=921600)
     parser.add_argument("--parity", choices="NEO", default="N")
     parser.add_argument(
         "--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port"

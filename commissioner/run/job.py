@@ -13,7 +13,7 @@ from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import DriveLimits, StreamPace
+from commissioner.procedure.checks import BITS_PER_REGISTER, OVERHEAD_BITS, DriveLimits, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.procedure.verdict import PARAMETERS
@@ -70,10 +70,15 @@ def make_job(
 
 
 def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> StreamPace | None:
-    """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now."""
+    """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now.
+    A serial line's time is that of its rate: a pseudo terminal, or a drive paced by its reader, takes this computer's instead."""
     layout = profile.window
     if layout is None:
         return None
+    samples = layout.data_registers // len(CHANNELS)
+    if isinstance(port, ModbusPort) and port.bit_s is not None:
+        bits = layout.words * BITS_PER_REGISTER + OVERHEAD_BITS
+        return StreamPace(bits * port.bit_s, samples, layout.words)
     times_s = []
     for _ in range(PACE_PROBES):
         began_s = now_s()
@@ -82,7 +87,7 @@ def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> Stre
         except RequestRefused:
             return None
         times_s.append(now_s() - began_s)
-    return StreamPace(min(times_s), layout.data_registers // len(CHANNELS), layout.words)
+    return StreamPace(min(times_s), samples, layout.words)
 
 
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:

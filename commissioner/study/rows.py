@@ -40,7 +40,10 @@ class Rows:
             self.ended = {row["case"]: row for row in _whole_lines(lines)}
         with whole_file(known) as temporary:
             temporary.write_text(json.dumps(plain(asked), indent=2) + "\n", "utf-8")
+        is_torn = lines.is_file() and not lines.read_bytes().endswith(b"\n") and lines.stat().st_size > 0
         self._file = lines.open("a", encoding="utf-8", newline="\n")
+        if is_torn:  # what a kill cut off must not swallow the next line
+            self._file.write("\n")
 
     def add(self, row: Row) -> None:
         """One case has ended; its line is with the operating system when this returns."""

@@ -82,6 +82,11 @@ class ModbusPort:
         self._answered_s = clock()
         self._trust = self._make_trust()
 
+    @property
+    def bit_s(self) -> float | None:
+        """Seconds a bit takes on a serial line; None of other wires."""
+        return 1.0 / self._url.baud if isinstance(self._url, RtuUrl) else None
+
     # --- the port -------------------------------------------------------------------------------------------------
     def read(self, address: int, count: int) -> Words:
         for _ in range(self.read_retries):

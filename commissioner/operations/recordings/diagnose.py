@@ -109,7 +109,7 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
 
 def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:
     """What the circuit says against the plate, where both are known; DataRefused unless the data are to be trusted."""
-    values = document["parameters_before"]
+    values = document["parameters_after"]
     if any(key not in plate for key in NAMEPLATE_KEYS) or any(name not in values for name in PARAMETERS):
         return []
     nameplate = nameplate_from(plate)

@@ -76,7 +76,7 @@ def test_a_recording_is_diagnosed_and_its_model_plays_what_was_measured(files, t
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["short"], "long enough"), (["silent"], "zero"), (["one_sensor"], "current_v_a"), (["running"], "commissioner monitor"),
+        (["short"], "long enough"), (["silent"], "zero"), (["one_sensor"], "current_v_a"), (["running"], "record a start"),
         (["text"], "time_s"), (["good", "another_motor"], "rated_power_w"),
     ],
 )  # fmt: skip
