@@ -43,6 +43,12 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
+NOT_YET_IN_CI = (
+    "integration/service/browser",
+    "integration/service/test_survival.py",
+    "integration/service/test_fuzz.py",
+)
+"""Never seen passing on a quiet machine: run by `pytest -m campaign tests/integration/service` until they are."""
 TOGETHER = ("integration/service",)
 """Folders whose tests share a costly fixture of a whole session: one worker has them all."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
@@ -54,6 +60,8 @@ USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
+        if any(item.path.is_relative_to(TESTS / name) for name in NOT_YET_IN_CI):
+            item.add_marker(pytest.mark.campaign)
         is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
         if is_listed and item.name.split("[")[0] not in NOT_REALTIME:
             item.add_marker(pytest.mark.realtime)
