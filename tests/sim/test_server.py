@@ -226,7 +226,7 @@ def test_command_line_serves_and_prints_where(tmp_path):
             ready = [process.stderr.readline().strip() for _ in range(2)]
             assert ready == [
                 f'ready: --drive "tcp://{lines[0][2]}?device=1"',
-                f'ready: --drive "rtu://{lines[1][2]}?baud=115200&parity=N&device=1"',
+                f'ready: --drive "rtu://{lines[1][2]}?baud=921600&parity=N&device=1"',
             ]
         finally:
             process.terminate()
