@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from commissioner.export.found import CONVENTION, Found
 
-_HEAD = '''"""Induction machine of run {run} ({utc}), for motulator 0.5: `from {stem} import par`.
+_HEAD = '''"""Induction machine of run {run} ({utc}), for motulator 0.5: `from this_file import par`.
 
 {convention}.
 Gamma circuit; constants from the inverse-Gamma values at a peak stator flux of {flux:.6g} Wb. Standard errors: {errors}.
@@ -40,9 +40,7 @@ def as_module(found: Found) -> bytes:
     """Python text that motulator's users import."""
     gamma = found.gamma
     errors = ", ".join(f"{name} {quantity.std:.2g}" for name, quantity in found.parameters.items())
-    head = _HEAD.format(
-        run=found.run, utc=found.utc, stem="this_file", convention=CONVENTION, flux=found.holds_for_wb, errors=errors
-    )
+    head = _HEAD.format(run=found.run, utc=found.utc, convention=CONVENTION, flux=found.holds_for_wb, errors=errors)
     bent = ""
     if found.stator_curve:
         flux, inductance = (

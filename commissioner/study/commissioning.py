@@ -3,7 +3,6 @@ socket. No archive is kept; the row is."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import tempfile
 import time
@@ -117,10 +116,6 @@ def _told(drawn: Drawn, findings: Findings, ended: RunEnded, highest_flux_wb: fl
     if found is None:
         return told
     truth = drawn.parameters_at(found.holds_for_flux_wb)
-    for name, std in zip(PARAMETERS, found.std, strict=True):
-        told |= {
-            f"{name}_true": truth[name],
-            f"{name}_value": dataclasses.asdict(found.parameters)[name],
-            f"{name}_std": std,
-        }
+    for name, value, std in zip(PARAMETERS, found.parameters.as_tuple(), found.std, strict=True):
+        told |= {f"{name}_true": truth[name], f"{name}_value": value, f"{name}_std": std}
     return told

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from commissioner.errors import ConfigurationError
 from commissioner.settings import read_toml
+from commissioner.validation import first_problem
 
 MOST_CASES = 1_000_000
-Names = list[str] | Literal["all"]
 
 
 class Specification(BaseModel):
@@ -59,17 +59,10 @@ def load_study(path: Path) -> Specification:
     try:
         return Specification.model_validate(read_toml(path))
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        field = Specification.model_fields.get(str(first["loc"][0])) if first["loc"] else None
-        wanted = field.description if field is not None and field.description else str(first["msg"])
-        if first["type"] == "extra_forbidden":
-            wanted = "no such key; known keys: " + ", ".join(sorted(Specification.model_fields))
-        raise ConfigurationError(file=str(path), key=key, value=_shown(first), expected=wanted) from error
-
-
-def _shown(problem: Any) -> object:
-    return None if problem["type"] == "missing" else problem["input"]
+        problem = first_problem(error, Specification)
+        raise ConfigurationError(
+            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
+        ) from error
 
 
 def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Case]:

@@ -24,13 +24,13 @@ from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
+from commissioner.procedure.verdict import PARAMETERS
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
-PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
