@@ -44,7 +44,7 @@ def null_modem():
 def serial_drive():
     """URL of the firmware behind libmodbus at the other end of a serial line."""
     with null_modem() as (theirs, ours), FirmwareProcess(build(), line=("--rtu", theirs)):
-        yield f"rtu://{ours}?parity=N&stop=1&baud=115200"
+        yield f"rtu://{ours}?parity=N&stop=1&baud=921600"
 
 
 @needs_libmodbus

@@ -84,10 +84,10 @@ def test_a_ripple_is_seen_at_its_frequency(nominal, setting, hertz, line):
         for (s, more), d in zip(with_ripple(setting, nominal, hertz), directions, strict=True)
     )
     record = replace(setting.record, segments=segments)
-    seen, lines = with_clearer_lines(record, nominal, setting.layout, WHITE, setting.lines_hz, ())
+    seen, lines = with_clearer_lines(record, nominal, setting.layout, WHITE, setting.lines_hz, {})
     assert line in lines and lines[line] == pytest.approx(hertz, abs=0.15)
     assert f"{line}_cos" in seen.channel_names and len(seen.channel_names) == seen.channels[0].shape[1]
-    again, same = with_clearer_lines(seen, nominal, setting.layout, WHITE, lines, ())
+    again, same = with_clearer_lines(seen, nominal, setting.layout, WHITE, lines, {})
     assert same == lines and again is seen
 
 

@@ -80,9 +80,10 @@ def test_zero_is_the_nominal_model(name, nominal, setting):
 
 @pytest.mark.parametrize("name", FITTED)
 def test_it_grows_continuously_and_first_in_proportion(name, nominal, setting):
-    base = currents(extended(nominal, setting, name, 1e-9), setting)
-    small = currents(extended(nominal, setting, name, 0.01), setting) - base
-    double = currents(extended(nominal, setting, name, 0.02), setting) - base
+    segment = 0 if name == "sensor_switch_on" else 1  # what settles as a file begins is gone in its second segment
+    base = currents(extended(nominal, setting, name, 1e-9), setting, segment)
+    small = currents(extended(nominal, setting, name, 0.01), setting, segment) - base
+    double = currents(extended(nominal, setting, name, 0.02), setting, segment) - base
     size = np.sqrt(np.mean(small**2))
     assert size > 0
     assert np.sqrt(np.mean((double - 2.0 * small) ** 2)) < 0.05 * size
