@@ -21,7 +21,7 @@ DIAGNOSIS_S = 60.0
 @dataclass(frozen=True)
 class CommissionRequest:
     """`axes_deg`: None takes the procedure's own. `diagnosis_s` 0 leaves the closing diagnosis out. `seal`: a key file.
-    `motor_tag`, `motor_serial`: which motor it is, as a person says."""
+    `motor_tag`, `motor_serial`: which motor it is, `place`: where, `cable`: what leads to it and what it drives, as a person says."""
 
     drive: str
     profile: str
@@ -34,6 +34,8 @@ class CommissionRequest:
     seal: Path | None = None
     motor_tag: str = ""
     motor_serial: str = ""
+    place: str = ""
+    cable: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,5 +85,5 @@ def commission(
 
 def _identity(request: CommissionRequest) -> dict[str, str]:
     """What a person said of the motor, where anything was said."""
-    said = {"motor_tag": request.motor_tag.strip(), "motor_serial": request.motor_serial.strip()}
+    said = {name: str(getattr(request, name)).strip() for name in ("motor_tag", "motor_serial", "place", "cable")}
     return {name: value for name, value in said.items() if value}
