@@ -49,6 +49,12 @@ Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in c
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
 ]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="Reject also where axes differ by a named cause, samples were lost or the flux guard acted."
+    ),
+]
 Seal = Annotated[
     Path | None,
     typer.Option(
@@ -112,6 +118,7 @@ def demo(
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
     diagnosis: Diagnosed = True,
+    strict: Strict = False,
 ) -> None:
     """The whole job against the simulated inverter, started as its own process on loopback."""
     from commissioner.cli.verbs.demo import demo as verb
@@ -125,6 +132,7 @@ def demo(
         runs=runs,
         as_json=json,
         diagnosis=diagnosis,
+        strict=strict,
     )
 
 
@@ -157,6 +165,7 @@ def run(
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
     seal: Seal = None,
+    strict: Strict = False,
     tag: Annotated[str, typer.Option("--tag", help="Which motor this is: its tag, kept with the run.")] = "",
     motor_serial: Annotated[
         str, typer.Option("--motor-serial", help="The motor's serial number, kept with the run.")
@@ -182,7 +191,7 @@ def run(
 
     request = CommissionRequest(
         drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal,
-        tag, motor_serial, place, cable,
+        strict, tag, motor_serial, place, cable,
     )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
 

@@ -32,6 +32,7 @@ class CommissionRequest:
     write_back: bool = False
     diagnosis_s: float = DIAGNOSIS_S
     seal: Path | None = None
+    strict: bool = False
     motor_tag: str = ""
     motor_serial: str = ""
     place: str = ""
@@ -71,7 +72,7 @@ def commission(
         request.drive,
         request.profile,
         load_motor(request.motor),
-        load_procedure(request.procedure, axes_deg=request.axes_deg),
+        load_procedure(request.procedure, axes_deg=request.axes_deg, strict=request.strict),
         write_back=request.write_back,
         runs=request.runs,
         present=observe,
