@@ -37,9 +37,6 @@ from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
 from commissioner.run.stopping.stop_file import stopped_by_file
 
-BUSY = 3.0
-"""The closing diagnosis may take this much longer on a computer that does something else as well."""
-
 
 @dataclass(frozen=True)
 class Order:
@@ -196,9 +193,9 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
 
 
 def _time_left(seconds: float, stop: OperatorStop) -> Callable[[], bool]:
-    """Says no once `seconds` of two cores are used up, `BUSY` times as long has gone by, or the operator stops."""
-    end, work_end = time.monotonic() + BUSY * seconds, time.process_time() + 2.0 * seconds
-    return lambda: time.monotonic() < end and time.process_time() < work_end and not stop.asked
+    """Says no once so many seconds have gone by, or the operator stops."""
+    end = time.monotonic() + seconds
+    return lambda: time.monotonic() < end and not stop.asked
 
 
 def _with_diagnosis(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from commissioner.diagnose.cancelling import ask_for_time
 from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.spline import cells_of
@@ -120,7 +121,8 @@ def _inside(listed: Sequence[Term], segment: Segment) -> list[int]:
 
 
 def trajectory(model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term]) -> Path:
-    """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`."""
+    """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`. TimeOver: given up."""
+    ask_for_time()
     segment, channels = record.segments[position], _channels(record, position)
     asked = [wanted[k] for k in _inside(wanted, segment)]
     drive = modulation(model, segment, channels)

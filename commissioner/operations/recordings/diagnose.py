@@ -75,7 +75,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     """Recordings together, of one motor at standstill or running; where all files are tables of test points, each on its own.
 
     Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
-    `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
+    A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(Path(path), said) for path in request.files]
