@@ -31,9 +31,8 @@ from commissioner.diagnose.verdict.causes import (
 from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
-from commissioner.diagnose.verdict.parameter_shift import PARAMETERS
 from commissioner.errors import DataRefused
-from commissioner.motor.circuit import Quantity
+from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.records import StandstillRecording
 
 NEVER_NAMEABLE = (

@@ -18,13 +18,12 @@ from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
