@@ -17,7 +17,6 @@ CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
 MAX_BYTES, MAX_DOTS = 250_000, 500
 """Of a TOML file, and in one line of it: the time that a dotted key takes grows with the square of its parts."""
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Percent = Annotated[float, Field(gt=0, le=100)]
 
 

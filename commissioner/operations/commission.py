@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.link.files.drive_file import load_profile
 from commissioner.operations.events import Observe, nobody
 from commissioner.run.archive.seal import read_key
-from commissioner.run.commission import Commissioned, require_capabilities
+from commissioner.run.commission import Commissioned, Origin, require_capabilities
 from commissioner.run.commission import commission as carry_out_and_close
-from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load_motor, load_procedure
 
 DIAGNOSIS_S = 60.0
@@ -39,14 +37,6 @@ class CommissionRequest:
     cable: str = ""
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Who asked for a run, and what is told the folder as soon as there is one."""
-
-    facts: Mapping[str, str] | None = None
-    begun: Callable[[Path], None] = lambda _folder: None
-
-
 def check_request(request: CommissionRequest) -> None:
     """ConfigurationError or UsageError where the request cannot be carried out on any drive of its profile."""
     load_motor(request.motor)
@@ -56,15 +46,10 @@ def check_request(request: CommissionRequest) -> None:
         read_key(request.seal)
 
 
-def commission(
-    request: CommissionRequest,
-    observe: Observe = nobody,
-    stop: OperatorStop | None = None,
-    origin: Origin | None = None,
-) -> Commissioned:
+def commission(request: CommissionRequest, observe: Observe = nobody, origin: Origin | None = None) -> Commissioned:
     """Energises the motor. Configuration errors are raised; from the first request on, every end is a run with a folder.
 
-    `observe` gets the records of `procedure.findings`. `stop` ends the run from outside; None listens to the terminal.
+    `observe` gets the records of `procedure.findings`.
     """
     origin = origin or Origin()
     key = read_key(request.seal) if request.seal is not None else None
@@ -78,9 +63,7 @@ def commission(
         present=observe,
         diagnosis_s=request.diagnosis_s,
         key=key,
-        stop=stop,
-        begun=origin.begun,
-        origin=dict(origin.facts or {}) | _identity(request),
+        origin=replace(origin, facts={**origin.facts, **_identity(request)}),
     )
 
 

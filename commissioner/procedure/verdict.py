@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
-from commissioner.motor.circuit import InverseGamma, Quantity
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.plate_match import PlateMatch, mismatch, plate_match
 from commissioner.procedure.plan import Acceptance
@@ -49,7 +49,6 @@ class Verdict:
         )
 
 
-PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 _LIMIT = {
     "stator_resistance_ohm": "resistance_std_percent",
     "rotor_resistance_ohm": "rotor_resistance_std_percent",

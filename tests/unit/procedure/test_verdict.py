@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from commissioner.motor.circuit import InverseGamma, Quantity
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
-from commissioner.procedure.verdict import PARAMETERS, Decision, Evidence, decide
+from commissioner.procedure.verdict import Decision, Evidence, decide
 from commissioner.settings import load_motor, load_procedure
 
 MOTORS = Path(__file__).parents[2] / "data" / "motors" / "motors.csv"
