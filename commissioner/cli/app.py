@@ -525,15 +525,23 @@ def runs_trend(
 
 @runs_app.command("push")
 def runs_push(
-    target: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    target: Annotated[
+        str,
+        typer.Argument(help="Folder of another archive, also on a mounted share; or http(s)://HOST:PORT of a service."),
+    ],
     run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    account: Annotated[str, typer.Option(help="Name of an account of the service, an operator's.")] = "",
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read its password from this file; asked for if not given.")
+    ] = None,
+    ca: Annotated[Path | None, typer.Option(help="PEM file of who vouches for the service's certificate.")] = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """Run folders to another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import move
+    from commissioner.cli.verbs.archived.moving import push
 
-    move(runs, target, run or (), to_it=True, as_json=json)
+    push(runs, target, run or (), account=account, password_file=password_file, ca=ca, as_json=json)
 
 
 @runs_app.command("pull")
@@ -544,9 +552,9 @@ def runs_pull(
     json: Json = False,
 ) -> None:
     """Run folders from another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import move
+    from commissioner.cli.verbs.archived.moving import pull
 
-    move(runs, source, run or (), to_it=False, as_json=json)
+    pull(runs, source, run or (), as_json=json)
 
 
 @runs_app.command("verify")
