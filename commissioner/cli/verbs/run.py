@@ -12,7 +12,8 @@ from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.operations.check import CheckRequest, check
-from commissioner.operations.commission import CommissionRequest, Origin, check_request, commission
+from commissioner.operations.commission import CommissionRequest, check_request, commission
+from commissioner.run.commission import Origin
 from commissioner.run.stopping.dead_man import DeadMan
 from commissioner.run.stopping.operator_stop import OperatorStop
 
@@ -39,7 +40,7 @@ def hold_and_commission(request: CommissionRequest) -> None:
     held = DeadMan(sys.stdin.fileno(), stop)
     held.start()
     facts = held.wait_for_begin()
-    done = commission(request, stop=stop, origin=Origin(facts, _say_folder))
+    done = commission(request, origin=Origin(facts, _say_folder, stop))
     show_and_exit(done, as_json=True)
 
 
