@@ -76,6 +76,7 @@ class _Acceptance(_File):
     rotor_resistance_std_percent: Percent
     magnetizing_std_percent: Percent
     axis_spread_percent: Percent
+    strict: bool = False
 
 
 class ProcedureFile(_File):
@@ -101,8 +102,11 @@ def load_motor(name_or_path: str) -> Nameplate:
     return nameplate
 
 
-def load_procedure(path: Path | None = None, axes_deg: tuple[float, ...] | None = None) -> ProcedurePlan:
-    """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes."""
+def load_procedure(
+    path: Path | None = None, axes_deg: tuple[float, ...] | None = None, *, strict: bool = False
+) -> ProcedurePlan:
+    """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes, `strict` its
+    leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     model = _load(source, ProcedureFile)
     if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
@@ -118,7 +122,7 @@ def load_procedure(path: Path | None = None, axes_deg: tuple[float, ...] | None 
         supervision=Supervision(**model.supervision.model_dump()),
         limits=Limits(**model.limits.model_dump()),
         excitation=ExcitationPlan(**model.excitation.model_dump()),
-        acceptance=Acceptance(**model.acceptance.model_dump()),
+        acceptance=Acceptance(**(model.acceptance.model_dump() | ({"strict": True} if strict else {}))),
     )
 
 

@@ -19,7 +19,7 @@ DIAGNOSIS_S = 60.0
 @dataclass(frozen=True)
 class CommissionRequest:
     """`axes_deg`: None takes the procedure's own. `diagnosis_s` 0 leaves the closing diagnosis out. `seal`: a key file.
-    `motor_tag`, `motor_serial`: which motor it is, as a person says."""
+    `motor_tag`, `motor_serial`: which motor it is, `place`: where, `cable`: what leads to it and what it drives, as a person says."""
 
     drive: str
     profile: str
@@ -30,8 +30,11 @@ class CommissionRequest:
     write_back: bool = False
     diagnosis_s: float = DIAGNOSIS_S
     seal: Path | None = None
+    strict: bool = False
     motor_tag: str = ""
     motor_serial: str = ""
+    place: str = ""
+    cable: str = ""
 
 
 def check_request(request: CommissionRequest) -> None:
@@ -54,7 +57,7 @@ def commission(request: CommissionRequest, observe: Observe = nobody, origin: Or
         request.drive,
         request.profile,
         load_motor(request.motor),
-        load_procedure(request.procedure, axes_deg=request.axes_deg),
+        load_procedure(request.procedure, axes_deg=request.axes_deg, strict=request.strict),
         write_back=request.write_back,
         runs=request.runs,
         present=observe,
@@ -66,5 +69,5 @@ def commission(request: CommissionRequest, observe: Observe = nobody, origin: Or
 
 def _identity(request: CommissionRequest) -> dict[str, str]:
     """What a person said of the motor, where anything was said."""
-    said = {"motor_tag": request.motor_tag.strip(), "motor_serial": request.motor_serial.strip()}
+    said = {name: str(getattr(request, name)).strip() for name in ("motor_tag", "motor_serial", "place", "cable")}
     return {name: value for name, value in said.items() if value}

@@ -13,7 +13,7 @@ from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import Points, is_points_table, read_points
+from commissioner.diagnose.points.table import Points, read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
@@ -23,6 +23,8 @@ from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
+from commissioner.operations.recordings.sheets import are_sheets, are_three
+from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
@@ -80,8 +82,8 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     tables = [contract_table(Path(path), said) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
-    if all(is_points_table(list(t.columns)) for t in tables):
-        return _points(tables, request.motor, request.out)
+    if are_sheets(tables):
+        return _points(tables, request)
     if any(is_running(t) for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
@@ -131,9 +133,15 @@ def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, t
     _write(out, document, seen.model, page, "report.html")
 
 
-def _points(tables: Sequence[Table], motor: str | None, out: Path | None) -> Diagnosed:
-    """The stator resistance of a locked-rotor table serves the others."""
-    plate = plate_metadata(motor)
+def _points(tables: Sequence[Table], request: DiagnoseRequest) -> Diagnosed:
+    """The stator resistance of a locked-rotor table serves the others; a few rows of different tests make one circuit."""
+    out = request.out
+    if are_three(tables):
+        one = of_three_tests(tables, request.motor, trust_from(request.trust))
+        if out is not None:
+            _write_points(out, one, [one], _names(tables)[:1])
+        return Diagnosed(one, out)
+    plate = plate_metadata(request.motor)
     read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
     resistance_ohm = float(known[0]) if known else None
