@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -42,9 +41,6 @@ from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import EQUAL_LEAKAGE, InverseGamma, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
 from commissioner.records import StandstillRecording
-
-if TYPE_CHECKING:
-    from commissioner.identify.contract import IdentificationDocument
 
 COPPER_ZERO_DEGC = -234.5
 MOST_SHIFTS = 6
@@ -85,12 +81,6 @@ class Identification:
     def std(self) -> tuple[float, float, float, float]:
         a, b, c, d = np.sqrt(np.diag(self.covariance))
         return float(a), float(b), float(c), float(d)
-
-    def as_json(self) -> IdentificationDocument:
-        """The document of the contract (`run` / `identify`), ready for `json.dumps`."""
-        from commissioner.identify.document import document
-
-        return document(self)
 
 
 def identify(

@@ -12,8 +12,9 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import Points, read_points
+from commissioner.diagnose.points.table import read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused

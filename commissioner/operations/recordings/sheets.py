@@ -16,7 +16,7 @@ from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
 from commissioner.operations.recordings.trust import Trust, refused, trusted_data
-from commissioner.procedure.verdict import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.recordings.table import Table
 
 NOTHING_LEFT = (

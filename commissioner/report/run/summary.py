@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
+from commissioner.identify.document import document as identification_document
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
@@ -35,7 +36,11 @@ def summarise(
         "diagnosis": None,
     }
     if identification is not None:
-        document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
+        document |= {
+            key: value
+            for key, value in identification_document(identification).items()
+            if key not in ("outcome", "reason")
+        }
         document["duration_s"] = ended.energised_s
         document |= _more(findings, document["remarks"])
     document["flux_guard"] = {
