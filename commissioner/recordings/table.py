@@ -235,6 +235,20 @@ def to_running(table: Table) -> RunningRecording:
     )
 
 
+def to_currents(table: Table) -> RunningRecording:
+    """The table as a running recording without voltages (NaN throughout). DataRefused: fewer than two currents, or no time."""
+    currents = ("current_u_a", "current_v_a", "current_w_a")
+    _require(table, ("time_s", *_all_but_one(currents, table.columns)), "a recording of a motor's currents")
+    time = table.columns["time_s"]
+    empty = np.full(time.size, np.nan)
+    u, v, w = (table.columns.get(name, empty) for name in currents)
+    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    return RunningRecording(
+        time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
+        table.source, table.notes,
+    )  # fmt: skip
+
+
 def _all_but_one(names: tuple[str, str, str], columns: Mapping[str, Signal]) -> tuple[str, ...]:
     """The names, without the one absent column where the other two are there."""
     present = tuple(name for name in names if name in columns)
