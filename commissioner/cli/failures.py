@@ -6,6 +6,7 @@ import errno
 import signal
 import sys
 import tempfile
+import threading
 import traceback
 from collections.abc import Callable, Sequence
 from types import FrameType
@@ -27,7 +28,39 @@ INTERRUPTED = 130
 def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     """Carry the verb out and leave with its exit code; with --json every failure is one document, too."""
     as_json, hide = "--json" in arguments, Secrets(arguments).hide
-    signal.signal(signal.SIGTERM, _terminated)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background job is deaf to Ctrl-C and stays so
+            signal.signal(number, _interrupted)
+    _ended.clear()
+    try:
+        error = _carried_out(app, arguments, as_json, hide)
+    except KeyboardInterrupt:  # a second one while the first was being answered
+        error = _stopped()
+    finally:
+        let_end()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, signal.SIG_IGN)  # the interpreter's own end is not to be cut off either
+    _say(error, as_json, hide)
+    sys.exit(error.exit_code)
+
+
+def let_end() -> None:
+    """What has ended ends as it has: from here on a signal changes neither what is said nor the exit code."""
+    _ended.set()
+
+
+_ended = threading.Event()
+
+
+def _interrupted(number: int, _frame: FrameType | None) -> None:
+    if not _ended.is_set():
+        raise KeyboardInterrupt(signal.Signals(number).name)
+
+
+def _carried_out(
+    app: typer.Typer, arguments: Sequence[str], as_json: bool, hide: Callable[[Any], Any]
+) -> CommissionerError:
+    """Why the verb could not be carried out; SystemExit where it could."""
     try:
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
         if code != INTERRUPTED:
@@ -55,12 +88,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
         error = _too_much(arguments)
     except Exception as surprise:
         error = _defect(surprise, arguments)
-    _say(error, as_json, hide)
-    sys.exit(error.exit_code)
-
-
-def _terminated(number: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt(signal.Signals(number).name)
+    return error
 
 
 def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:

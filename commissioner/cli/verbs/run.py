@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from commissioner.cli.failures import let_end
 from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
@@ -26,8 +27,10 @@ def run(request: CommissionRequest, *, yes: bool, as_json: bool, dead_man: bool 
     screen.require_yes(yes, as_json=as_json)
     if not yes:
         _ask(request)
-    with LiveView(screen.err if as_json else screen.out) as view:
-        done = commission(request, view)
+    with OperatorStop() as stop:
+        with LiveView(screen.err if as_json else screen.out) as view:
+            done = commission(request, view, stop)
+        let_end()
     show_and_exit(done, as_json=as_json)
 
 
@@ -39,7 +42,9 @@ def hold_and_commission(request: CommissionRequest) -> None:
     held = DeadMan(sys.stdin.fileno(), stop)
     held.start()
     facts = held.wait_for_begin()
-    done = commission(request, stop=stop, origin=Origin(facts, _say_folder))
+    with stop:
+        done = commission(request, stop=stop, origin=Origin(facts, _say_folder))
+        let_end()
     show_and_exit(done, as_json=True)
 
 
