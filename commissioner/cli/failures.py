@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import errno
-import signal
 import sys
 import tempfile
-import threading
 import traceback
 from collections.abc import Callable, Sequence
-from types import FrameType
 from typing import Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from commissioner.cli.signals import be_deaf, listen
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
 
@@ -28,33 +26,15 @@ INTERRUPTED = 130
 def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     """Carry the verb out and leave with its exit code; with --json every failure is one document, too."""
     as_json, hide = "--json" in arguments, Secrets(arguments).hide
-    for number in (signal.SIGTERM, signal.SIGINT):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background job is deaf to Ctrl-C and stays so
-            signal.signal(number, _interrupted)
-    _ended.clear()
+    listen()
     try:
         error = _carried_out(app, arguments, as_json, hide)
     except KeyboardInterrupt:  # a second one while the first was being answered
         error = _stopped()
     finally:
-        let_end()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, signal.SIG_IGN)  # the interpreter's own end is not to be cut off either
+        be_deaf()
     _say(error, as_json, hide)
     sys.exit(error.exit_code)
-
-
-def let_end() -> None:
-    """What has ended ends as it has: from here on a signal changes neither what is said nor the exit code."""
-    _ended.set()
-
-
-_ended = threading.Event()
-
-
-def _interrupted(number: int, _frame: FrameType | None) -> None:
-    if not _ended.is_set():
-        raise KeyboardInterrupt(signal.Signals(number).name)
 
 
 def _carried_out(

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from commissioner.cli.failures import let_end
 from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
+from commissioner.cli.signals import let_end
 from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, Origin, check_request, commission
 from commissioner.run.stopping.dead_man import DeadMan

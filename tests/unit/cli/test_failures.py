@@ -11,8 +11,9 @@ import typer
 
 from commissioner.cli import failures
 from commissioner.cli.app import app
-from commissioner.cli.failures import let_end, run_to_exit
+from commissioner.cli.failures import run_to_exit
 from commissioner.cli.screens import screen
+from commissioner.cli.signals import let_end
 from commissioner.errors import DriveFault
 from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND
