@@ -18,7 +18,6 @@ from commissioner.registers.status import DriveState, decode_state
 DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE, RESET_FAULT = 0x00, 0x02, 0x06, 0x07, 0x0F, 0x80
 POLLS = 200
 POLL_S = 0.005
-SUPPLY_NEEDED = ("sto_released", "remote_control", "shaft_at_rest", "supply_ok", "no_other_master")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.identify import contract
 from commissioner.identify.estimate.axis import AxisResult
 from commissioner.identify.inverter.staircase import InverterError, Staircase
-from commissioner.motor.circuit import InverseGamma, Quantity
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 
 if TYPE_CHECKING:
     from commissioner.identify.analysis import Identification
@@ -39,7 +39,7 @@ def document(result: Identification) -> contract.IdentificationDocument:
             "assumption": result.t_model.assumption,
         },
         "axes": [_axis(axis) for axis in result.axes],
-        "dispersion": dict(zip(_NAMES, result.combined.relative_dispersion, strict=True)),
+        "dispersion": dict(zip(PARAMETERS, result.combined.relative_dispersion, strict=True)),
         "findings": [
             {
                 "cause": f.cause.name.lower(),
@@ -74,9 +74,6 @@ def document(result: Identification) -> contract.IdentificationDocument:
         "duration_s": result.duration_s,
         "remarks": list(result.remarks),
     }
-
-
-_NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 
 
 def parameters_json(machine: InverseGamma, covariance: np.ndarray, at_flux_wb: float) -> contract.Parameters:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from commissioner.identify.analysis import Identification, identify
@@ -220,7 +220,7 @@ def judge(job: Job, findings: Findings) -> Step:
         recording, job.nameplate, winding_temperature_degc=findings.winding_degc, earlier=findings.look
     )
     findings.identification = identification
-    evidence = evidence_of(identification)
+    evidence = replace(evidence_of(identification), guard_acted=findings.guard_acted)
     findings.plate_match = match_of(evidence.combined, job.nameplate)
     verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
     findings.verdict = verdict

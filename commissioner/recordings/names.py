@@ -57,6 +57,21 @@ TIME = frozenset(
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 """Without a unit of its own such a column is in 1/min."""
+SHEET = {
+    "frequency_hz": re.compile(r"f|freq(?:uency)?|frequenz|frequence|supplyfrequency|frequencia|fs"),
+    "voltage_line_v": re.compile(
+        r"(?:v|u|e|voltage|volts?|spannung|tension)(?:l|ll|line|linetoline|linevoltage)?|line(?:toline)?voltage|lltvoltage|terminalvoltage"
+        r"|appliedvoltage|vline|uline"
+    ),
+    "current_line_a": re.compile(
+        r"(?:i|current|amps?|strom|courant)(?:l|line|avg|mean)?|line(?:current|amps)|(?:mean|average)(?:line)?current"
+    ),
+    "power_w": re.compile(
+        r"(?:p|w|power|watts?|leistung|puissance)(?:in|tot|total|input|3ph|el)?|(?:input|total|three(?:phase)?|3ph(?:ase)?)power|powerinput"
+        r"|inputwatts"
+    ),
+}
+"""Columns of a test sheet: line values and the power of all phases; a name that says `phase` is none of them."""
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
@@ -104,6 +119,20 @@ def uses_rst(names: Iterable[str]) -> bool:
 def key_of(name: str) -> str:
     """Letters and digits of a name, without its unit in brackets and its path."""
     return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1]).lower())
+
+
+def sheet_meaning(name: str) -> str | None:
+    """The column of a test sheet (`Voltage (V)`, `I_line [A]`, `P_in/kW`) that a name means, or None."""
+    bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE)
+    return next((column for column, names in SHEET.items() if names.fullmatch(key_of(bare))), None)
+
+
+def is_sheet(names: Iterable[str]) -> bool:
+    """Whether names are those of a test sheet: volts, amperes and watts once each, and no time."""
+    names = [n for n in names if n]
+    found = [m for n in names if (m := sheet_meaning(n))]
+    is_whole = all(found.count(c) == 1 for c in ("voltage_line_v", "current_line_a", "power_w"))
+    return is_whole and found.count("frequency_hz") < 2 and not any(meaning_of(n) == "time_s" for n in names)
 
 
 def is_per_minute(name: str) -> bool:

@@ -12,11 +12,11 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.checks import BITS_PER_REGISTER, OVERHEAD_BITS, DriveLimits, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.acting import CHANNELS

@@ -76,3 +76,35 @@ def show_running(document: Mapping[str, Any], sources: Sequence[str]) -> None:
         out.print(f"load of the start: {name.replace('_', ' ').removesuffix(' nm')} {value:.3g} N m")
     for remark in document["remarks"]:
         out.print(f"- {remark}")
+
+
+def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
+    """Of test sheets: the circuit as terminals have it, as a T, and by the textbook's approximations; what was assumed."""
+    from commissioner.cli.screens.screen import out, table
+
+    rows = []
+    for label, key, unit, factor in ROWS:
+        quantity = document["parameters"][key]
+        std = "not known" if quantity["std"] is None else f"{factor * quantity['std']:.2g}"
+        rows.append((label, f"{factor * quantity['value']:.5g}", std, unit))
+    ends = document["at_terminals"]
+    rows.append(("between two terminals, R", f"{ends['resistance_uv_ohm']:.5g}", "", "ohm"))
+    rows.append(("between two terminals, L idle", f"{1e3 * ends['inductance_uv_h']:.5g}", "", "mH"))
+    title = "Identified from " + ", ".join(sources)
+    out.print(table(title, ("per phase, star equivalent", "value", "std error", "unit"), rows))
+    t, book = document["t_circuit"], document["textbook"]
+    w = 2.0 * 3.141592653589793 * book["frequency_hz"]
+    exact = (
+        t["stator_resistance_ohm"], t["rotor_resistance_ohm"], w * t["stator_leakage_h"], w * t["rotor_leakage_h"],
+        w * t["magnetizing_inductance_h"],
+    )  # fmt: skip
+    usual = [book[k] for k in ("r1_ohm", "r2_ohm", "x1_ohm", "x2_ohm", "xm_ohm")]
+    lines = [
+        (name, f"{a:.4g}", f"{b:.4g}")
+        for name, a, b in zip(("R_1", "R_2", "X_1", "X_2", "X_M"), exact, usual, strict=True)
+    ]
+    heads = (f"T circuit at {book['frequency_hz']:g} Hz, ohm", "same terminals", "usual approximations")
+    out.print(table("", heads, lines, right=(1, 2)))
+    out.print(f"Method: {document['method']}.")
+    for remark in document["remarks"]:
+        out.print(f"- {remark}", markup=False)

@@ -13,7 +13,8 @@ from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.cli.signals import let_end
 from commissioner.operations.check import CheckRequest, check
-from commissioner.operations.commission import CommissionRequest, Origin, check_request, commission
+from commissioner.operations.commission import CommissionRequest, check_request, commission
+from commissioner.run.commission import Origin
 from commissioner.run.stopping.dead_man import DeadMan
 from commissioner.run.stopping.operator_stop import OperatorStop
 
@@ -29,7 +30,7 @@ def run(request: CommissionRequest, *, yes: bool, as_json: bool, dead_man: bool 
         _ask(request)
     with OperatorStop() as stop:
         with LiveView(screen.err if as_json else screen.out) as view:
-            done = commission(request, view, stop)
+            done = commission(request, view, Origin(stop=stop))
         let_end()
     show_and_exit(done, as_json=as_json)
 
@@ -43,7 +44,7 @@ def hold_and_commission(request: CommissionRequest) -> None:
     held.start()
     facts = held.wait_for_begin()
     with stop:
-        done = commission(request, stop=stop, origin=Origin(facts, _say_folder))
+        done = commission(request, origin=Origin(facts, _say_folder, stop))
         let_end()
     show_and_exit(done, as_json=True)
 

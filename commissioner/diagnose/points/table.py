@@ -128,7 +128,7 @@ def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> D
             f"{f.size} different points cannot carry an answer",
             f.size,
             f"at least {LEAST_POINTS}",
-            "measure at more voltages",
+            "measure at more voltages; or give the direct-current, no-load and locked-rotor tests together",
         )
     if f.size > MOST_POINTS:
         return refused(

@@ -13,18 +13,19 @@ from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import Points, is_points_table, read_points
+from commissioner.diagnose.points.table import Points, read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
+from commissioner.operations.recordings.sheets import are_sheets, are_three
+from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
@@ -75,14 +76,14 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     """Recordings together, of one motor at standstill or running; where all files are tables of test points, each on its own.
 
     Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
-    `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
+    A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(Path(path), said) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
-    if all(is_points_table(list(t.columns)) for t in tables):
-        return _points(tables, request.motor, request.out)
+    if are_sheets(tables):
+        return _points(tables, request)
     if any(is_running(t) for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
@@ -132,9 +133,15 @@ def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, t
     _write(out, document, seen.model, page, "report.html")
 
 
-def _points(tables: Sequence[Table], motor: str | None, out: Path | None) -> Diagnosed:
-    """The stator resistance of a locked-rotor table serves the others."""
-    plate = plate_metadata(motor)
+def _points(tables: Sequence[Table], request: DiagnoseRequest) -> Diagnosed:
+    """The stator resistance of a locked-rotor table serves the others; a few rows of different tests make one circuit."""
+    out = request.out
+    if are_three(tables):
+        one = of_three_tests(tables, request.motor, trust_from(request.trust))
+        if out is not None:
+            _write_points(out, one, [one], _names(tables)[:1])
+        return Diagnosed(one, out)
+    plate = plate_metadata(request.motor)
     read = [read_points(t.columns, Path(t.source).stem, {**t.metadata, **plate}) for t in tables]
     known = [p.resistance_ohm.mean() for p in read if isinstance(p, Points) and p.resistance_ohm is not None]
     resistance_ohm = float(known[0]) if known else None

@@ -66,12 +66,27 @@ class IdentifiedRunning:
     files: tuple[Path, ...]
 
 
-def identify_any(request: IdentifyRequest, observe: Observe = nobody) -> Identified | IdentifiedRunning:
-    """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine."""
+@dataclass(frozen=True)
+class IdentifiedSheets:
+    """Of test sheets: direct current, no load, locked rotor; nothing is written into a drive from them."""
+
+    document: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+
+def identify_any(
+    request: IdentifyRequest, observe: Observe = nobody
+) -> Identified | IdentifiedRunning | IdentifiedSheets:
+    """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine, test sheets
+    by their three tests."""
     from commissioner.operations.recordings.running import identified, is_running
+    from commissioner.operations.recordings.sheets import are_sheets
+    from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(path, said) for path in request.files]
+    if are_sheets(tables):
+        return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     if not any(is_running(t) for t in tables):
         return identify(request, observe)
     observe(Began("identifying"))

@@ -109,12 +109,13 @@ def _are_numbers(rows: Sequence[Row]) -> bool:
 
 
 def _with_text(rows: Sequence[Row]) -> bool:
-    """Rows of numbers with a column of texts among them (a date, a state), the same in all."""
-    if len(rows) < HEAD_ROWS:
+    """Rows of numbers with a column of texts among them (a date, a state, a test's name), the same in all: two at least, where
+    the file ends with them."""
+    if len(rows) < HEAD_ROWS - 1:
         return False
     kinds = [tuple(is_numeric(c) for c in r) for r in rows]
     numbers = sum(kinds[0])
-    filled = sum(1 for c in rows[0] if is_number(c))
+    filled = max(sum(1 for c in r if is_number(c)) for r in rows)
     return len(set(kinds)) == 1 and filled >= 3 and len(rows[0]) - numbers <= max(2, len(rows[0]) // 4)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import DataRefused
-from commissioner.recordings.names import is_per_minute, meaning_of, reversed_pair, uses_rst
+from commissioner.recordings.names import is_per_minute, is_sheet, meaning_of, reversed_pair, sheet_meaning, uses_rst
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
 from commissioner.recordings.units import FOREIGN, read_unit, unit_in
@@ -36,6 +36,7 @@ def recognise(
 ) -> Recognised:
     """The columns by the contract's names where they mean one, else by their own; see the module."""
     with_s = uses_rst([n for n in names if n])
+    of_sheet = is_sheet(names)
     columns: dict[str, Signal] = {}
     readings, notes, unnamed = [], [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
@@ -44,6 +45,9 @@ def recognise(
         if not name:
             continue
         meaning, factor = _meaning(name, unit, targets.get(name), with_s, source)
+        if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_meaning(name)):
+            unit = unit or _power_unit(name)
+            meaning, factor = found, _factor(name, unit, found, source)
         if meaning in columns:
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
@@ -55,6 +59,11 @@ def recognise(
                 columns[meaning] = factor * values[k] if factor != 1.0 else values[k]
         readings.append(ColumnReading(name, meaning, unit, factor))
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _power_unit(name: str) -> str:
+    """`kw` at the end of a test sheet's `power_kw`, which no other column has."""
+    return "kW" if name.lower().endswith("_kw") else ""
 
 
 def _bare(name: str) -> str:

@@ -64,12 +64,15 @@ def points_page(document: Mapping[str, Any], name: str) -> Page:
     facts: list[tuple[str, str]] = []
     below = sections.what_it_means(document)
     if document["verdict"] != "refused":
-        facts = [("error, constant parameters", percent(gain["relative_error_before"]))]
-        if document["causes"]:
-            facts.append(("error, with the named causes", percent(gain["relative_error_after"])))
-        facts.append(("measured on", "points kept aside for checking"))
-        below += [sections.points_causes(document), *_over_points(document)]
-        if document["verdict"] != "unexplained":
+        if gain["relative_error_before"] is not None:
+            facts = [("error, constant parameters", percent(gain["relative_error_before"]))]
+            if document["causes"]:
+                facts.append(("error, with the named causes", percent(gain["relative_error_after"])))
+            facts.append(("measured on", "points kept aside for checking"))
+            below += [sections.points_causes(document), *_over_points(document)]
+        if document.get("test") == "three tests":
+            below.append(sections.circuit(document))
+        elif document["verdict"] != "unexplained":
             below.append(sections.parameters(document))
     return Page(
         title=f"Diagnosis of {document.get('test', 'test')} points: {name}",

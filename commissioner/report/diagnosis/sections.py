@@ -187,6 +187,13 @@ def parameters(document: Document) -> Section:
     )
 
 
+def circuit(document: Document) -> Section:
+    """The circuit of three tests, which nothing is left over to judge."""
+    after = document["parameters_after"]
+    rows = [(title, _plain(after[key], scale, unit)) for key, title, scale, unit in NAMES if key in after]
+    return Section("The circuit", [Table(("inverse-Gamma, per star phase", "value"), rows)])
+
+
 def _flux_of(document: Document) -> str:
     if any(CATALOGUE[c["name"]].bends_l_m for c in document["causes"]):
         return " The magnetizing inductance here is the unsaturated value, above the one at rated flux."

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.report.run.contract import RunDocument, WrittenRow
 
 

@@ -26,11 +26,11 @@ from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire import clients
 from commissioner.link.wire.modbus import ModbusPort
 from commissioner.link.wire.url import parse_url
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate, rated_flux
 from commissioner.procedure.course import Findings, course
 from commissioner.procedure.energised import excite
 from commissioner.procedure.findings import RunEnded
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.run import runner as running
 from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.settings import load_procedure

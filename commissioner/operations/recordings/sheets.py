@@ -1,0 +1,96 @@
+"""Test sheets of a motor - direct current, no load, locked rotor - as an identification, and as what a diagnosis says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+from commissioner.diagnose.contract import DiagnosisDocument
+from commissioner.diagnose.document import CONVENTION
+from commissioner.diagnose.points.table import is_points_table
+from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
+from commissioner.errors import DataRefused
+from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
+from commissioner.motor.plate_match import contradiction, rated_point
+from commissioner.operations.recordings.intake import plate_metadata
+from commissioner.operations.recordings.trust import Trust, refused, trusted_data
+from commissioner.procedure.verdict import PARAMETERS
+from commissioner.recordings.table import Table
+
+NOTHING_LEFT = (
+    "Three tests fix the circuit and leave nothing over: no cause can be seen or ruled out. The circuit is below; `identify` "
+    "shows it with what was assumed."
+)
+
+
+def are_sheets(tables: Sequence[Table]) -> bool:
+    """Whether all files are tables of test points."""
+    return all(is_points_table(list(t.columns)) for t in tables)
+
+
+def are_three(tables: Sequence[Table]) -> bool:
+    """Whether they are the few rows of different tests that make a circuit together."""
+    return are_three_tests([t.columns for t in tables])
+
+
+def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> dict[str, Any]:
+    """The circuit's document. DataRefused: a test is missing or impossible, or contradicts the plate and nobody decided."""
+    plate = plate_metadata(motor)
+    found = solve([t.columns for t in tables], [{**t.metadata, **plate} for t in tables])
+    if isinstance(found, DataRefused):
+        raise found
+    decided = _against_plate(found, {**{k: v for t in tables for k, v in t.metadata.items()}, **plate}, trust)
+    circuit = found.circuit
+    std = None if found.slow is None else found.slow.std_ohm
+    values = dict(zip(PARAMETERS, circuit.as_tuple(), strict=True))
+    parameters = {n: {"value": v, "std": std if n == "rotor_resistance_ohm" else None} for n, v in values.items()}
+    parameters["rotor_time_constant_s"] = {"value": circuit.rotor_time_constant_s, "std": None}
+    return {
+        "kind": "three tests",
+        "method": found.method,
+        "convention": CONVENTION,
+        "parameters": parameters,
+        "t_circuit": asdict(found.t_circuit),
+        "textbook": dict(found.textbook),
+        "at_terminals": {
+            "resistance_uv_ohm": 2.0 * circuit.stator_resistance_ohm,
+            "inductance_uv_h": 2.0 * (circuit.leakage_inductance_h + circuit.magnetizing_inductance_h),
+            "leakage_uv_h": 2.0 * circuit.leakage_inductance_h,
+        },
+        "losses": asdict(found.losses),
+        "rows": dict(found.rows),
+        "remarks": [*decided, *found.assumed, *_notes(tables)],
+    }
+
+
+def diagnosed(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> DiagnosisDocument:
+    """What a diagnosis says of them: their circuit, and that nothing is left over."""
+    made = identified(tables, motor, trust)
+    document: dict[str, Any] = {
+        "verdict": "nothing_significant", "reason": NOTHING_LEFT, "kind": "points", "test": "three tests",
+        "convention": CONVENTION, "causes": [],
+        "gain": {"held_out": None, "rmse_before_a": None, "rmse_after_a": None, "noise_floor_a": None,
+                 "relative_error_before": None, "relative_error_after": None},
+        "parameters_before": {}, "parameters_after": made["parameters"], "remarks": made["remarks"],
+        "next_experiment": None, "model_file": None,
+        **{k: made[k] for k in ("t_circuit", "textbook", "at_terminals", "losses", "method")},
+    }  # fmt: skip
+    return cast("DiagnosisDocument", document)
+
+
+def _against_plate(found: ThreeTests, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:
+    if any(not isinstance(plate.get(key), float | int) for key in NAMEPLATE_KEYS):
+        return []
+    nameplate = nameplate_from(plate)
+    against = contradiction(rated_point(found.circuit, nameplate), nameplate)
+    if against is None:
+        return []
+    if trust != "data":
+        raise refused(against)
+    return [trusted_data(against)]
+
+
+def _notes(tables: Sequence[Table]) -> list[str]:
+    return [f"{Path(t.source).name}: {note.what}." for t in tables for note in t.notes]

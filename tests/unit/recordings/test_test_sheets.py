@@ -1,0 +1,42 @@
+"""Test sheets as people write them: names, units, decimal commas, the test's name in a column of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
+
+SHEETS = {
+    "contract": "test,frequency_hz,voltage_line_v,current_line_a,power_w\ndc,0,13.6,28.0,380.8\nno_load,60,208,8.17,420\n"
+    "locked_rotor,15,25,27.9,920\n",
+    "units": "Test type,Line voltage (V),Line current (A),Input power (W),Frequency (Hz)\nBlocked rotor,25,27.9,920,15\n"
+    "No load,208,8.17,420,60\nDC,13.6,28.0,,0\n",
+    "german": "Versuch;f [Hz];U [V];I [A];P [kW]\nGleichstrom;;13,6;28,0;\nLeerlauf;60;208;8,17;0,42\nKurzschluss;15;25;27,9;0,92\n",
+    "short": "test,voltage_v,current_a,power_kw,frequency_hz,winding_resistance_uv_ohm\nno-load,208,8.17,0.42,60,0.4857\n"
+    "locked,25,27.9,0.92,15,0.4857\n",
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_sheet_gives_its_circuit_under_anybodys_headers(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(SHEETS[name], encoding="utf-8")
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    found = [q["value"] for q in done.document["parameters"].values()]
+    assert found[:4] == pytest.approx([0.2429, 0.1514, 3.484e-3, 35.11e-3], rel=1e-3)
+    assert all(q["std"] is None for q in done.document["parameters"].values())
+
+
+def test_a_diagnosis_of_three_tests_says_that_nothing_is_left_over(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(SHEETS["contract"], encoding="utf-8")
+    done = diagnose(DiagnoseRequest((path,), out=tmp_path / "out"))
+    assert done.document["causes"] == [] and "leave nothing over" in done.document["reason"]
+    assert np.isclose(done.document["parameters_after"]["rotor_resistance_ohm"]["value"] or 0.0, 0.1514, rtol=1e-3)
+    page = (tmp_path / "out" / "report_sheet.html").read_text(encoding="utf-8")
+    assert "three tests" in page and "0.2429" in page
