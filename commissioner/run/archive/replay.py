@@ -12,7 +12,7 @@ from typing import Any
 
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import archived_profile
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.checks import DriveLimits, StreamPace
 from commissioner.procedure.course import Findings, Job, course
@@ -66,7 +66,7 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     if not any(line["kind"] in _DECISIONS for line in journal):
         raise damaged(folder, "journal.jsonl", "no decision behind the job")
     archived = [_decision(line["kind"], line["record"]) for line in journal if _is_compared(line)]
-    announcer = Announcer(load_profile(read_saved(folder, "request.json", "profile")["profile"]))
+    announcer = Announcer(archived_profile(str(read_saved(folder, "request.json", "profile")["profile"])))
     kinds = {line["kind"] for line in journal}
     is_by_itself = "run_ended" in kinds and "error" not in kinds and not salvage
     if is_by_itself:
