@@ -118,8 +118,8 @@ def identify(
     examined = audit(recording)
     require_amperes(examined, plate)
     require_volts(examined, plate)
-    require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
+    require_tones(examined, period_s)
     first, *others = _by_test(examined)
 
     def one(stretches: Sequence[Stretch]) -> AxisFit:
