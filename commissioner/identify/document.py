@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.identify import contract
+from commissioner.identify.analysis import Identification
 from commissioner.identify.estimate.axis import AxisResult
 from commissioner.identify.inverter.staircase import InverterError, Staircase
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
-
-if TYPE_CHECKING:
-    from commissioner.identify.analysis import Identification
 
 CONVENTION = "SI, per-phase star equivalent, rotor referred to the stator; std is one standard deviation"
 

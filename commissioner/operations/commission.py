@@ -12,8 +12,8 @@ from commissioner.run.commission import Commissioned, Origin, require_capabiliti
 from commissioner.run.commission import commission as carry_out_and_close
 from commissioner.settings import load_motor, load_procedure
 
-DIAGNOSIS_S = 60.0
-"""Four tests with five causes in them take 40 s on two cores."""
+DIAGNOSIS_S = 180.0
+"""Four tests with five causes in them take 40 s on two quiet cores, 106 s with other work beside: then it is given up, wherever it is."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,6 +109,8 @@ class Path:
     rotor_current: Array
     drive: Drive
     machine: Machine
+    at_work: Mapping[int, list[int]]
+    """Memory operators and branches, by kind, that have a size or were asked for: all that a derivative along this path may be by."""
 
 
 def _channels(record: Record, position: int) -> Array:
@@ -128,7 +130,8 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
     drive = Drive(va, vb, *modulation(model, segment, channels))
-    machine = _machine(model, layout, asked)
+    at_work = {kind: _at_work(kind, model, asked) for kind in (kinds.STOP, kinds.BRANCH)}
+    machine = _machine(model, layout, asked, at_work)
     period = segment.period_s
     start, memory = initial_state(model, segment, machine)
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v}
@@ -137,7 +140,7 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
         transition, gain, output, slope = exact_step(model.nominal, period)
         states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
         rotor = states[:-1, 2:4].T / model.nominal[3] - current
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
     if not acting & kinds.NONLINEAR:
         rate = _fastest(model, machine.branch_gain, machine.branch_time) * period
         steps = max(int(np.ceil(rate)), 1) * layout.substeps
@@ -145,12 +148,12 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
         states, current, after, before, rotor = propagate_varying(
             drive, period, steps, _taylor_order(rate / steps), whole, machine, start
         )
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
     steps = _substeps(model, layout, segment, asked)
     states, stops, current, after, before, rotor = propagate(
         drive, period, steps, layout.crossing_substeps, machine, start, memory
     )
-    return Path(states, stops, current, after, before, rotor, drive, machine)
+    return Path(states, stops, current, after, before, rotor, drive, machine, at_work)
 
 
 def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
@@ -171,7 +174,7 @@ def _tangent(
     path: Path, model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]
 ) -> Array:
     wanted = {t.kind for t in asked}
-    place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}
+    place = path.at_work
     at_work = np.array([*kinds.NOMINAL, *(t.kind for t in asked)], dtype=np.int64)
     indices = np.array(
         [0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64
@@ -214,7 +217,7 @@ def _at_work(kind: int, model: Model, asked: Sequence[Term]) -> list[int]:
     return sorted(acting | {t.index for t in asked if t.kind == kind})
 
 
-def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> Machine:
+def _machine(model: Model, layout: Layout, asked: Sequence[Term], at_work: Mapping[int, list[int]]) -> Machine:
     aniso = [
         model.sum_kind(k, 2) for k in (kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)
     ]
@@ -245,7 +248,7 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> Machine:
             *(1.0 + shares),
         ]
     )
-    stops, branches = _at_work(kinds.STOP, model, asked), _at_work(kinds.BRANCH, model, asked)
+    stops, branches = at_work[kinds.STOP], at_work[kinds.BRANCH]
     wanted = {t.kind for t in asked}
 
     def shape(kind: int, vectors: Array) -> Array:

@@ -12,13 +12,15 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import Points, read_points
+from commissioner.diagnose.points.table import read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
+from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
@@ -30,6 +32,7 @@ from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.records import StandstillRecording
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
@@ -97,6 +100,9 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     require_one_motor(recordings)
     recordings, copies = without_copies(recordings)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
+    if seen.verdict.value == "unexplained" and all(any(n.code == COMPUTED for n in r.notes) for r in recordings):
+        seen, said = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
+        remarks = [*said, *remarks]
     document = as_document(seen, None)
     decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
     remarks = [*decided, *remarks]
@@ -106,6 +112,23 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     if request.out is not None:
         _write_recordings(request.out, seen, document, tables)
     return Diagnosed(document, request.out, seen)
+
+
+def _of_another_pair(
+    recordings: Sequence[StandstillRecording], seen: Diagnosis, excluded: tuple[str, ...], observe: Observe, go_on: GoOn
+) -> tuple[Diagnosis, list[str]]:
+    """The diagnosis with the computed current in another column, where that one explains what this one does not."""
+    choices = [other_pairs(r) for r in recordings]
+    for k, (name, _) in enumerate(choices[0]):
+        other = analyse([c[k][1] for c in choices], excluded=excluded, report=observe, go_on=go_on)
+        if other.verdict.value == "explained":
+            pair = {"u": ("v", "w"), "v": ("w", "u")}[name]
+            said = (
+                f"Explained only where current {name} is the computed one: phases u and v of this diagnosis are {pair[0]} and {pair[1]} "
+                "of the recording, axes are counted from there."
+            )
+            return other, [said]
+    return seen, []
 
 
 def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:
