@@ -12,7 +12,6 @@
         |-- DriveFault                    the drive tripped, or does not do what it acknowledged
         |-- IdentityMismatch              not the drive, firmware or values that were expected
         |-- WriteBackFailed               read-back differs; says whether the snapshot was restored
-        |-- SamplesLost                   the stream lost more than the estimate can bridge
         `-- LinkError                     the wire
             |-- LinkUnreachable           nothing answers at the URL
             |-- ReplyTimeout              a request without an answer
@@ -118,10 +117,6 @@ class WriteBackFailed(DriveError):
     """`was_restored`: the snapshot was seen in the drive again; False says it was not, or could not be, verified."""
 
     was_restored: bool = False
-
-
-class SamplesLost(DriveError):
-    pass
 
 
 class LinkError(DriveError):

@@ -17,7 +17,6 @@ CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
 MAX_BYTES, MAX_DOTS = 250_000, 500
 """Of a TOML file, and in one line of it: the time that a dotted key takes grows with the square of its parts."""
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Percent = Annotated[float, Field(gt=0, le=100)]
 
 
@@ -77,6 +76,7 @@ class _Acceptance(_File):
     rotor_resistance_std_percent: Percent
     magnetizing_std_percent: Percent
     axis_spread_percent: Percent
+    strict: bool = False
 
 
 class ProcedureFile(_File):
@@ -102,8 +102,11 @@ def load_motor(name_or_path: str) -> Nameplate:
     return nameplate
 
 
-def load_procedure(path: Path | None = None, axes_deg: tuple[float, ...] | None = None) -> ProcedurePlan:
-    """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes."""
+def load_procedure(
+    path: Path | None = None, axes_deg: tuple[float, ...] | None = None, *, strict: bool = False
+) -> ProcedurePlan:
+    """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes, `strict` its
+    leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     model = _load(source, ProcedureFile)
     if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
@@ -119,7 +122,7 @@ def load_procedure(path: Path | None = None, axes_deg: tuple[float, ...] | None 
         supervision=Supervision(**model.supervision.model_dump()),
         limits=Limits(**model.limits.model_dump()),
         excitation=ExcitationPlan(**model.excitation.model_dump()),
-        acceptance=Acceptance(**model.acceptance.model_dump()),
+        acceptance=Acceptance(**(model.acceptance.model_dump() | ({"strict": True} if strict else {}))),
     )
 
 

@@ -52,16 +52,21 @@ def wanted(problem: Mapping[str, Any], model: type[BaseModel] | None = None) -> 
     location = problem["loc"]
     if problem["type"] == "extra_forbidden":
         return "no such key" + (f"; known here: {', '.join(_keys(model, location[:-1]))}" if model else "")
-    name, unit = human(str(location[-1])) if location else ("the whole", "")
-    kind = problem["type"].partition("_")[0]
-    if kind in ("missing", "value"):
-        what = "needed" if kind == "missing" else str(problem["ctx"]["error"])
-    else:
-        what = _limit(problem, f" {unit}" if unit else "") or _WANTED.get(kind, "another value")
-    where = f" in {unit}" if unit and kind in ("int", "float", "finite") else ""
+    name = human(str(location[-1]))[0] if location else "the whole"
     field = _field(model, location) if model else None
     description = f" ({field.description})" if field is not None and field.description else ""
-    return f"{name}: {what}{where}{description}"
+    return f"{name}: {requirement(problem)}{description}"
+
+
+def requirement(problem: Mapping[str, Any]) -> str:
+    """The same without the field's name: `needed`, `a whole number`, `50 1/min or more`."""
+    location = problem["loc"]
+    unit = human(str(location[-1]))[1] if location else ""
+    kind = problem["type"].partition("_")[0]
+    if kind in ("missing", "value"):
+        return "needed" if kind == "missing" else str(problem["ctx"]["error"])
+    what = _limit(problem, f" {unit}" if unit else "") or _WANTED.get(kind, "another value")
+    return what + (f" in {unit}" if unit and kind in ("int", "float", "finite") else "")
 
 
 def human(key: str) -> tuple[str, str]:

@@ -49,6 +49,12 @@ Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in c
 Procedure = Annotated[
     Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
 ]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="Reject also where axes differ by a named cause, samples were lost or the flux guard acted."
+    ),
+]
 Seal = Annotated[
     Path | None,
     typer.Option(
@@ -76,6 +82,9 @@ WhichOutcome = Annotated[str, typer.Option("--outcome", help="commissioned, reje
 Since = Annotated[str, typer.Option("--since", help="UTC date, as 2026-11-25 or the start of one.")]
 Until = Annotated[str, typer.Option("--until", help="UTC date, included.")]
 Limit = Annotated[int | None, typer.Option("--limit", min=0, help="So many of the newest; 0: all.")]
+TableOut = Annotated[
+    Path | None, typer.Option("--out", help="Write them as a table instead: .csv or .parquet, a row a run.")
+]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 RUNS = Path("runs")
 
@@ -109,6 +118,7 @@ def demo(
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
     diagnosis: Diagnosed = True,
+    strict: Strict = False,
 ) -> None:
     """The whole job against the simulated inverter, started as its own process on loopback."""
     from commissioner.cli.verbs.demo import demo as verb
@@ -122,6 +132,7 @@ def demo(
         runs=runs,
         as_json=json,
         diagnosis=diagnosis,
+        strict=strict,
     )
 
 
@@ -154,9 +165,15 @@ def run(
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
     seal: Seal = None,
+    strict: Strict = False,
     tag: Annotated[str, typer.Option("--tag", help="Which motor this is: its tag, kept with the run.")] = "",
     motor_serial: Annotated[
         str, typer.Option("--motor-serial", help="The motor's serial number, kept with the run.")
+    ] = "",
+    place: Annotated[str, typer.Option("--place", help="Where this is, kept with the run.")] = "",
+    cable: Annotated[
+        str,
+        typer.Option("--cable", help="Cable and load, as `30 m, 4 x 2.5 mm2, coupled to the pump`, kept with the run."),
     ] = "",
     dead_man: Annotated[
         bool,
@@ -174,7 +191,7 @@ def run(
 
     request = CommissionRequest(
         drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal,
-        tag, motor_serial,
+        strict, tag, motor_serial, place, cable,
     )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
 
@@ -352,12 +369,13 @@ def runs_list(
     since: Since = "",
     until: Until = "",
     limit: Limit = None,
+    out: TableOut = None,
     archive: Database = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    runs_find([], motor, drive, serial, person, outcome, since, until, limit, archive, runs, json)
+    runs_find([], motor, drive, serial, person, outcome, since, until, limit, out, archive, runs, json)
 
 
 @runs_app.command("find")
@@ -373,16 +391,20 @@ def runs_find(
     since: Since = "",
     until: Until = "",
     limit: Limit = None,
+    out: TableOut = None,
     archive: Database = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """The runs that hold all of these words."""
-    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs
+    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs, write_table
     from commissioner.operations.history.runs import Wanted
 
-    most = limit if limit is not None else 0 if json else SHOWN
+    most = limit if limit is not None else 0 if json or out else SHOWN
     wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
+    if out is not None:
+        write_table(runs, out, as_json=json, wanted=wanted, database=archive)
+        return
     list_runs(runs, as_json=json, wanted=wanted, database=archive)
 
 
@@ -503,15 +525,23 @@ def runs_trend(
 
 @runs_app.command("push")
 def runs_push(
-    target: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
+    target: Annotated[
+        str,
+        typer.Argument(help="Folder of another archive, also on a mounted share; or http(s)://HOST:PORT of a service."),
+    ],
     run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
+    account: Annotated[str, typer.Option(help="Name of an account of the service, an operator's.")] = "",
+    password_file: Annotated[
+        Path | None, typer.Option(help="Read its password from this file; asked for if not given.")
+    ] = None,
+    ca: Annotated[Path | None, typer.Option(help="PEM file of who vouches for the service's certificate.")] = None,
     runs: Runs = RUNS,
     json: Json = False,
 ) -> None:
     """Run folders to another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import move
+    from commissioner.cli.verbs.archived.moving import push
 
-    move(runs, target, run or (), to_it=True, as_json=json)
+    push(runs, target, run or (), account=account, password_file=password_file, ca=ca, as_json=json)
 
 
 @runs_app.command("pull")
@@ -522,9 +552,9 @@ def runs_pull(
     json: Json = False,
 ) -> None:
     """Run folders from another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import move
+    from commissioner.cli.verbs.archived.moving import pull
 
-    move(runs, source, run or (), to_it=False, as_json=json)
+    pull(runs, source, run or (), as_json=json)
 
 
 @runs_app.command("verify")

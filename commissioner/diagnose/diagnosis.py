@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from commissioner.diagnose.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.causes import CATALOGUE, LINEAR
 from commissioner.diagnose.causes.inverter.legs import tail_of_legs
 from commissioner.diagnose.export.model_file import model_document
@@ -17,9 +18,10 @@ from commissioner.diagnose.fit.gauss_newton import Fit, inverse
 from commissioner.diagnose.intake.audit import Audit, prepare
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
+from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
-from commissioner.diagnose.search.journal import Said, Step, followed
+from commissioner.diagnose.search.journal import Said, Step, followed, replayed
 from commissioner.diagnose.search.search import Found, search
 from commissioner.diagnose.verdict.causes import (
     Cause,
@@ -30,9 +32,8 @@ from commissioner.diagnose.verdict.causes import (
 from commissioner.diagnose.verdict.evidence import HeldOut, hold_out
 from commissioner.diagnose.verdict.experiment import next_experiment
 from commissioner.diagnose.verdict.lack_of_fit import LackOfFit, lack_of_fit
-from commissioner.diagnose.verdict.parameter_shift import PARAMETERS
 from commissioner.errors import DataRefused
-from commissioner.motor.circuit import Quantity
+from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.records import StandstillRecording
 
 NEVER_NAMEABLE = (
@@ -75,6 +76,8 @@ class Diagnosis:
     unsure: tuple[Cause, ...] = ()
     """Fitted, and more likely wrong than right as names: what they explain counts as left."""
     refusal: DataRefused | None = None
+    is_complete: bool = True
+    """False: given up before nothing more passed the rules, and nothing is named."""
     steps: tuple[Step, ...] = ()
     """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
 
@@ -88,9 +91,16 @@ def diagnose(
 ) -> Diagnosis:
     """Names what a four-parameter simulation gets wrong about the recordings of one motor.
 
-    `go_on` is asked between causes; once it says no, the answer is given with what was found so far, and says so.
+    Once `go_on` says no, the search is given up within a segment's prediction; the answer says so, and names nothing.
     Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason.
     """
+    averaged = [int(np.max(r.averaged)) for r in recordings if r.averaged is not None]
+    if averaged:
+        refusal = refused(
+            "the samples are means over several control periods", max(averaged), "1 control period a sample",
+            "diagnose a recording of every sample: a faster link, or a scope",
+        )  # fmt: skip
+        return _refused(refusal, Audit(()))
     record, audit = prepare(recordings)
     if audit.refusal:
         return _refused(audit.refusal, audit)
@@ -98,20 +108,47 @@ def diagnose(
     if audit.step_a:
         noise = noise.with_converter_step(np.array(audit.step_a), resting_share(record))
     rms_a = noise.rms_a(max(s.count for s in record.segments), record.facts.sample_period_s)
-    measured = Said(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}")
-    report(measured)
+    steps: list[Step] = []
+
+    def heard(step: Step) -> None:
+        steps.append(step)
+        report(step)
+
+    heard(Said(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}"))
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
         check = partial(check_before_search, noise=noise)
-        found, steps = followed(search(record, noise, excluded=excluded, check=check, go_on=go_on), report)
-        check_one_state(found.fit, found.record)
+        with given_up_by(go_on):
+            found = followed(search(record, noise, excluded=excluded, check=check), heard)
+            check_one_state(found.fit, found.record)
+            return replace(_conclude(found, audit, noise, excluded), steps=tuple(steps))
     except DataRefused as refusal:
         return _refused(refusal, audit, noise)
-    return replace(_conclude(found, audit, noise, excluded), steps=(measured, *steps))
+    except TimeOver:
+        return _unfinished(steps, audit, noise)
 
 
 def _refused(refusal: DataRefused, audit: Audit, noise: Noise | None = None) -> Diagnosis:
     return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", (), (), audit, noise, refusal=refusal)
+
+
+def _unfinished(steps: Sequence[Step], audit: Audit, noise: Noise) -> Diagnosis:
+    """Given up: what the search had accepted was not weighed against what else makes the same error, so that it is no name yet."""
+    so_far = ", ".join(replayed(steps).accepted)
+    return Diagnosis(
+        Verdict.UNEXPLAINED,
+        "Not finished: the time allowed was over before every cause was tried and weighed.",
+        (),
+        (),
+        audit,
+        noise,
+        remarks=(
+            "The time allowed was over before every cause was tried: diagnose the recording again without a limit.",
+            *([f"Seen on the way, and not yet weighed against others: {so_far}."] if so_far else []),
+        ),
+        steps=tuple(steps),
+        is_complete=False,
+    )
 
 
 def _conclude(found: Found, audit: Audit, noise: Noise, excluded: Sequence[str]) -> Diagnosis:
@@ -172,11 +209,6 @@ def _verdict(
         or leaves_a_trace
     ):
         names = ", ".join(c.name for c in causes)
-        if not found.is_complete:
-            return Verdict.UNEXPLAINED, (
-                f"Not finished: the time allowed was over before every cause was tried; a structured error of {lack.sigma:.2g} "
-                f"times the noise is left so far{', beside ' + names if names else ''}."
-            )
         seen = f" The data are consistent with {names}, but something else is in them too." if names else ""
         comes_and_goes = (
             " It comes and goes: in some moments much more is left than in most." if lack.from_bursts_sigma else ""
@@ -224,11 +256,7 @@ def _not_told_apart(lines: int) -> tuple[str, ...]:
 
 
 def _remarks(noise: Noise, found: Found, unsure: Sequence[Cause]) -> tuple[str, ...]:
-    out = (
-        []
-        if found.is_complete
-        else ["The time allowed was over before every cause was tried: diagnose the recording again without a limit."]
-    )
+    out = []
     if unsure:
         names = ", ".join(f"{c.name} ({c.strength_sigma:.2g} times the noise)" for c in unsure)
         out.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {names}.")

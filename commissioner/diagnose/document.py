@@ -53,7 +53,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
         "line_levels_db": dict(seen.split.level_db) if seen.split else {},
         "audit": list(seen.audit.sentences),
         "remarks": list(seen.remarks),
-        "is_complete": seen.found.is_complete if seen.found else True,
+        "is_complete": seen.is_complete,
         "search": written(seen.steps),
         "next_experiment": dict(seen.next_experiment) if seen.next_experiment else None,
         "model_file": model_file,

@@ -30,8 +30,6 @@ LOGARITHMIC = frozenset(
         "dead_knee", "inertia",
     )
 )  # fmt: skip
-OF_LINEAR_CHAIN = frozenset(k for k in range(AT["delay"], AT["current_offset_w"] + 1))
-"""Numbers of the current's chain: they act on a current that is already simulated."""
 DEFAULTS = {"leakage_knee": 2.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
 """Leakage flux of so many times rated current; corner of the bars in rad/s; of rated peak current; kg m^2."""
 

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from commissioner.errors import DataRefused
-from commissioner.motor.circuit import Gamma, InverseGamma, Quantity
+from commissioner.motor.circuit import PARAMETERS, Gamma, InverseGamma, Quantity
 
 CONVENTION = (
     "SI units; one phase of the star equivalent; rotor quantities referred to the stator; currents, voltages and fluxes of "
     "space vectors are peak values; std is one standard error"
 )
-_FOUR = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Found:
 
     @property
     def machine(self) -> InverseGamma:
-        return InverseGamma(*(self.parameters[name].value for name in _FOUR))
+        return InverseGamma(*(self.parameters[name].value for name in PARAMETERS))
 
     @property
     def gamma(self) -> Gamma:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.history.series import FALSE_ALARM, Array, Judged, judge
-from commissioner.identify.estimate.axes import NAMES, REPEATABILITY, RESISTANCE_PER_K, TEMPERATURE_K
+from commissioner.identify.estimate.axes import REPEATABILITY, RESISTANCE_PER_K, TEMPERATURE_K
 from commissioner.identify.estimate.common_ground import CommonGround, Result, at_one_flux, at_temperature
+from commissioner.motor.circuit import PARAMETERS
 
 YEAR_S = 365.25 * 86400.0
 
@@ -87,13 +88,13 @@ def motor_trends(measured: Sequence[Measured], *, false_alarm: float = FALSE_ALA
     ]
     time = np.array([one.time_s for one in measured])
     trends = []
-    for k, name in enumerate(NAMES):
+    for k, name in enumerate(PARAMETERS):
         value = np.array([result.combined.parameters.as_tuple()[k] for result in moved])
         claimed = np.array([math.sqrt(result.combined.covariance[k, k]) for result in moved]) / value
         heat = RESISTANCE_PER_K * TEMPERATURE_K * (1.0 if k < 2 else 0.0)
         unknown = np.array([heat if result.winding_degc is None else 0.0 for result in results])
         std = np.sqrt(claimed**2 + REPEATABILITY[k] ** 2 + unknown**2)
-        judged = judge(time / YEAR_S, np.log(value), std, tests=len(NAMES), false_alarm=false_alarm)
+        judged = judge(time / YEAR_S, np.log(value), std, tests=len(PARAMETERS), false_alarm=false_alarm)
         trends.append(_relative(name, measured, value, std, judged))
     sentences = [*said, *_heat_sentences(results, degc)]
     return Trends(

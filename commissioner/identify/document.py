@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.identify import contract
+from commissioner.identify.analysis import Identification
 from commissioner.identify.estimate.axis import AxisResult
 from commissioner.identify.inverter.staircase import InverterError, Staircase
-from commissioner.motor.circuit import InverseGamma, Quantity
-
-if TYPE_CHECKING:
-    from commissioner.identify.analysis import Identification
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 
 CONVENTION = "SI, per-phase star equivalent, rotor referred to the stator; std is one standard deviation"
 
@@ -39,7 +36,7 @@ def document(result: Identification) -> contract.IdentificationDocument:
             "assumption": result.t_model.assumption,
         },
         "axes": [_axis(axis) for axis in result.axes],
-        "dispersion": dict(zip(_NAMES, result.combined.relative_dispersion, strict=True)),
+        "dispersion": dict(zip(PARAMETERS, result.combined.relative_dispersion, strict=True)),
         "findings": [
             {
                 "cause": f.cause.name.lower(),
@@ -74,9 +71,6 @@ def document(result: Identification) -> contract.IdentificationDocument:
         "duration_s": result.duration_s,
         "remarks": list(result.remarks),
     }
-
-
-_NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 
 
 def parameters_json(machine: InverseGamma, covariance: np.ndarray, at_flux_wb: float) -> contract.Parameters:

@@ -13,7 +13,7 @@ from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
 from commissioner.monitor.partial import Partial
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
 from commissioner.monitor.trend.trend import Entry, Verdict
-from commissioner.motor.circuit import EQUAL_LEAKAGE
+from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS
 
 OPEN = 0.25
 """A combination that keeps more than this share of its prior variance was not fixed by the data."""
@@ -292,7 +292,7 @@ def _segment(observation: Observation) -> dict[str, float]:
 
 
 def _parameters(fitted: Fitted) -> dict[str, Measured]:
-    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+    names = PARAMETERS
     value = np.array(fitted.circuit.as_inverse_gamma().as_tuple())
     moved = np.array([circuit_at(fitted, step).as_inverse_gamma().as_tuple() for step in steps(fitted)])
     std = np.sqrt(np.sum((moved - value) ** 2, axis=0))

@@ -14,6 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
+"""The inverse-Gamma circuit's four as results name them, in its order."""
+
 
 class Quantity(NamedTuple):
     """A value with its standard deviation, both in the unit the field name says."""

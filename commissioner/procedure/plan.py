@@ -34,11 +34,14 @@ class ExcitationPlan:
 
 @dataclass(frozen=True)
 class Acceptance:
+    """Standard errors and the spread over axes that a result may have. `strict`: nor may anything unusual have happened."""
+
     resistance_std_percent: float
     leakage_std_percent: float
     rotor_resistance_std_percent: float
     magnetizing_std_percent: float
     axis_spread_percent: float
+    strict: bool = False
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from commissioner.identify.analysis import Identification, axis_at
-from commissioner.motor.circuit import InverseGamma, Quantity
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
 from commissioner.motor.plate_match import PlateMatch, mismatch, plate_match
 from commissioner.procedure.plan import Acceptance
@@ -49,7 +49,6 @@ class Verdict:
         )
 
 
-PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 _LIMIT = {
     "stator_resistance_ohm": "resistance_std_percent",
     "rotor_resistance_ohm": "rotor_resistance_std_percent",
@@ -64,12 +63,16 @@ Values = Mapping[str, Quantity]
 @dataclass(frozen=True)
 class Evidence:
     """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
-    test's values at the flux all of them reached."""
+    test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words; `lost_samples` of all tests;
+    `guard_acted`: the flux guard took the amplitude back."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
     batch: tuple[tuple[float, Values], ...] = ()
     at_one_flux: tuple[tuple[float, Values], ...] = ()
+    unlike: tuple[str, ...] = ()
+    lost_samples: int = 0
+    guard_acted: bool = False
 
 
 def evidence_of(identification: Identification) -> Evidence:
@@ -83,6 +86,8 @@ def evidence_of(identification: Identification) -> Evidence:
         axes=tuple((axis.axis_deg, _values(axis.parameters, s)) for axis, s in zip(axes, std, strict=True)),
         batch=tuple((axis.axis_deg, _values(b, s)) for axis, b, s in zip(axes, batch, std, strict=True)),
         at_one_flux=tuple((e.axis_deg, _values(e.parameters, s)) for e, s in zip(alike, std, strict=True)),
+        unlike=tuple(finding.cause.value for finding in identification.combined.findings),
+        lost_samples=identification.lost_samples,
     )
 
 
@@ -98,6 +103,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence.combined, acceptance),
         *_spread(evidence, acceptance),
+        *(_unusual(evidence) if acceptance.strict else ()),
     )
     if objections:
         return Verdict(Decision.REJECT, objections)
@@ -179,3 +185,17 @@ def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
                 f"{acceptance.axis_spread_percent:g} %",
                 "compare the current sensors' gains and the three phases' resistances",
             )
+
+
+def _unusual(evidence: Evidence) -> Iterator[Objection]:
+    """What a good result may have beside it, unless it was asked to be strict."""
+    for cause in evidence.unlike:
+        yield Objection(
+            f"strict: {cause}", "more than by chance", "axes alike", "mend the cause, or run without --strict"
+        )
+    if evidence.lost_samples:
+        yield Objection(
+            "strict: samples were lost on the way", evidence.lost_samples, 0, "use a faster or a quieter link"
+        )
+    if evidence.guard_acted:
+        yield Objection("strict: the flux guard took the amplitude back", "acted", "no cause to act", "check the plate")

@@ -79,9 +79,3 @@ def is_unit(text: str) -> bool:
     return (
         not bare or read_unit(text) is not None or bare in FOREIGN or bare in {"-", "none", "sequence", "unit", "units"}
     )
-
-
-def scale_of(unit: str) -> float:
-    """Factor to SI: 1e-3 for mA, 2 pi / 60 for rpm; 1 where no unit is recognised."""
-    found = read_unit(unit)
-    return found.scale if found else 1.0

@@ -7,7 +7,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import load_profile, reference
 from commissioner.link.wire.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
@@ -37,9 +37,6 @@ from commissioner.run.runner import Course, Present, Runner, kind_of
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop
 from commissioner.run.stopping.stop_file import stopped_by_file
 
-BUSY = 3.0
-"""The closing diagnosis may take this much longer on a computer that does something else as well."""
-
 
 @dataclass(frozen=True)
 class Order:
@@ -58,11 +55,23 @@ class Order:
         folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
         lock.name_run(folder.path.name)
         request = {
-            "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
+            "url": without_secrets(self.url), "profile": reference(self.profile), "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
         }  # fmt: skip
         folder.save("request.json", request | more)
         return folder
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Who asked for a run: under which names of drive and motor (`facts`, kept with the request), what is told the folder as soon
+
+    as there is one, and by what others end the run (None: the terminal's signals alone).
+    """
+
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    begun: Callable[[Path], None] = lambda _folder: None
+    stop: OperatorStop | None = None
 
 
 @dataclass(frozen=True)
@@ -85,26 +94,23 @@ def commission(
     present: Present,
     diagnosis_s: float = 0.0,
     key: bytes | None = None,
-    stop: OperatorStop | None = None,
-    begun: Callable[[Path], None] = lambda _folder: None,
-    origin: Mapping[str, Any] | None = None,
+    origin: Origin | None = None,
 ) -> Commissioned:
     """The whole job. Configuration errors are raised, and DriveInUse where another run has the drive; from the first request on, every end is a run with a folder.
 
     `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
     `key`: seals the folder (`archive.seal`).
-    `stop`: by which others end the run. `begun` is told the folder as soon as there is one. `origin`: who asked for the
-    run, and under which names of drive and motor; kept with the request.
     """
     profile = load_profile(profile_name)
     require_capabilities(profile, write_back=write_back)
     order = Order(url, profile, nameplate, plan, write_back, key)
     findings = Findings()
-    asked = OperatorStop() if stop is None else stop
+    origin = origin or Origin()
+    asked = origin.stop or OperatorStop()
     with DriveLock.take(parse_url(url), profile, ACT) as lock:
-        folder = order.open_folder(runs, lock, **({"origin": origin} if origin else {}))
+        folder = order.open_folder(runs, lock, **({"origin": origin.facts} if origin.facts else {}))
         with closing(folder), asked, stopped_by_file(folder.path, asked):
-            begun(folder.path)
+            origin.begun(folder.path)
             _tell(folder, present, WarmingUp())
             with suppress(Abandoned), asked.computing():
                 warm_up(nameplate)
@@ -196,9 +202,9 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
 
 
 def _time_left(seconds: float, stop: OperatorStop) -> Callable[[], bool]:
-    """Says no once `seconds` of two cores are used up, `BUSY` times as long has gone by, or the operator stops."""
-    end, work_end = time.monotonic() + BUSY * seconds, time.process_time() + 2.0 * seconds
-    return lambda: time.monotonic() < end and time.process_time() < work_end and not stop.asked
+    """Says no once so many seconds have gone by, or the operator stops."""
+    end = time.monotonic() + seconds
+    return lambda: time.monotonic() < end and not stop.asked
 
 
 def _with_diagnosis(

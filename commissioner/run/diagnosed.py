@@ -25,7 +25,7 @@ _KEPT = (
 def diagnose_run(folder: RunFolder, go_on: Callable[[], bool]) -> dict[str, Any]:
     """Short form for the result; the whole document goes to `diagnosis.json`. A recording that cannot be read is said.
 
-    No further cause is looked for once `go_on` says no.
+    Once `go_on` says no it is given up, unfinished.
     """
     try:
         recording = to_standstill(read_table(folder.path / RECORDING))

@@ -12,7 +12,7 @@ from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, problem_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import Record, prepare
-from commissioner.motor.circuit import Quantity
+from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.causes import CATALOGUE, always_tied
@@ -231,7 +231,7 @@ def _parameters(fit: Fit) -> dict[str, Quantity]:
     out = {}
     for name, key in zip(
         NAMES[:4],
-        ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h"),
+        PARAMETERS,
         strict=True,
     ):
         out[key] = Quantity(fit.machine.value(name), fit.std(name))

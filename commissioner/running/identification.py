@@ -16,14 +16,13 @@ from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import STATES, Record, first_part, prepare
-from commissioner.motor.circuit import InverseGamma, Quantity, TModel, to_t_model
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.lack import Lack, lack_of_fit
 from commissioner.running.nominal import FOUR, with_shaft, with_speed
 
 Array = NDArray[np.float64]
-KEYS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 SPEED_STEP_S = 4e-3
 """Between speeds that count as independent: the span over which they were smoothed."""
 AFTER_START_S = 0.15
@@ -105,7 +104,7 @@ def _of_four(fit: Fit) -> Array:
 def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
     out = {
         k: Quantity(v, float(v * np.sqrt(covariance[j, j])))
-        for j, (k, v) in enumerate(zip(KEYS, four.as_tuple(), strict=True))
+        for j, (k, v) in enumerate(zip(PARAMETERS, four.as_tuple(), strict=True))
     }
     spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
     t = four.rotor_time_constant_s
@@ -222,7 +221,7 @@ def as_document(seen: Identified) -> dict[str, object]:
         "inertia_kg_m2": None if seen.inertia is None else {"value": seen.inertia.value, "std": seen.inertia.std},
         "load": dict(seen.load),
         "bound_std": dict(seen.bound),
-        "covariance": {"of": [f"log {k}" for k in KEYS], "matrix": seen.covariance.tolist()},
+        "covariance": {"of": [f"log {k}" for k in PARAMETERS], "matrix": seen.covariance.tolist()},
         "holds_for_stator_flux_wb": flux,
         "t_model": {
             "stator_resistance_ohm": _measured(t.stator_resistance_ohm), "rotor_resistance_ohm": _measured(t.rotor_resistance_ohm),

@@ -16,6 +16,7 @@ from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
+from commissioner.validation import requirement
 
 SIMULATOR = "simulator"
 PLATE_FIELDS = tuple(name for name in MotorFile.model_fields if name != "name")
@@ -118,7 +119,7 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
             name = str(problem["loc"][0])
             described = MotorFile.model_fields[name].description if name in MotorFile.model_fields else None
             missing = problem["type"] == "missing" or values.get(name) in (None, "")
-            what = "is missing" if missing else _wrong(str(problem["type"]))
+            what = "is missing" if missing else f"must be {requirement(problem)}"
             if name in fields:
                 fields[name] = {"ok": False, "what": what, "remedy": described or "read the plate again"}
         return {"ok": False, "fields": fields, "efficiency": None, "usual_efficiency": None, "questions": []}
@@ -134,17 +135,6 @@ def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
         "ok": all(field["ok"] for field in fields.values()), "fields": fields, "efficiency": round(efficiency, 4),
         "usual_efficiency": usual_efficiency(plate), "slip": round(plate.rated_slip, 5), "questions": questions(plate),
     }  # fmt: skip
-
-
-def _wrong(kind: str) -> str:
-    """What pydantic found, as a technician says it."""
-    if kind.startswith("int"):
-        return "is no whole number"
-    if kind.startswith(("float", "finite")):
-        return "is no number"
-    if kind.startswith(("greater", "less")):
-        return "is outside what motors have"
-    return "is neither star nor delta" if kind == "literal_error" else "cannot be used"
 
 
 def efficiency_of(plate: Nameplate) -> float:

@@ -15,6 +15,7 @@ from commissioner.service.configuration import Settings
 from commissioner.service.library import Library
 from commissioner.service.recordings import Recordings
 from commissioner.service.runs.desk import Desk
+from commissioner.service.runs.incoming import Incoming
 from commissioner.service.simulator import Simulator
 from commissioner.service.warm import WarmUp
 
@@ -35,6 +36,7 @@ class Parts:
     desk: Desk
     archive: Archive
     recordings: Recordings
+    incoming: Incoming
     simulator: Simulator
     warm: WarmUp
     login_tries: Throttle = field(default_factory=lambda: Throttle(LOGIN_TRIES, LOGIN_WITHIN_S))
@@ -63,6 +65,7 @@ def make_parts(settings: Settings) -> Parts:
         Desk(settings, library, audit),
         Archive(settings.runs),
         Recordings(data / "recordings"),
+        Incoming(data / "incoming", settings.runs),
         Simulator(settings.file.simulator, library, data / "logs"),
         WarmUp(data / "logs"),
     )

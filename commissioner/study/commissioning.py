@@ -13,12 +13,12 @@ from commissioner.errors import CommissionerError
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.in_process import InProcessPort
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.energised.excite import warm_up
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.plan import ProcedurePlan
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.job import bounds, make_job, open_drive, watch_limits
 from commissioner.run.runner import Runner

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import CommissionerError
-from commissioner.procedure.verdict import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.study.specification import Case
 
 

@@ -12,8 +12,6 @@ from commissioner.errors import UsageError
 from commissioner.recordings.whole import whole_file
 
 ENDED, TABLE, ASKED = "ended.jsonl", "cases.parquet", "study.json"
-NOT_REPEATABLE = ("cpu_s",)
-"""Columns that differ from run to run; all others are the same for the same seed."""
 Row = dict[str, Any]
 
 

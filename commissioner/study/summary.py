@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from commissioner.procedure.verdict import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.report.run.quantities import BY_FIELD
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document

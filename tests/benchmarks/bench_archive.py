@@ -12,11 +12,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from commissioner.operations.history.runs import Archive, Wanted, write_runs
 from commissioner.run.index.store import NAME
+from tests.benchmarks.pairs import Pair
 from tests.support.archive.synthetic import make_archive
 
 
@@ -30,6 +33,33 @@ def cold(*arguments: str) -> tuple[float, float, float]:
         assert code == 0, arguments
         taken.append((time.perf_counter() - began, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024))
     return min(taken, key=lambda one: one[1])
+
+
+def pairs(closing: ExitStack, count: int = 10_000) -> list[Pair]:
+    """The newest fifty of an archive, each in a process of its own: our list checks every folder against the index; DuckDB reads the table."""
+    root = Path(closing.enter_context(tempfile.TemporaryDirectory())) / "runs"
+    make_archive(root, count)
+    table = root.parent / "runs.parquet"
+    write_runs(Archive(root), Wanted(), table)
+    query = f"SELECT run, outcome, motor_tag, drive, person FROM '{table}' ORDER BY run DESC LIMIT 50"
+    duck = ("-c", f"import duckdb; print(duckdb.sql({query!r}).fetchall())")
+    ours = ("-m", "commissioner", "runs", "list", "--runs", str(root))
+    return [
+        Pair(
+            f"list of {count} runs, cold process",
+            "DuckDB on the table",
+            lambda: _child(*ours),
+            lambda: _child(*duck),
+            "s a list",
+        )
+    ]
+
+
+def _child(*arguments: str) -> float:
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
+    _, code, used = os.wait4(process.pid, 0)
+    assert code == 0, arguments
+    return used.ru_utime + used.ru_stime
 
 
 def figures(count: int) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
 
 import pytest
 
@@ -11,6 +14,8 @@ from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.registers.window import StreamCursor
+from tests.benchmarks.pairs import Pair
+from tests.sim.client import TcpClient
 from tests.support.sim_process import SimProcess
 
 WIRES = {"tcp": ("--tcp", "0"), "rtu over a pty": ("--rtu", "pty")}
@@ -53,6 +58,64 @@ def measure(arguments: tuple[str, ...], seconds: float) -> dict[str, float]:
         "latency_p99_ms": 1e3 * port.stats.latency_s(0.99),
         "samples_lost": float(window.cursor.lost),
     }
+
+
+def pairs(closing: ExitStack, seconds: float = 4.0) -> list[Pair]:
+    """One session's samples: checked and decoded by us, fetched undecoded by pymodbus and by a bare socket. The drive is another process."""
+    sim = closing.enter_context(SimProcess(*WIRES["tcp"]))
+    profile = load_profile("simulated")
+
+    def session(read: Callable[[Inverter, Any, StreamCursor], int]) -> float:
+        port = open_port(parse_url(sim.url), profile)
+        inverter = Inverter(port, profile)
+        cursor = start(inverter, seconds)
+        began = time.process_time()
+        samples = read(inverter, port, cursor)
+        spent = time.process_time() - began
+        inverter.disarm()
+        port.close()
+        return spent / samples
+
+    def checked(inverter: Inverter, _port: Any, cursor: StreamCursor) -> int:
+        while not (window := inverter.fetch(cursor)).has_ended:
+            cursor = window.cursor
+        return window.cursor.next_index
+
+    def loop(ask: Callable[[list[int], int, int], list[int]], cursor: StreamCursor) -> int:
+        layout, index, beat = cursor.stream.layout, 0, 0
+        while True:
+            beat += 1
+            words = ask([beat & 0xFFFF, index >> 16, index & 0xFFFF], layout.address, layout.words)
+            index = (words[1] << 16 | words[2]) + words[3]
+            if words[5] & 16:
+                return index
+
+    def library(_inverter: Inverter, port: Any, cursor: StreamCursor) -> int:
+        at = profile.items["heartbeat"].address
+        return loop(
+            lambda words, address, count: (
+                port._client.readwrite_registers(
+                    read_address=address, read_count=count, write_address=at, values=words, device_id=1
+                ).registers
+            ),
+            cursor,
+        )
+
+    def bare(_inverter: Inverter, port: Any, cursor: StreamCursor) -> int:
+        at, client = profile.items["heartbeat"].address, TcpClient.over(port._client.socket)
+        return loop(lambda words, address, count: client.write_read(address, count, at, words), cursor)
+
+    return [
+        Pair(
+            "samples over TCP, each checked and decoded",
+            peer,
+            lambda: session(checked),
+            lambda read=read: session(read),
+            "µs a sample",
+            1e6,
+        )
+        for peer, read in (("pymodbus 3.15.0, words only", library), ("a bare socket, words only", bare))
+    ]
 
 
 @pytest.mark.benchmark

@@ -126,6 +126,13 @@ class TcpClient(Client):
         self.transaction = 0
         self.last_header = b""
 
+    @classmethod
+    def over(cls, connected: socket.socket) -> TcpClient:
+        """On a connection that somebody else has made."""
+        client = cls.__new__(cls)
+        client.socket, client.transaction, client.last_header = connected, 0, b""
+        return client
+
     def send(self, pdu: bytes) -> None:
         self.transaction = (self.transaction + 1) & 0xFFFF
         self.socket.sendall(struct.pack(">HHHB", self.transaction, 0, len(pdu) + 1, self.unit) + pdu)

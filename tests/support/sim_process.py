@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 
-START_S = 60.0
+START_S = 120.0
 """The first start on a fresh machine compiles the simulator's kernels."""
 
 

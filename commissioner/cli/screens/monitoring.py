@@ -12,6 +12,15 @@ from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.trend.trend import Verdict
 
+RPM = 30 / 3.141592653589793
+"""1/min per rad/s."""
+SHOWN = (
+    ("R_s", "stator_resistance_ohm", 1, "ohm"),
+    ("R_R", "rotor_resistance_ohm", 1, "ohm"),
+    ("L_sigma", "leakage_inductance_h", 1e3, "mH"),
+    ("L_M", "magnetizing_inductance_h", 1e3, "mH"),
+)
+
 
 def show_refused(seen: Refused, document: Mapping[str, Any]) -> None:
     """What the terminals show all the same."""
@@ -62,7 +71,7 @@ def _states(document: Mapping[str, Any], where: Console) -> None:
         own = s.get("withheld", "")
         if "mean_torque_nm" in s:
             speed, torque = s["mean_speed_rad_per_s"], s["mean_torque_nm"]
-            own = f"{speed['value'] * 9.5493:.6g} 1/min, {torque['value']:.4g} N m (std {torque['std']:.2g})"
+            own = f"{speed['value'] * RPM:.6g} 1/min, {torque['value']:.4g} N m (std {torque['std']:.2g})"
         if s["used"] and where is out:
             own = "the answer below"
         rows.append((s["state"], f"{s['start_s']:.3g} ... {s['end_s']:.3g} s", f"{s['current_a']:.3g} A", own))
@@ -75,73 +84,9 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
     wiring = miswired(seen.findings)
     for finding in wiring:
         out.print(f"[bold yellow]check the probes:[/] {finding.what} (put right here)")
-    period = seen.period
-    rpm = 30 / 3.141592653589793
-    rows = [
-        ("mean speed", quantity(seen.mean_speed_rad_per_s * rpm, seen.mean_speed_std * rpm, "1/min")),
-        ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
-        (
-            "speed within the period",
-            f"± {0.5 * float(period.speed_rad_per_s.max() - period.speed_rad_per_s.min()) * rpm:.3g} 1/min "
-            f"(std {document['waveforms']['speed_rms_std_rad_per_s'] * rpm:.2g})",
-        ),
-    ]
-    if period.load_torque_nm is not None:
-        rows.append(
-            (
-                "load torque",
-                f"{period.load_torque_nm.min():.3g} ... {period.load_torque_nm.max():.3g} N m "
-                f"(std {document['waveforms']['load_torque']['rms_std_nm']:.2g})",
-            )
-        )
-    else:
-        rows.append(("load torque", document["waveforms"]["load_torque"]))
-    if seen.inertia_kg_m2 is not None:
-        rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
-    rows.append(
-        ("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)")
-    )
-    out.print(table("", ("", ""), rows))
-    out.print(
-        table(
-            "Periods",
-            ("what", "Hz", "of the shaft", "speed ripple", "varies with"),
-            [
-                (
-                    p.name,
-                    quantity(p.frequency_hz, p.frequency_std_hz, ""),
-                    f"{p.ratio_to_shaft:.4f}",
-                    f"{p.speed_ripple_rad_per_s * rpm:.3g} 1/min rms",
-                    p.follows,
-                )
-                for p in seen.load_periods
-            ],
-            right=(1, 2, 3),
-        )
-    )
-    names = {
-        "stator_resistance_ohm": "R_s",
-        "rotor_resistance_ohm": "R_R",
-        "leakage_inductance_h": "L_sigma",
-        "magnetizing_inductance_h": "L_M",
-    }
-    out.print(
-        table(
-            f"Motor (inverse-Gamma; start: {seen.start.origin})",
-            ("", ""),
-            [
-                (
-                    short,
-                    quantity(
-                        document["parameters"][key]["value"] * scale, document["parameters"][key]["std"] * scale, unit
-                    ),
-                )
-                for (key, short), (scale, unit) in zip(
-                    names.items(), ((1, "ohm"), (1, "ohm"), (1e3, "mH"), (1e3, "mH")), strict=True
-                )
-            ],
-        )
-    )
+    out.print(table("", ("", ""), _shaft(seen, document["waveforms"])))
+    _load_periods(seen)
+    _motor(seen, document["parameters"])
     out.print(document["cannot_be_fixed"]["sentence"])
     for finding in seen.findings:
         if (finding not in wiring and finding.kind == "corrected") or (
@@ -153,3 +98,50 @@ def show(seen: Observation, document: Mapping[str, Any], verdict: Verdict | None
         out.print(f"[{colour}]{verdict.state.value}[/]" + (": " + ", ".join(verdict.names) if verdict.names else ""))
     for name, path in document.get("files", {}).items():
         out.print(f"[dim]{name}[/] {path}")
+
+
+def _shaft(seen: Observation, waveforms: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Speed and torque, mean and over the period, and how well the current is simulated."""
+    speed, load = seen.period.speed_rad_per_s, seen.period.load_torque_nm
+    rows = [
+        ("mean speed", quantity(seen.mean_speed_rad_per_s * RPM, seen.mean_speed_std * RPM, "1/min")),
+        ("mean torque", quantity(seen.mean_torque_nm, seen.mean_torque_std, "N m")),
+        (
+            "speed within the period",
+            f"± {0.5 * float(speed.max() - speed.min()) * RPM:.3g} 1/min "
+            f"(std {waveforms['speed_rms_std_rad_per_s'] * RPM:.2g})",
+        ),
+    ]
+    said = waveforms["load_torque"]
+    if load is not None:
+        said = f"{load.min():.3g} ... {load.max():.3g} N m (std {said['rms_std_nm']:.2g})"
+    rows.append(("load torque", said))
+    if seen.inertia_kg_m2 is not None:
+        rows.append(("inertia used", f"{seen.inertia_kg_m2:.3g} kg m²; load torque scales with it"))
+    rows.append(
+        ("measured current", f"simulated to {seen.proof.relative_rms:.1%} rms (mains harmonics and noise included)")
+    )
+    return rows
+
+
+def _load_periods(seen: Observation) -> None:
+    rows = [
+        (
+            p.name,
+            quantity(p.frequency_hz, p.frequency_std_hz, ""),
+            f"{p.ratio_to_shaft:.4f}",
+            f"{p.speed_ripple_rad_per_s * RPM:.3g} 1/min rms",
+            p.follows,
+        )
+        for p in seen.load_periods
+    ]
+    out.print(table("Periods", ("what", "Hz", "of the shaft", "speed ripple", "varies with"), rows, right=(1, 2, 3)))
+
+
+def _motor(seen: Observation, parameters: Mapping[str, Any]) -> None:
+    """The four parameters, per phase."""
+    rows = [
+        (short, quantity(parameters[key]["value"] * scale, parameters[key]["std"] * scale, unit))
+        for short, key, scale, unit in SHOWN
+    ]
+    out.print(table(f"Motor (inverse-Gamma; start: {seen.start.origin})", ("", ""), rows))

@@ -20,6 +20,7 @@ def demo(
     runs: Path,
     as_json: bool,
     diagnosis: bool,
+    strict: bool,
 ) -> None:
     """Commission the simulated inverter; exits with the code of the outcome."""
     from commissioner.cli.screens import screen
@@ -28,6 +29,7 @@ def demo(
         screen.out.print("[dim]starting the simulated inverter (its own process, Modbus TCP on loopback)[/]")
     with simulated_inverter(scenario, speed, seed) as url:
         request = CommissionRequest(
-            url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0
-        )
+            url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back,
+            DIAGNOSIS_S if diagnosis else 0.0, strict=strict,
+        )  # fmt: skip
         run(request, yes=True, as_json=as_json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import json
 import sys
 import webbrowser
@@ -10,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from commissioner.cli.screens.password import read_password
 from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def add(name: str, *, role: str, password_file: Path | None, config: Path | None
             limit="viewer, operator or administrator",
             remedy="give one of these",
         )
-    _accounts(config, runs).add(name, Role[role.upper()], _password(password_file))
+    _accounts(config, runs).add(name, Role[role.upper()], read_password(password_file, "accounts", is_new=True))
     _said({"account": name, "role": role.lower()}, f"{name} may log in as {role.lower()}", as_json)
 
 
@@ -90,25 +90,6 @@ def require_extra() -> None:
             limit="the extra `serve`",
             remedy="pip install 'commissioner[serve]'",
         ) from missing
-
-
-def _password(file: Path | None) -> str:
-    if file is not None:
-        return file.read_text("utf-8").splitlines()[0] if file.stat().st_size else ""
-    if not sys.stdin.isatty():
-        raise UsageError(
-            "nobody can be asked for a password",
-            step="accounts",
-            value="no terminal",
-            limit="a terminal, or --password-file",
-            remedy="write the password into a file that only you may read and give it with --password-file",
-        )
-    first = getpass.getpass("Password: ")
-    if first != getpass.getpass("Again: "):
-        raise UsageError(
-            "the two passwords differ", step="accounts", value=None, limit="twice the same", remedy="try again"
-        )
-    return first
 
 
 def _said(document: dict[str, str], words: str, as_json: bool) -> None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from commissioner.diagnose.causes.setting import Array
-
-if TYPE_CHECKING:
-    from commissioner.diagnose.points.table import Points
+from commissioner.diagnose.intake.points import Points
 
 
 def always(points: Points) -> bool:

@@ -16,10 +16,14 @@ from scipy.fft import next_fast_len, rfft
 
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record, each_segment
+from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, Term
 from commissioner.diagnose.plant.prediction import Path, predict, trajectory
 
 Array = NDArray[np.float64]
+Directions = tuple[Array, Array, NDArray[np.bool_]]
+AT_ONCE = 48
+"""Numbers of the machine whose sensitivities at every sample are held at once where they are averaged."""
 HELD_SAMPLES = 400_000
 """Of a record whose trajectories are held: a quarter of a gigabyte at the most."""
 
@@ -125,9 +129,9 @@ class NormalEquations:
         def of_segment(k: int) -> tuple[Array, Array, float, int]:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 here, segment = self._here(k), self._record.segments[k]
-                path = self._paths[k] if self._paths else None
-                seen = predict(self._model, self._record, k, self._layout, [self._wanted[c] for c in here], path)
-                product = self._product(seen.jacobian, segment.currents_a - seen.currents_a, segment.is_good, block)
+                is_averaged = block > 1 and self._noise.is_white
+                directions, left, good = self._averaged(k, here, block) if is_averaged else self._directions(k, here)
+                product = self._product(directions, left, good)
             rows = np.array([0, 1, 2, 3, *(4 + c for c in here)])
             gram, slope = np.zeros((self._size, self._size)), np.zeros(self._size)
             gram[np.ix_(rows, rows)] = product[:-1, :-1]
@@ -144,17 +148,45 @@ class NormalEquations:
             counts.append(0)
         return Normal(np.array(grams), np.array(slopes), np.array(chi2), np.array(counts))
 
-    def _product(self, jacobian: Array, residual: Array, good: NDArray[np.bool_], block: int) -> Array:
+    def _directions(self, k: int, here: Sequence[int]) -> Directions:
+        """Sensitivities for the four and the numbers `here`, the residual, and which samples of it are good."""
+        segment, path = self._record.segments[k], self._paths[k] if self._paths else None
+        seen = predict(self._model, self._record, k, self._layout, [self._wanted[c] for c in here], path)
+        return seen.jacobian, segment.currents_a - seen.currents_a, segment.is_good
+
+    def _averaged(self, k: int, here: Sequence[int], block: int) -> Directions:
+        """`_directions` with `block` neighbours averaged, some numbers at a time: all of a screening at every sample would be half a
+
+        gigabyte a segment.
+        """
+        segment = self._record.segments[k]
+        wanted = [self._wanted[c] for c in here]
+        path = self._paths[k] if self._paths else trajectory(self._model, self._record, k, self._layout, wanted)
+        # what a sensor does goes first, with the four: a number of its own may change what they are seen through
+        inside = [c for c, t in enumerate(wanted) if t.kind < kinds.FIRST_OF_SENSING]
+        outside = [c for c, t in enumerate(wanted) if t.kind >= kinds.FIRST_OF_SENSING]
+        turns = [outside, *(inside[first : first + AT_ONCE] for first in range(0, len(inside), AT_ONCE))]
+        phases = self._record.facts.phases
+        directions = np.zeros((phases, 4 + len(wanted), segment.count // block)).swapaxes(0, 1)
+        left = np.zeros((phases, 0))
+        for turn in turns:
+            seen = predict(self._model, self._record, k, self._layout, [wanted[c] for c in turn], path)
+            rows = [4 + c for c in turn]
+            if turn is outside:
+                left = segment.currents_a - seen.currents_a
+                directions[:4] = _averaged(seen.jacobian[:4], block)
+            directions[rows] = _averaged(seen.jacobian[4:], block)
+        return directions, _averaged(left, block), _whole(segment.is_good, block)
+
+    def _product(self, jacobian: Array, residual: Array, good: NDArray[np.bool_]) -> Array:
         """Whitened Gram matrix of all directions and, last, the residual: of white noise phase by phase, never copied whole."""
         noise, size = self._noise, jacobian.shape[0] + 1
         total = np.zeros((size, size))
         if noise.is_white:
             for phase, sigma_a in enumerate(noise.sigma_a):
-                directions, left, kept = jacobian[:, phase], residual[phase], good
-                if block > 1:
-                    directions, left, kept = _averaged(directions, block), _averaged(left, block), _whole(good, block)
-                if not kept.all():
-                    directions, left = directions[:, kept], left[kept]
+                directions, left = jacobian[:, phase], residual[phase]
+                if not good.all():
+                    directions, left = directions[:, good], left[good]
                 _add_products(directions, left, float(sigma_a) ** -2.0, total)
         else:
             period = self._record.facts.sample_period_s

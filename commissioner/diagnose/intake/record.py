@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
@@ -185,4 +186,5 @@ def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Re
     if count == 1:
         return [of_segment(0)]
     with ThreadPoolExecutor(min(count, THREADS)) as pool:
-        return list(pool.map(of_segment, range(count)))
+        begun = [pool.submit(copy_context().run, of_segment, k) for k in range(count)]
+        return [one.result() for one in begun]

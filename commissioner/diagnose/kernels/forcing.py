@@ -29,39 +29,20 @@ def tilted(cosine, sine, a, b):
 
 
 @kernel
-def pushes(
-    kind,
-    n,
-    start,
-    stop,
-    states,
-    stop_states,
-    voltage_a,
-    voltage_b,
-    link_factor,
-    phase_factor,
-    channels,
-    base,
-    branch_time,
-    stop_radius,
-    legs_vectors,
-    iron_vectors,
-    leak_vectors,
-    at,
-    before,
-    now,
-    leg_mean,
-    lost,
-    magnetizing,
-    current,
-    terminal,
-    flux,
-    rotor,
-):
-    """What one parameter pushes at each sample: into the `magnetizing` and the stator `current`, straight into the `terminal`
-
-    current and into w (`rotor`), each (2, B+1), and into d psi_s/dt and d psi_R/dt over the period before (`flux` (4, B+1)).
-    """
+def pushes(kind, n, span, trajectory, drive, channels, machine, asked, samples, into):
+    """What one parameter, number `n` of its `kind`, pushes at each sample of `span` (start, stop); `trajectory`: states and stops."""
+    start, stop = span
+    states, stop_states = trajectory
+    voltage_a, voltage_b, link_factor, phase_factor = (
+        drive.voltage_a,
+        drive.voltage_b,
+        drive.link_factor,
+        drive.phase_factor,
+    )
+    base, branch_time, stop_radius = machine.base, machine.branch_time, machine.stop_radius
+    legs_vectors, iron_vectors, leak_vectors = asked.legs, asked.iron, asked.leak
+    at, before, now, leg_mean, lost = samples.at, samples.before, samples.now, samples.leg_mean, samples.lost
+    magnetizing, current, terminal, flux, rotor = into.magnetizing, into.current, into.terminal, into.flux, into.rotor
     rs, r_r, gs, gm, g = base[0], base[1], base[2], base[3], base[5]
     las, lbs, mas, mbs = base[8], base[9], base[10], base[11]
     kappa, leak_ratio, coupled, splits_a, splits_b = base[12], base[13], base[14], base[15], base[16]
@@ -160,8 +141,9 @@ def pushes(
 
 
 @kernel
-def through_the_circuit(last, nu, shrink, cage_push, magnetizing, current, terminal, rotor):
+def through_the_circuit(last, nu, shrink, cage_push, into):
     """What pushes inside the machine are at its terminals and in w, added to `terminal` and in place of `rotor`."""
+    magnetizing, current, terminal, rotor = into.magnetizing, into.current, into.terminal, into.rotor
     for m in range(1, last):
         ua, ub = current[0, m] + nu * magnetizing[0, m], current[1, m] + nu * magnetizing[1, m]
         terminal[0, m] += shrink * ua

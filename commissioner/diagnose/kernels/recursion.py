@@ -7,8 +7,9 @@ from commissioner.diagnose.kernels import samples as row
 
 
 @kernel
-def forced(last, jump, has_flux, has_more, push, at, terminal, flux, rotor, both, force):
+def forced(last, jump, has_flux, has_more, push, at, into, both, force):
     """What the pushes before and after each period do to the states at its end, (4, B+1); `both` (4, B+1) is room to work in."""
+    terminal, flux, rotor = into.terminal, into.flux, into.rotor
     for c in range(2):
         for m in range(1, last):
             both[c, m] = (
@@ -30,8 +31,9 @@ def forced(last, jump, has_flux, has_more, push, at, terminal, flux, rotor, both
 
 
 @kernel
-def marched(first, last, x, step, amp, force, terminal, out):
+def marched(first, last, x, matrices, force, terminal, out):
     """States (4,) marched through rows `first` ... `last` - 1, derivatives of the current into `out` (2, rows)."""
+    step, amp = matrices.step, matrices.amp
     x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
     for m in range(1, last):
         if m >= first:
@@ -46,38 +48,17 @@ def marched(first, last, x, step, amp, force, terminal, out):
 
 
 @kernel
-def marched_with_memory(
-    first,
-    last,
-    own,
-    nu,
-    shrink,
-    beta,
-    branch,
-    x,
-    z,
-    q,
-    flux,
-    rate,
-    fed,
-    step,
-    push,
-    amp,
-    cage,
-    cage_push,
-    at,
-    memory,
-    force,
-    terminal,
-    rotor,
-    out,
-):
-    """As `marched`, a few parameters side by side (a processor overlaps them), where memory operators (derivatives `z`
+def marched_with_memory(first, last, circuit, branch, carried, matrices, samples, pushed, out):
+    """As `marched`, a few parameters side by side (a processor overlaps them), where memory operators and rotor branches push on top.
 
-    (p, s, 2), of the `flux` before) and rotor branches (`q` (p, b, 2), fed by the w before, `rate`) push on top; `fed` (p, 4) is
-    what they pushed into current and w at the sample before. `own` (p,): 1 where the iron's flux itself depends on the parameter.
-    `branch` (b, 3): what a branch takes from w, keeps of itself over a period, and takes up.
+    `circuit`: nu, shrink, beta; `branch` (b, 3): what a branch takes from w, keeps of itself over a period, and takes up. `pushed`:
+    force (p, 4, B+1), and pushes into the terminal current and w (p, 2, B+1).
     """
+    nu, shrink, beta = circuit
+    own, x, z, q, flux, rate, fed = carried
+    step, push, amp, cage, cage_push = matrices
+    at, memory = samples.at, samples.memory
+    force, terminal, rotor = pushed
     stops, branches = z.shape[1], q.shape[1]
     for m in range(1, last):
         for p in range(x.shape[0]):

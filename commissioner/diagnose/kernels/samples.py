@@ -46,48 +46,23 @@ def _leg_path(i0, i1, top, knee, intervals, mean):
 
 
 @kernel
-def at_samples(
-    start,
-    stop,
-    states,
-    stop_states,
-    voltage_a,
-    voltage_b,
-    voltage_factor,
-    link_factor,
-    phase_factor,
-    rotor_factor,
-    omega,
-    base,
-    legs,
-    legs_link,
-    iron,
-    leak,
-    legs_top,
-    legs_knee,
-    iron_top,
-    leak_top,
-    stop_gain,
-    stop_radius,
-    branch_gain,
-    branch_time,
-    working,
-    wants_legs,
-    at,
-    before,
-    now,
-    secant,
-    leg_mean,
-    lost,
-    memory,
-):
-    """(1)-(6) at samples `start` ... `stop` - 1 into columns 1 ... of `at` and rows 1 ... of the others; 0 is the sample before.
+def at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, samples):
+    """(1)-(6) at samples `start` ... `stop` - 1 into columns 1 ... of `samples.at` and rows 1 ... of its others; 0 is the sample before.
 
-    A sample still belongs to the voltage of the period it ends. `before`, `now` (B+1, 3) phase currents at that period's ends,
-    `secant` (B+1, 3) resistance of phase and leg between them, `leg_mean` (B+1, 2, width) mean weights of the leg curve, `lost` (B+1, 3)
-    mean voltage of a leg that is as the mean of the three, memory operators' derivatives in `memory` (B+1, s, 7), of the `working`
-    (s,) ones: factor, by the flux (aa, ab, bb), by the state before.
+    A sample still belongs to the voltage of the period it ends. `working` (s,): the memory operators at work.
     """
+    voltage_a, voltage_b, voltage_factor = drive.voltage_a, drive.voltage_b, drive.voltage_factor
+    link_factor, phase_factor = drive.link_factor, drive.phase_factor
+    base, legs, legs_link, iron, leak = machine.base, machine.legs, machine.legs_link, machine.iron, machine.leak
+    legs_top, legs_knee, branch_gain, branch_time = (
+        machine.legs_top,
+        machine.legs_knee,
+        machine.branch_gain,
+        machine.branch_time,
+    )
+    stop_gain, stop_radius = machine.stop_gain, machine.stop_radius
+    at, before, now, secant = samples.at, samples.before, samples.now, samples.secant
+    leg_mean, lost, memory = samples.leg_mean, samples.lost, samples.memory
     rs, gs, gm, nu, g, kappa = base[0], base[2], base[3], base[4], base[5], base[12]
     shrink = 1.0 / (1.0 + g * rs)
     iaa, iab, ibb = gs * (1.0 + base[8]), gs * base[9], gs * (1.0 - base[8])
@@ -105,12 +80,12 @@ def at_samples(
             va = vb = 0.0
         x0, x1, x2, x3 = states[t, 0], states[t, 1], states[t, 2], states[t, 3]
         at[VOLT_A, m], at[VOLT_B, m] = va, vb
-        at[RATE, m], at[SPEED, m] = base[1] * rotor_factor[held], omega[held]
+        at[RATE, m], at[SPEED, m] = base[1] * drive.rotor_factor[held], drive.omega[held]
         # (1), (2)
         pa, pb = (1.0 - nu) * x2 + nu * x0, (1.0 - nu) * x3 + nu * x1
         ja = jb = jaa = jab = jbb = 0.0
         if iron.shape[0] > 0:
-            j, at[IRON_U, m], ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top)
+            j, at[IRON_U, m], ja, jb, jaa, jab, jbb = saturating(pa, pb, iron, machine.iron_top)
             at[IRON_AT, m] = j
         at[MAG_AA, m], at[MAG_AB, m], at[MAG_BB, m] = jaa, jab, jbb
         at[IRON_A, m], at[IRON_B, m] = pa, pb
@@ -150,7 +125,7 @@ def at_samples(
         ea = eb = eaa = eab = ebb = 0.0
         if leak.shape[0] > 0:
             la, lb = x0 - kappa * x2, x1 - kappa * x3
-            j, at[PATH_U, m], ea, eb, eaa, eab, ebb = saturating(la, lb, leak, leak_top)
+            j, at[PATH_U, m], ea, eb, eaa, eab, ebb = saturating(la, lb, leak, machine.leak_top)
             at[PATH_AT, m] = j
             at[PATH_A, m], at[PATH_B, m] = la, lb
             ia += ea

@@ -24,6 +24,7 @@ from commissioner.diagnose.kernels import samples as row
 from commissioner.diagnose.kernels.forcing import INTO_FLUX, pushes, through_the_circuit
 from commissioner.diagnose.kernels.recursion import forced, marched, marched_with_memory
 from commissioner.diagnose.kernels.samples import at_samples
+from commissioner.diagnose.kernels.structures import Carried, Matrices, Pushes, Samples
 from commissioner.diagnose.kernels.trajectory import SQRT3
 
 BLOCK = 256
@@ -33,15 +34,9 @@ SIDE_BY_SIDE = 4
 
 
 @kernel
-def _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage, cage_push):
-    """(8) solved for the end of the period before each sample, of states x = (d psi_s, d psi_R) with pushes into the current
-    (t), the rotor voltage (w) and the flux (v):
-
-    x' = `step` x + `push` (t + t', w + w') + T `push_v` v;   d i = `amp` x + t;   d w = `cage` x + `cage_push` (push without K).
-
-    `step`, `push` (B+1, 4, 4) and (4, 8, B+1), the last four columns T push_v; `amp`, `cage` (B+1, 2, 4); `cage_push` (B+1, 7) K
-    (2, 2) that takes a current at the magnetizing node to w, and what rotor branches leave of a voltage (aa, ab, bb).
-    """
+def _steps_of(start, stop, period, base, beta, at, secant, matrices):
+    """(8) solved for the end of the period before each sample, into `matrices`."""
+    step, push, amp, cage, cage_push = matrices
     gs, gm, nu, g, kappa = base[2], base[3], base[4], base[5], base[12]
     shrink = 1.0 / (1.0 + g * base[0])
     half, over = 0.5 * period, kappa - 1.0
@@ -151,51 +146,21 @@ def _solved(v, amp, cage, half, om, back):
 
 
 @kernel
-def sensitivities(
-    states,
-    stop_states,
-    voltage_a,
-    voltage_b,
-    voltage_factor,
-    link_factor,
-    phase_factor,
-    rotor_factor,
-    omega_rad_per_s,
-    channels,
-    period,
-    base,
-    legs,
-    legs_link,
-    iron,
-    leak,
-    legs_top,
-    legs_knee,
-    iron_top,
-    leak_top,
-    stop_gain,
-    stop_radius,
-    branch_gain,
-    branch_time,
-    kind_of,
-    indices,
-    legs_vectors,
-    iron_vectors,
-    leak_vectors,
-    start_slopes,
-    out,
-):
-    """Fills `out` (2, P, n): d i / d parameter at every sample, for the kinds and `indices` (P,) listed.
-
-    `states`, `stop_states` and everything before `kind_of` are the trajectory's. `legs_vectors` (K, width) are B-spline weights,
-    `iron_vectors` and `leak_vectors` (K, intervals, 4) cells; empty where no listed parameter needs them. `start_slopes`
-    (P, 4): d (psi_s, psi_R) / d parameter at the first sample.
-    """
-    samples, count = voltage_a.shape[0], kind_of.shape[0]
+def sensitivities(trajectory, drive, channels, period, machine, asked, out):
+    """Fills `out` (2, P, n): d i / d parameter at every sample, for what is `asked`; `trajectory`: states and stops of `propagate`."""
+    states, stop_states = trajectory
+    base, stop_gain, branch_gain, branch_time = (
+        machine.base,
+        machine.stop_gain,
+        machine.branch_gain,
+        machine.branch_time,
+    )
+    samples, count = drive.voltage_a.shape[0], asked.kinds.shape[0]
     working = np.flatnonzero(stop_gain)
     bars = np.flatnonzero((branch_gain != 0.0) & (branch_time > 0.0))
     nu, half = base[4], 0.5 * period
     shrink = 1.0 / (1.0 + base[5] * base[0])
-    wants_legs = legs_vectors.shape[0] > 0
+    wants_legs = asked.legs.shape[0] > 0
     beta, branch = 0.0, np.zeros((bars.shape[0], 3))
     for k, n in enumerate(bars):
         h = half / branch_time[n]
@@ -211,18 +176,21 @@ def sensitivities(
     rows = BLOCK + 1
     at, memory = np.zeros((row.ROWS, rows)), np.zeros((rows, working.shape[0], 7))
     before, now, secant, lost = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 3))
-    leg_mean = np.zeros((rows, 2, legs_vectors.shape[1]))
+    leg_mean = np.zeros((rows, 2, asked.legs.shape[1]))
     step, push = np.zeros((rows, 4, 4)), np.zeros((4, 8, rows))
     amp, cage, cage_push = np.zeros((rows, 2, 4)), np.zeros((rows, 2, 4)), np.zeros((rows, 7))
     magnetizing, current, flux = np.zeros((2, rows)), np.zeros((2, rows)), np.zeros((4, rows))
     terminal, rotor = np.zeros((SIDE_BY_SIDE, 2, rows)), np.zeros((SIDE_BY_SIDE, 2, rows))
     both, force = np.zeros((4, rows)), np.zeros((SIDE_BY_SIDE, 4, rows))
 
+    known = Samples(at, before, now, secant, leg_mean, lost, memory)
+    matrices = Matrices(step, push, amp, cage, cage_push)
+
     # what a parameter takes from block to block: state, pushes into current and w, and those of what remembers
-    x, pushed, fed = start_slopes.copy(), np.zeros((count, 4)), np.zeros((count, 4))
+    x, pushed, fed = asked.start.copy(), np.zeros((count, 4)), np.zeros((count, 4))
     z, q = np.zeros((count, working.shape[0], 2)), np.zeros((count, bars.shape[0], 2))
     moved, rate = np.zeros((count, 2)), np.zeros((count, 2))
-    own = (kind_of == kinds.NU).astype(np.float64)
+    own = (asked.kinds == kinds.NU).astype(np.float64)
     for p in range(count):
         for c in range(2):
             moved[p, c] = (1.0 - nu) * x[p, 2 + c] + nu * x[p, c]
@@ -232,113 +200,33 @@ def sensitivities(
         last = stop - start + 1
         # the first sample of all ends no period
         first = 2 if start == 0 else 1
-        at_samples(
-            start,
-            stop,
-            states,
-            stop_states,
-            voltage_a,
-            voltage_b,
-            voltage_factor,
-            link_factor,
-            phase_factor,
-            rotor_factor,
-            omega_rad_per_s,
-            base,
-            legs,
-            legs_link,
-            iron,
-            leak,
-            legs_top,
-            legs_knee,
-            iron_top,
-            leak_top,
-            stop_gain,
-            stop_radius,
-            branch_gain,
-            branch_time,
-            working,
-            wants_legs,
-            at,
-            before,
-            now,
-            secant,
-            leg_mean,
-            lost,
-            memory,
-        )
-        _steps_of(start, stop, period, base, beta, at, secant, step, push, amp, cage, cage_push)
+        at_samples(start, stop, states, stop_states, drive, machine, working, wants_legs, known)
+        _steps_of(start, stop, period, base, beta, at, secant, matrices)
         for group in range(0, count, SIDE_BY_SIDE):
             end = min(group + SIDE_BY_SIDE, count)
             for p in range(group, end):
-                kind, here = kind_of[p], p - group
+                kind, here = asked.kinds[p], p - group
+                into = Pushes(magnetizing, current, terminal[here], flux, rotor[here])
                 magnetizing[:], current[:], flux[:], terminal[here], rotor[here] = 0.0, 0.0, 0.0, 0.0, 0.0
-                pushes(
-                    kind,
-                    indices[p],
-                    start,
-                    stop,
-                    states,
-                    stop_states,
-                    voltage_a,
-                    voltage_b,
-                    link_factor,
-                    phase_factor,
-                    channels,
-                    base,
-                    branch_time,
-                    stop_radius,
-                    legs_vectors,
-                    iron_vectors,
-                    leak_vectors,
-                    at,
-                    before,
-                    now,
-                    leg_mean,
-                    lost,
-                    magnetizing,
-                    current,
-                    terminal[here],
-                    flux,
-                    rotor[here],
-                )
+                span = (start, stop)
+                pushes(kind, asked.indices[p], span, trajectory, drive, channels, machine, asked, known, into)
                 has_flux, has_more = kind in INTO_FLUX, kind == kinds.R_S or kind not in INTO_FLUX
                 if has_more:
-                    through_the_circuit(last, nu, shrink, cage_push, magnetizing, current, terminal[here], rotor[here])
+                    through_the_circuit(last, nu, shrink, cage_push, into)
                 for c in range(2):
                     terminal[here, c, 0], rotor[here, c, 0] = pushed[p, c], pushed[p, 2 + c]
                     pushed[p, c], pushed[p, 2 + c] = terminal[here, c, last - 1], rotor[here, c, last - 1]
                 # the part of an iron-loss current that follows the voltage at once
                 jump = shrink if kind == kinds.IRON_LOSS else 0.0
-                forced(last, jump, has_flux, has_more, push, at, terminal[here], flux, rotor[here], both, force[here])
+                forced(last, jump, has_flux, has_more, push, at, into, both, force[here])
                 if not has_memory:
-                    marched(first, last, x[p], step, amp, force[here], terminal[here], out[:, p, start:stop])
+                    marched(first, last, x[p], matrices, force[here], terminal[here], out[:, p, start:stop])
             if has_memory:
+                these = slice(group, end)
+                carried = Carried(own[these], x[these], z[these], q[these], moved[these], rate[these], fed[these])
+                circuit, more = (nu, shrink, beta), (force, terminal, rotor)
                 marched_with_memory(
-                    first,
-                    last,
-                    own[group:end],
-                    nu,
-                    shrink,
-                    beta,
-                    branch,
-                    x[group:end],
-                    z[group:end],
-                    q[group:end],
-                    moved[group:end],
-                    rate[group:end],
-                    fed[group:end],
-                    step,
-                    push,
-                    amp,
-                    cage,
-                    cage_push,
-                    at,
-                    memory,
-                    force,
-                    terminal,
-                    rotor,
-                    out[:, group:end, start:stop],
+                    first, last, circuit, branch, carried, matrices, known, more, out[:, group:end, start:stop]
                 )
         at[:, 0] = at[:, last - 1]
         amp[0], cage[0] = amp[last - 1], cage[last - 1]

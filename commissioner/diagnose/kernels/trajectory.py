@@ -88,44 +88,31 @@ def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
 
 
 @inlined
-def _rates(
-    x,
-    k,
-    va,
-    vb,
-    ru,
-    rv,
-    rw,
-    rr,
-    omega,
-    base,
-    legs,
-    has_legs,
-    legs_top,
-    legs_knee,
-    iron,
-    iron_top,
-    leak,
-    leak_top,
-    ma,
-    mb,
-    branch_gain,
-    branch_time,
-):
-    """Right-hand side (1)-(7) at x into k, memory current (ma, mb) given; terminal current and the paths' derivatives."""
+def _rates(x, k, voltage, resistance, rr, omega, machine, legs, memory):
+    """Right-hand side (1)-(7) at x into k, with `voltage`, `memory` current (alpha, beta) and `resistance` (u, v, w); `legs` are those at
+
+    the link's voltage. Returns the terminal current and the paths' derivatives.
+    """
+    base, iron, leak = machine.base, machine.iron, machine.leak
+    branch_gain, branch_time = machine.branch_gain, machine.branch_time
+    legs_top, legs_knee = machine.legs_top, machine.legs_knee
+    has_legs = machine.legs.shape[0] > 0 or machine.legs_link.shape[0] > 0
+    va, vb = voltage
+    ru, rv, rw = resistance
+    ma, mb = memory
     gs, gm, nu, g, kappa = base[2], base[3], base[4], base[5], base[12]
     # (1), (2)
     ja, jb, jaa, jab, jbb = ma, mb, 0.0, 0.0, 0.0
     if iron.shape[0] > 0:
         pa, pb = (1.0 - nu) * x[2] + nu * x[0], (1.0 - nu) * x[3] + nu * x[1]
-        _, _, qa, qb, jaa, jab, jbb = saturating(pa, pb, iron, iron_top)
+        _, _, qa, qb, jaa, jab, jbb = saturating(pa, pb, iron, machine.iron_top)
         ja += qa
         jb += qb
     # (3)
     sa, sb = x[0] - x[2], x[1] - x[3]
     ea = eb = eaa = eab = ebb = 0.0
     if leak.shape[0] > 0:
-        _, _, ea, eb, eaa, eab, ebb = saturating(x[0] - kappa * x[2], x[1] - kappa * x[3], leak, leak_top)
+        _, _, ea, eb, eaa, eab, ebb = saturating(x[0] - kappa * x[2], x[1] - kappa * x[3], leak, machine.leak_top)
     ia = gs * ((1.0 + base[8]) * sa + base[9] * sb) + ea + nu * ja
     ib = gs * (base[9] * sa + (1.0 - base[8]) * sb) + eb + nu * jb
     # (4)
@@ -147,12 +134,15 @@ def _rates(
     ca = gm * ((1.0 + base[10]) * x[2] + base[11] * x[3]) + ja - ia - (kappa - 1.0) * ea - qa
     cb = gm * (base[11] * x[2] + (1.0 - base[10]) * x[3]) + jb - ib - (kappa - 1.0) * eb - qb
     _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time)
-    return ta, tb, jaa, jab, jbb, eaa, eab, ebb
+    return ta, tb, (jaa, jab, jbb, eaa, eab, ebb)
 
 
 @inlined
-def _current_slope(x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time):
+def _current_slope(x, k, machine, paths, z):
     """Slope of the terminal current while the voltage is held, from the rates k at x and the paths' derivatives there."""
+    base, stop_gain, stop_radius = machine.base, machine.stop_gain, machine.stop_radius
+    branch_gain, branch_time = machine.branch_gain, machine.branch_time
+    jaa, jab, jbb, eaa, eab, ebb = paths
     gs, nu, kappa = base[2], base[4], base[12]
     qa, qb = (1.0 - nu) * k[2] + nu * k[0], (1.0 - nu) * k[3] + nu * k[1]
     dja, djb = jaa * qa + jab * qb, jab * qa + jbb * qb
@@ -175,8 +165,11 @@ def _current_slope(x, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_
 
 
 @kernel
-def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, legs_top, legs_knee, fewest, most):
-    """Steps fine enough for the steepest part of the leg curve that the currents may meet in this period."""
+def _steps_for_legs(current, rate, turn, period, machine, legs, fewest, most):
+    """Steps fine enough for the steepest part of the leg curve that the currents (alpha, beta; with their slope) may meet in this period."""
+    ia, ib = current
+    slope_a, slope_b = rate
+    slope_gain, legs_top, legs_knee = machine.base[2], machine.legs_top, machine.legs_knee
     steep = 0.0
     for leg in range(3):
         i, slope = ia, slope_a
@@ -190,40 +183,21 @@ def _steps_for_legs(ia, ib, slope_a, slope_b, turn, period, slope_gain, legs, le
 
 
 @kernel
-def propagate(
-    voltage_a,
-    voltage_b,
-    voltage_factor,
-    link_factor,
-    phase_factor,
-    rotor_factor,
-    omega_rad_per_s,
-    period,
-    substeps,
-    crossing_substeps,
-    base,
-    legs,
-    legs_link,
-    iron,
-    leak,
-    legs_top,
-    legs_knee,
-    iron_top,
-    leak_top,
-    stop_gain,
-    stop_radius,
-    branch_gain,
-    branch_time,
-    initial_state,
-    initial_memory,
-):
+def propagate(drive, period, substeps, crossing_substeps, machine, initial_state, initial_memory):
     """Trajectory of one segment from `initial_state` (psi_s, psi_R) and what its iron remembers, `initial_memory` (s, 2).
 
-    `voltage_*` (n,) commanded alpha/beta; `voltage_factor`, `link_factor`, `rotor_factor`, `omega_rad_per_s` (n,) and
-    `phase_factor` (n, 3) known functions of time; curves as cells (intervals, 4), those without any size empty. Returns
-    states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal current (2, n), its slope after and before each sample
+    Returns states (n+1, 4+2b), stops (n+1, s, 2) at the samples, terminal current (2, n), its slope after and before each sample
     (2, n), and rotor current (2, n).
     """
+    voltage_a, voltage_b, voltage_factor, link_factor = (
+        drive.voltage_a,
+        drive.voltage_b,
+        drive.voltage_factor,
+        drive.link_factor,
+    )
+    phase_factor, rotor_factor, omega_rad_per_s = drive.phase_factor, drive.rotor_factor, drive.omega
+    base, legs, legs_link = machine.base, machine.legs, machine.legs_link
+    stop_gain, stop_radius, branch_gain = machine.stop_gain, machine.stop_radius, machine.branch_gain
     samples = voltage_a.shape[0]
     stops = stop_gain.shape[0]
     order = 4 + 2 * branch_gain.shape[0]
@@ -257,34 +231,9 @@ def propagate(
             pa, pb = (1.0 - nu) * y[2] + nu * y[0], (1.0 - nu) * y[3] + nu * y[1]
             ma, mb = _memory_current(pa, pb, pa - from_a, pb - from_b, z, stop_gain, stop_radius)
             va, vb = (last_a, last_b) if stage < 0 else (now_a, now_b)
-            ia, ib, jaa, jab, jbb, eaa, eab, ebb = _rates(
-                y,
-                k,
-                va,
-                vb,
-                ru,
-                rv,
-                rw,
-                rr,
-                om,
-                base,
-                legs_now,
-                has_legs,
-                legs_top,
-                legs_knee,
-                iron,
-                iron_top,
-                leak,
-                leak_top,
-                ma,
-                mb,
-                branch_gain,
-                branch_time,
-            )
+            ia, ib, paths = _rates(y, k, (va, vb), (ru, rv, rw), rr, om, machine, legs_now, (ma, mb))
             if step == 0 and stage < 1:
-                da, db = _current_slope(
-                    y, k, base, jaa, jab, jbb, eaa, eab, ebb, z, stop_gain, stop_radius, branch_gain, branch_time
-                )
+                da, db = _current_slope(y, k, machine, paths, z)
                 if stage < 0:
                     current[0, t], current[1, t] = ia, ib
                     slope_before[0, t], slope_before[1, t] = da, db
@@ -293,18 +242,7 @@ def propagate(
                     if has_legs:
                         turn = base[2] * (abs(now_a - last_a) + abs(now_b - last_b))
                         steps = _steps_for_legs(
-                            ia,
-                            ib,
-                            da,
-                            db,
-                            turn,
-                            period,
-                            base[2],
-                            legs_now,
-                            legs_top,
-                            legs_knee,
-                            substeps,
-                            crossing_substeps,
+                            (ia, ib), (da, db), turn, period, machine, legs_now, substeps, crossing_substeps
                         )
                     h = period / steps
                     stage = 0
@@ -364,8 +302,10 @@ def propagate_linear(voltage_a, voltage_b, transition, gain, output, slope, init
 
 
 @kernel
-def _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, current):
+def _rate(x, k, voltage, a, rr, omega, machine, current):
     """(3)-(7) without nonlinear terms: d x/dt into k, terminal current into `current`; `a` resistances aa, ab, bb."""
+    base, branch_gain, branch_time = machine.base, machine.branch_gain, machine.branch_time
+    va, vb = voltage
     gs, gm, g = base[2], base[3], base[5]
     sa, sb = x[0] - x[2], x[1] - x[3]
     ia = gs * ((1.0 + base[8]) * sa + base[9] * sb)
@@ -392,9 +332,9 @@ def _add_eddy_slope(k, branch_gain, branch_time, shrink, slope, t):
 
 
 @kernel
-def rates_of_unit_states(phase_factor, rotor_factor, omega, base, branch_gain, branch_time):
+def rates_of_unit_states(phase_factor, rotor_factor, omega, machine):
     """(size, size + 2): d x/dt of `propagate_varying` for each state alone and each voltage alone, at constant factors."""
-    size = 4 + 2 * branch_gain.shape[0]
+    base, size = machine.base, 4 + 2 * machine.branch_gain.shape[0]
     out, x, k, unused, a = np.zeros((size, size + 2)), np.zeros(size), np.zeros(size), np.zeros(2), np.zeros(3)
     _resistances(base, phase_factor, a)
     for c in range(size + 2):
@@ -402,7 +342,7 @@ def rates_of_unit_states(phase_factor, rotor_factor, omega, base, branch_gain, b
         if c < size:
             x[c] = 1.0
         va, vb = 1.0 if c == size else 0.0, 1.0 if c == size + 1 else 0.0
-        _rate(x, k, va, vb, a, base[1] * rotor_factor, omega, base, branch_gain, branch_time, unused)
+        _rate(x, k, (va, vb), a, base[1] * rotor_factor, omega, machine, unused)
         out[:, c] = k
     return out
 
@@ -415,26 +355,14 @@ def _resistances(base, phase_factor, a):
 
 
 @kernel
-def propagate_varying(
-    voltage_a,
-    voltage_b,
-    voltage_factor,
-    phase_factor,
-    rotor_factor,
-    omega_rad_per_s,
-    period,
-    steps,
-    order,
-    whole_step,
-    base,
-    branch_gain,
-    branch_time,
-    initial_state,
-):
+def propagate_varying(drive, period, steps, order, whole_step, machine, initial_state):
     """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
 
     varies the exact step itself, `whole_step` (size, size + 2) of states and held voltage (empty otherwise).
     """
+    voltage_a, voltage_b, voltage_factor = drive.voltage_a, drive.voltage_b, drive.voltage_factor
+    phase_factor, rotor_factor, omega_rad_per_s = drive.phase_factor, drive.rotor_factor, drive.omega
+    base, branch_gain, branch_time = machine.base, machine.branch_gain, machine.branch_time
     samples = voltage_a.shape[0]
     size = 4 + 2 * branch_gain.shape[0]
     states = np.zeros((samples + 1, size))
@@ -452,7 +380,7 @@ def propagate_varying(
         _resistances(base, phase_factor[t], a)
         rr, omega = base[1] * rotor_factor[t], omega_rad_per_s[t]
         states[t] = x
-        _rate(x, k, last_a, last_b, a, rr, omega, base, branch_gain, branch_time, i_now)
+        _rate(x, k, (last_a, last_b), a, rr, omega, machine, i_now)
         for c in range(2):
             current[c, t] = i_now[c]
             rotor_current[c, t] = -k[2 + c] / rr
@@ -460,7 +388,7 @@ def propagate_varying(
         slope_before[0, t], slope_before[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
         _add_eddy_slope(k, branch_gain, branch_time, shrink, slope_before, t)
         for step in range(steps):
-            _rate(x, k, va, vb, a, rr, omega, base, branch_gain, branch_time, unused)
+            _rate(x, k, (va, vb), a, rr, omega, machine, unused)
             if step == 0:
                 ua, ub = k[0] - k[2], k[1] - k[3]
                 slope_after[0, t], slope_after[1, t] = iaa * ua + iab * ub, iab * ua + ibb * ub
@@ -477,7 +405,7 @@ def propagate_varying(
                 for c in range(size):
                     x[c] += factor * k[c]
                 if j + 1 < order:
-                    _rate(k, k_next, 0.0, 0.0, a, rr, omega, base, branch_gain, branch_time, unused)
+                    _rate(k, k_next, (0.0, 0.0), a, rr, omega, machine, unused)
                     k, k_next = k_next, k
                     factor *= h / (j + 2.0)
         last_a, last_b = va, vb

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.decay import LEAST_SHARE, decayed
 from commissioner.diagnose.kernels.forcing import tilted
 from commissioner.diagnose.kernels.spline import cells_of
+from commissioner.diagnose.kernels.structures import Machine
 from commissioner.diagnose.plant.model import Layout, Model, Term
 
 Array = NDArray[np.float64]
@@ -56,12 +56,12 @@ class _Left:
         return np.asarray(slope + self.rates_spent * self.tilt @ slope + longer * self.tilt @ self.even)
 
 
-def initial_state(model: Model, segment: Segment, machine: tuple[Any, ...]) -> tuple[Array, Array]:
+def initial_state(model: Model, segment: Segment, machine: Machine) -> tuple[Array, Array]:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component; and (s, 2) what
 
-    the memory operators at work remember. `machine` is the plant's constants and curves.
+    the memory operators at work remember.
     """
-    memory = _memory(model, segment, machine[10])
+    memory = _memory(model, segment, machine.stop_radius)
     state = np.tile(_left(model, segment, machine, np.zeros((0, 0, 4))).flux, 2) + _magnetized(machine, memory)
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kinds.INITIAL_FLUX and term.segment in (-1, segment.uid):
@@ -69,11 +69,9 @@ def initial_state(model: Model, segment: Segment, machine: tuple[Any, ...]) -> t
     return state, memory
 
 
-def slopes_of_start(
-    model: Model, segment: Segment, machine: tuple[Any, ...], layout: Layout, asked: Sequence[Term]
-) -> Array:
+def slopes_of_start(model: Model, segment: Segment, machine: Machine, layout: Layout, asked: Sequence[Term]) -> Array:
     """(4 + asked, 4) derivatives of the initial state by the kernels' four (R_s, R_R, 1/L_sigma, 1/L_M) and by `asked`."""
-    coupled, splits = machine[0][14], machine[0][15:17]
+    coupled, splits = machine.base[14], machine.base[15:17]
     bends = any(t.kind == kinds.IRON_CURVE for t in asked)
     left = _left(model, segment, machine, cells_of(layout.iron_vectors if bends else layout.iron_vectors[:0]))
     per_tilt = left.rates_spent * left.even
@@ -86,7 +84,9 @@ def slopes_of_start(
     }
     out = np.zeros((4 + len(asked), 4))
     out[kinds.GAMMA_M] = np.tile(left.derivatives[0] * left.flux, 2)
-    out[kinds.GAMMA_M] -= model.nominal[3] * np.tile(_magnetized(machine, _memory(model, segment, machine[10]))[2:], 2)
+    out[kinds.GAMMA_M] -= model.nominal[3] * np.tile(
+        _magnetized(machine, _memory(model, segment, machine.stop_radius))[2:], 2
+    )
     for row, term in enumerate(asked, start=4):
         if term.kind == kinds.INITIAL_FLUX:
             out[row] = _unit(term.index)
@@ -110,14 +110,14 @@ def _memory(model: Model, segment: Segment, radius: Array) -> Array:
     return segment.memory(np.ascontiguousarray(radius[:, 0]))
 
 
-def _magnetized(machine: tuple[Any, ...], memory: Array) -> Array:
+def _magnetized(machine: Machine, memory: Array) -> Array:
     """(psi_s, psi_R) that the memory keeps up."""
-    return np.asarray(_per_memory_current(machine) @ ((machine[9] * per_ampere(machine[10])) @ memory))
+    return np.asarray(_per_memory_current(machine) @ ((machine.stop_gain * per_ampere(machine.stop_radius)) @ memory))
 
 
-def _per_memory_current(machine: tuple[Any, ...]) -> Array:
+def _per_memory_current(machine: Machine) -> Array:
     """(4, 2): (psi_s, psi_R) per ampere of memory current where neither terminals nor cage carry any: (3), (6) of `trajectory`."""
-    l_sigma, l_m, nu = 1.0 / machine[0][2], 1.0 / machine[0][3], machine[0][4]
+    l_sigma, l_m, nu = 1.0 / machine.base[2], 1.0 / machine.base[3], machine.base[4]
     return np.vstack([-(l_m + nu * l_sigma) * np.eye(2), -l_m * np.eye(2)])
 
 
@@ -126,8 +126,8 @@ def per_ampere(radius: Array) -> Array:
     return np.where(radius[:, 1] > 0.0, 0.0, 1.0 / np.abs(radius[:, 0]))
 
 
-def _left(model: Model, segment: Segment, machine: tuple[Any, ...], vectors: Array) -> _Left:
-    base, iron, iron_top = machine[0], machine[3], machine[7]
+def _left(model: Model, segment: Segment, machine: Machine, vectors: Array) -> _Left:
+    base, iron, iron_top = machine.base, machine.iron, machine.iron_top
     before, share = np.array(segment.flux_before_wb), np.zeros(2)
     for term, value in zip(model.terms, model.values, strict=True):
         if term.kind == kinds.CARRY and term.segment in (-1, segment.uid):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from commissioner.diagnose.cancelling import ask_for_time
 from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.spline import cells_of
+from commissioner.diagnose.kernels.structures import Asked, Drive, Machine
 from commissioner.diagnose.kernels.tangent import sensitivities
 from commissioner.diagnose.kernels.trajectory import (
     propagate,
@@ -76,12 +77,12 @@ def predict(
             jacobian,
             [0, 1, 2, 3, *(4 + k for k in inside)],
         )
-    held_v = segment.voltage_ab_v * path.drive[2]
+    held_v = segment.voltage_ab_v * path.drive.voltage_factor
     terminal = (path.current, path.after, path.before)
     measured = sense(model, record, segment, channels, layout, terminal, held_v, jacobian, listed)
-    nu = path.machine[0][4]
+    nu = path.machine.base[4]
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
-    leakage = (path.states[:-1, 0:2] - path.machine[0][12] * path.states[:-1, 2:4]).T
+    leakage = (path.states[:-1, 0:2] - path.machine.base[12] * path.states[:-1, 2:4]).T
     last = path.states[-1, 2:4]
     return Prediction(
         measured, jacobian, path.rotor_current, iron, leakage, path.before, (float(last[0]), float(last[1]))
@@ -98,7 +99,7 @@ def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -
 
 @dataclass(frozen=True)
 class Path:
-    """A trajectory and what it was driven by: `drive` known functions of time, `machine` constants and dictionaries."""
+    """A trajectory and what it was driven by."""
 
     states: Array
     stops: Array
@@ -106,8 +107,10 @@ class Path:
     after: Array
     before: Array
     rotor_current: Array
-    drive: tuple[Array, ...]
-    machine: tuple[Any, ...]
+    drive: Drive
+    machine: Machine
+    at_work: Mapping[int, list[int]]
+    """Memory operators and branches, by kind, that have a size or were asked for: all that a derivative along this path may be by."""
 
 
 def _channels(record: Record, position: int) -> Array:
@@ -120,44 +123,37 @@ def _inside(listed: Sequence[Term], segment: Segment) -> list[int]:
 
 
 def trajectory(model: Model, record: Record, position: int, layout: Layout, wanted: Sequence[Term]) -> Path:
-    """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`."""
+    """The motor's path through segment `position`, integrated finely enough for derivatives for `wanted`. TimeOver: given up."""
+    ask_for_time()
     segment, channels = record.segments[position], _channels(record, position)
     asked = [wanted[k] for k in _inside(wanted, segment)]
-    drive = modulation(model, segment, channels)
-    machine = _machine(model, layout, asked)
-    period = segment.period_s
-    start, memory = initial_state(model, segment, machine)
     voltage = segment.voltage_ab_v
     va, vb = np.ascontiguousarray(voltage[0]), np.ascontiguousarray(voltage[1])
+    drive = Drive(va, vb, *modulation(model, segment, channels))
+    at_work = {kind: _at_work(kind, model, asked) for kind in (kinds.STOP, kinds.BRANCH)}
+    machine = _machine(model, layout, asked, at_work)
+    period = segment.period_s
+    start, memory = initial_state(model, segment, machine)
     acting = {t.kind for t, v in zip(model.terms, model.values, strict=True) if v}
     acting |= {t.kind for t in asked} & {kinds.STOP, kinds.BRANCH}
     if all(k in (kinds.INITIAL_FLUX, kinds.CARRY) or k >= kinds.FIRST_OF_SENSING for k in acting):
         transition, gain, output, slope = exact_step(model.nominal, period)
         states, current, after, before = propagate_linear(va, vb, transition, gain, output, slope, start)
         rotor = states[:-1, 2:4].T / model.nominal[3] - current
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
     if not acting & kinds.NONLINEAR:
-        base, branches = machine[0], machine[-2:]
-        rate = _fastest(model, *branches) * period
+        rate = _fastest(model, machine.branch_gain, machine.branch_time) * period
         steps = max(int(np.ceil(rate)), 1) * layout.substeps
-        factors = (drive[0], *drive[2:])
-        whole = _whole_step(drive[2], drive[3], drive[4], period, base, branches)
+        whole = _whole_step(drive, period, machine)
         states, current, after, before, rotor = propagate_varying(
-            va, vb, *factors, period, steps, _taylor_order(rate / steps), whole, base, *branches, start
+            drive, period, steps, _taylor_order(rate / steps), whole, machine, start
         )
-        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, (va, vb, *drive), machine)
+        return Path(states, np.zeros((0, 0, 2)), current, after, before, rotor, drive, machine, at_work)
+    steps = _substeps(model, layout, segment, asked)
     states, stops, current, after, before, rotor = propagate(
-        va,
-        vb,
-        *drive,
-        period,
-        _substeps(model, layout, segment, asked),
-        layout.crossing_substeps,
-        *machine,
-        start,
-        memory,
+        drive, period, steps, layout.crossing_substeps, machine, start, memory
     )
-    return Path(states, stops, current, after, before, rotor, (va, vb, *drive), machine)
+    return Path(states, stops, current, after, before, rotor, drive, machine, at_work)
 
 
 def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
@@ -178,27 +174,21 @@ def _tangent(
     path: Path, model: Model, segment: Segment, channels: Array, layout: Layout, asked: Sequence[Term]
 ) -> Array:
     wanted = {t.kind for t in asked}
-    place = {kinds.STOP: _at_work(kinds.STOP, model, asked), kinds.BRANCH: _at_work(kinds.BRANCH, model, asked)}
+    place = path.at_work
     at_work = np.array([*kinds.NOMINAL, *(t.kind for t in asked)], dtype=np.int64)
     indices = np.array(
         [0, 0, 0, 0, *(place[t.kind].index(t.index) if t.kind in place else t.index for t in asked)], dtype=np.int64
     )
     out = np.empty((2, at_work.shape[0], segment.count))
-    sensitivities(
-        path.states,
-        path.stops,
-        *path.drive,
-        channels,
-        segment.period_s,
-        *path.machine,
+    derivatives = Asked(
         at_work,
         indices,
         _if(bool(wanted & {kinds.LEGS, kinds.LEGS_LINK, kinds.LEG_SHARE}), layout.legs_vectors),
         cells_of(_if(kinds.IRON_CURVE in wanted, layout.iron_vectors)),
         cells_of(_if(kinds.LEAKAGE_CURVE in wanted, layout.leak_vectors)),
         slopes_of_start(model, segment, path.machine, layout, asked),
-        out,
     )
+    sensitivities((path.states, path.stops), path.drive, channels, segment.period_s, path.machine, derivatives, out)
     return out
 
 
@@ -227,7 +217,7 @@ def _at_work(kind: int, model: Model, asked: Sequence[Term]) -> list[int]:
     return sorted(acting | {t.index for t in asked if t.kind == kind})
 
 
-def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, ...]:
+def _machine(model: Model, layout: Layout, asked: Sequence[Term], at_work: Mapping[int, list[int]]) -> Machine:
     aniso = [
         model.sum_kind(k, 2) for k in (kinds.ROTOR_ANISOTROPY, kinds.LEAKAGE_ANISOTROPY, kinds.MAGNETIZING_ANISOTROPY)
     ]
@@ -258,14 +248,14 @@ def _machine(model: Model, layout: Layout, asked: Sequence[Term]) -> tuple[Any, 
             *(1.0 + shares),
         ]
     )
-    stops, branches = _at_work(kinds.STOP, model, asked), _at_work(kinds.BRANCH, model, asked)
+    stops, branches = at_work[kinds.STOP], at_work[kinds.BRANCH]
     wanted = {t.kind for t in asked}
 
     def shape(kind: int, vectors: Array) -> Array:
         weights = model.sum_kind(kind, vectors.shape[0]) @ vectors
         return cells_of(weights if weights.any() or kind in wanted else weights[:3])
 
-    return (
+    return Machine(
         base,
         shape(kinds.LEGS, layout.legs_vectors),
         shape(kinds.LEGS_LINK, layout.legs_vectors),
@@ -293,16 +283,15 @@ def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:
     return max(rate, *((1.0 + max(r_r, r_s) * branch_gain) / np.abs(branch_time))) if branch_time.size else rate
 
 
-def _whole_step(
-    phase_factor: Array, rotor_factor: Array, omega: Array, period_s: float, base: Array, branches: tuple[Array, Array]
-) -> Array:
+def _whole_step(drive: Drive, period_s: float, machine: Machine) -> Array:
     """The exact step of a linear machine in which nothing varies, (size, size + 2) of states and held voltage; empty where
 
     something does. Strong paths beside a cage of hardly any conductance are a hundred times faster than the sampling.
     """
+    phase_factor, rotor_factor, omega = drive.phase_factor, drive.rotor_factor, drive.omega
     if np.ptp(phase_factor, axis=0).any() or np.ptp(rotor_factor) or np.ptp(omega):
         return np.zeros((0, 0))
-    rates = rates_of_unit_states(phase_factor[0], float(rotor_factor[0]), float(omega[0]), base, *branches)
+    rates = rates_of_unit_states(phase_factor[0], float(rotor_factor[0]), float(omega[0]), machine)
     size = rates.shape[0]
     step = expm(np.vstack([rates, np.zeros((2, size + 2))]) * period_s)
     return np.ascontiguousarray(step[:size]) if np.isfinite(step).all() else np.zeros((0, 0))

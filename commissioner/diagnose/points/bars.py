@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from commissioner.diagnose.points.table import Array, Points
+from commissioner.diagnose.intake.points import Array, Points
 
 MAIN_OVER_LEAKAGE = (14.9, 0.5)
 """L_M over L_sigma and the spread of its logarithm, of 35 published machines (tests/data/motors)."""

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.causes.in_points import InPoints
-from commissioner.diagnose.points.table import Array, Points
+from commissioner.diagnose.intake.points import Array, Points
 
 Factor = Callable[[str, Array], Array]
 LEAST_SCATTER = 0.002

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.circuits import Extension, candidates_for, fit_points, held_out, scales
-from commissioner.diagnose.points.table import Array, Points
 from commissioner.motor.circuit import Quantity
 
 SIGNIFICANCE = 1e-3

@@ -6,17 +6,15 @@ Per point the terminal impedance is R + jX with R = P / (3 I^2) and |Z| = V / (s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.resistance import column_of, star_resistance
 from commissioner.errors import DataRefused
 from commissioner.records import POINT_COLUMNS
 
-Array = NDArray[np.float64]
 LEAST_POINTS, MOST_POINTS = 5, 300
 LEAST_SPREAD, LEAST_FLUX_SPREAD = 1.3, 1.15
 """Largest over smallest current (locked rotor) and flux (no load) from which on a circuit can be seen to bend."""
@@ -24,49 +22,6 @@ LEAST_POWER_FACTOR = 0.005
 """A large motor at no load has 0.03; kilowatts read as watts make a thousandth of any."""
 NO_LOAD_SLOPE = -0.5
 """d ln R / d ln V of R = P/(3 I^2): about 0 with a locked rotor, between -1 and -2 at no load."""
-
-
-@dataclass(frozen=True)
-class Points:
-    """Steady-state points of one test: `(n,)` each, line values rms, three-phase power; `resistance_ohm` per star phase."""
-
-    name: str
-    frequency_hz: Array
-    voltage_line_v: Array
-    current_line_a: Array
-    power_w: Array
-    resistance_ohm: Array | None
-    is_locked: bool
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def count(self) -> int:
-        return int(self.current_line_a.shape[0])
-
-    @property
-    def omega(self) -> Array:
-        return np.asarray(2.0 * np.pi * self.frequency_hz)
-
-    @property
-    def phase_voltage_v(self) -> Array:
-        return np.asarray(self.voltage_line_v / np.sqrt(3.0))
-
-    def without(self, k: int) -> Points:
-        keep = np.arange(self.count) != k
-        return self._at(keep)
-
-    def only(self, k: int) -> Points:
-        return self._at(np.arange(self.count) == k)
-
-    def _at(self, keep: NDArray[np.bool_]) -> Points:
-        return replace(
-            self,
-            frequency_hz=self.frequency_hz[keep],
-            voltage_line_v=self.voltage_line_v[keep],
-            current_line_a=self.current_line_a[keep],
-            power_w=self.power_w[keep],
-            resistance_ohm=None if self.resistance_ohm is None else self.resistance_ohm[keep],
-        )
 
 
 def is_points_table(columns: Sequence[str]) -> bool:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.resistance import column_of, star_resistance
-from commissioner.diagnose.points.table import LEAST_POINTS, Array, Points
+from commissioner.diagnose.points.table import LEAST_POINTS
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.running import TCircuit

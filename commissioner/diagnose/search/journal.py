@@ -189,18 +189,14 @@ KINDS: Mapping[str, type] = {k.__name__.lower(): k for k in get_args(Step)}
 Result = TypeVar("Result")
 
 
-def followed(
-    search: Generator[Step, None, Result], observe: Callable[[Step], None] = lambda _: None
-) -> tuple[Result, tuple[Step, ...]]:
-    """What a search finds, and its records; `observe` is called with each."""
-    steps: list[Step] = []
+def followed(search: Generator[Step, None, Result], observe: Callable[[Step], None] = lambda _: None) -> Result:
+    """What a search finds; `observe` is called with each of its records."""
     while True:
         try:
-            step = next(search)
+            observe(next(search))
         except StopIteration as end:
-            return end.value, tuple(steps)
-        observe(step)
-        steps.append(step)
+            found: Result = end.value
+            return found
 
 
 def written(steps: Iterable[Step]) -> list[dict[str, Any]]:

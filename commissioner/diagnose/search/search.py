@@ -67,8 +67,6 @@ class Found:
     material_chi2: float = 0.0
     """A cause that gains less is too small to matter."""
     ruled_out: RuledOut = field(default_factory=RuledOut)
-    is_complete: bool = True
-    """False: the time allowed was over before nothing more passed the rules."""
 
 
 Search = Generator[Step, None, Found]
@@ -80,16 +78,15 @@ def search(
     *,
     excluded: Sequence[str] = (),
     check: Callable[[Fit, Record], None] | None = None,
-    go_on: Callable[[], bool] = lambda: True,
     rules: Rules = RULES,
 ) -> Search:
     """Accepted causes of the whole record. Where lost samples were put right first and much is left, another cause may have looked
 
     like them: sought again in the data as they came.
 
-    `check` sees the nominal fit first and may raise to spare the search; where `go_on` says no, no further cause is tried.
+    `check` sees the nominal fit first and may raise to spare the search.
     """
-    problem = Problem(noise, tuple(name for name in CATALOGUE if name not in excluded), go_on, rules)
+    problem = Problem(noise, tuple(name for name in CATALOGUE if name not in excluded), rules)
     found = yield from _searched(record, problem, check)
     if not found.losses or not _leaves(rules.unknown_sigma, found.fit, found.nominal, problem):
         return found
@@ -213,7 +210,6 @@ def _refined(state: State, problem: Problem, nominal: Fit, losses: Losses, *, ha
         tuple(x for x in losses if x.is_spike),
         material_chi2(state, problem),
         ruled_out,
-        problem.go_on(),
     )
 
 

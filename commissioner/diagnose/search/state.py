@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,11 +24,10 @@ from commissioner.diagnose.search.screening import Screening
 
 @dataclass(frozen=True)
 class Problem:
-    """What stays: the noise, the causes allowed, the rules, and whether there is time (`go_on` is asked between causes)."""
+    """What stays: the noise, the causes allowed, and the rules."""
 
     noise: Noise
     names: tuple[str, ...]
-    go_on: Callable[[], bool] = lambda: True
     rules: Rules = RULES
 
 

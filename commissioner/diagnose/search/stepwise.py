@@ -24,7 +24,7 @@ def stepwise(state: State, problem: Problem, *, adds: bool = True) -> Steps:
     idle: frozenset[str] = frozenset()
     while True:
         state = _screened(state, problem)
-        is_over = not adds or len(state.accepted) >= problem.rules.most_causes or not problem.go_on()
+        is_over = not adds or len(state.accepted) >= problem.rules.most_causes
         name = None
         if not is_over:
             state, name = yield from forward(state, problem, refused)

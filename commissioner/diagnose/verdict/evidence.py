@@ -40,7 +40,6 @@ class HeldOut:
     noise_a: float
     share: float
     is_measured: bool
-    worst_share: float
 
 
 def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noise) -> HeldOut:
@@ -59,7 +58,6 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     period = record.facts.sample_period_s
     floor = np.array([noise.rms_a(s.count, period) ** 2 for s in record.segments]) * table[:, 2]
     removed = table[:, 0] - table[:, 1]
-    structured = np.maximum(table[:, 0] - floor, 1e-12 * floor)
     mean = table.sum(axis=0)
     return HeldOut(
         float(np.sqrt(mean[0] / mean[2])),
@@ -67,7 +65,6 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
         float(np.sqrt(floor.sum() / mean[2])),
         float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)),
         many,
-        float(np.clip((removed / structured).min(), -1.0, 1.0)),
     )
 
 

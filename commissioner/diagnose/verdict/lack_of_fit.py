@@ -40,11 +40,8 @@ class LackOfFit:
     """Structured error after the fit, in units of the noise rms; 0 where the noise explains everything."""
 
     sigma: float
-    from_power_sigma: float
-    from_lines_sigma: float
     from_tones_sigma: float
     from_states_sigma: float
-    strongest_hz: float
     from_bursts_sigma: float = 0.0
     from_ruled_out_sigma: float = 0.0
     """What a cause would take that was ruled out."""
@@ -64,7 +61,7 @@ def lack_of_fit(
     state: a law that is met in a few instants only, like a slew limit, shows in no line; and moments in which much more is left
     than in most.
     """
-    power, count, line_power, strongest = 0.0, 0, 0.0, (0.0, 0.0)
+    power, count, line_power = 0.0, 0, 0.0
     around: list[list[_Around]] = [[] for _ in tones_hz]
     predicted = each_segment(lambda k: predict(model, record, k, layout).currents_a, record)
     residuals = [s.currents_a - expected for s, expected in zip(record.segments, predicted, strict=True)]
@@ -84,10 +81,6 @@ def lack_of_fit(
         line_power += 2.0 * float((spectrum[high] - 1.0).sum())
         for rows, one in zip(around, _around_tones(spectrum, n * period, tones_hz), strict=True):
             rows.append(one)
-        if high.any():
-            _, column = np.unravel_index(int(np.argmax(spectrum)), spectrum.shape)
-            if float(spectrum.max()) > strongest[0]:
-                strongest = (float(spectrum.max()), float(np.fft.rfftfreq(n, period)[1:][column]))
     excess = power / max(count - numbers, 1) - 1.0
     uncertainty_here = 3.0 * float(np.hypot(noise.uncertainty, np.sqrt(2.0 / count)))
     by_power = float(np.sqrt(excess)) if excess > uncertainty_here else 0.0
@@ -99,7 +92,7 @@ def lack_of_fit(
     )
     by_bursts = bursts_sigma(residuals, record, noise, has_causes=any(t.effect for t in model.terms))
     largest = max(by_power, by_lines, by_tones, by_states, by_bursts)
-    return LackOfFit(largest, by_power, by_lines, by_tones, by_states, strongest[1], by_bursts)
+    return LackOfFit(largest, by_tones, by_states, by_bursts)
 
 
 def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Array], noise: Noise) -> float:

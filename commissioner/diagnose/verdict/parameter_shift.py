@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.fit.gauss_newton import Fit, inverse
 from commissioner.diagnose.plant.model import Layout
+from commissioner.motor.circuit import PARAMETERS
 
-PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 LEAST_SHARE, LEAST_SIGMAS = 0.01, 3.0
 """A move below a per cent, or within three standard errors of the better value, is not worth a sentence."""
 

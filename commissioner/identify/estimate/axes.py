@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 
 Matrix = NDArray[np.float64]
-NAMES = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 SIGNIFICANCE = 0.01
 FLOOR = 2e-4
 """No axis result is believed better than this, relatively, when axes are compared: what models leave out varies with
@@ -228,7 +227,9 @@ def compare(
         covariance = covariance + np.outer(heat, heat) + np.diag([0.0, (0.3 * heat[1]) ** 2, 0.0, 0.0])
     difference = new - old
     sigmas = np.abs(difference) / np.sqrt(np.diag(covariance))
-    changes = tuple(Change(NAMES[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas))
+    changes = tuple(
+        Change(PARAMETERS[k], float(math.expm1(difference[k])), float(sigmas[k])) for k in np.argsort(-sigmas)
+    )
     far = (np.abs(difference) > 0.1) & (sigmas > limit_sigmas)
     if (far[2] and far[3]) or far.sum() >= 3:
         return Comparison(Identity.OTHER, changes, limit_sigmas, _sentence(changes, limit_sigmas))

@@ -23,7 +23,6 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import admittance_s, held_input, poles_per_s
 from commissioner.records import Signal
 
-MAX_TONES = 8
 TONE_COUNT = 5
 DEFAULT_SECONDS = 9.0  # with the staircase about 12 s energised per axis
 

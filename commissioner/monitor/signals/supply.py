@@ -19,7 +19,6 @@ from commissioner.records import Signal
 Vector = NDArray[np.complex128]
 Instants = NDArray[np.floating[Any]]
 
-TURN = np.exp(2j * np.pi / 3)
 KNOT_SPACING_S = 1.5
 """Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 BAND_IN_SUPPLY_FREQUENCIES = 14.0

@@ -11,8 +11,7 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.identify.estimate.axes import Combined
 from commissioner.identify.estimate.common_ground import Result
-from commissioner.motor.circuit import InverseGamma
-from commissioner.procedure.verdict import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.run.archive.catalogue import RunSummary
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from commissioner.run.index.index import find as look_up
 from commissioner.run.index.index import refresh as bring_into_step
 from commissioner.run.index.rows import Row, Wanted
 
-__all__ = ["Found", "Refreshed", "Row", "Wanted", "find_runs", "index_runs", "show_run"]
+__all__ = ["Found", "Refreshed", "Row", "Wanted", "find_runs", "index_runs", "show_run", "write_runs"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,21 @@ def find_runs(archive: Archive, wanted: Wanted | None = None) -> Found:
     for name in ("since", "until"):
         _check_date(getattr(wanted, name), name)
     return look_up(archive.runs, wanted, archive.database)
+
+
+@dataclass(frozen=True)
+class WrittenTable:
+    table: str
+    runs: int
+
+
+def write_runs(archive: Archive, wanted: Wanted, out: Path) -> WrittenTable:
+    """The runs that are wanted as a table. UsageError: no date, no ending of a table."""
+    from commissioner.export.runs_table import write_table
+
+    return WrittenTable(
+        str(out), write_table((json.loads(row.document) for row in find_runs(archive, wanted).rows), out)
+    )
 
 
 def show_run(runs: Path, run: str) -> RunSummary:

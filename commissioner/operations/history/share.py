@@ -28,6 +28,7 @@ COPIED, UPDATED, THERE, NEWER, LEFT, CONFLICT = (
     "left: damaged",
     "conflict",
 )
+CONFLICTING = "the two have gone different ways since they were copied; neither was touched"
 
 
 @dataclass(frozen=True)
@@ -89,9 +90,7 @@ def _one(folder: Path, target: Path) -> Moved:
         return Moved(folder.name, LEFT, 0, 0, f"{seen.losses[0].file}: {seen.losses[0].what}")
     relation = _relation(folder, there) if (there / JOURNAL).is_file() else COPIED
     if relation == CONFLICT:
-        return Moved(
-            folder.name, CONFLICT, 0, 0, "the two have gone different ways since they were copied; neither was touched"
-        )
+        return Moved(folder.name, CONFLICT, 0, 0, CONFLICTING)
     if relation == THERE and verify(there).state == DAMAGED:
         relation = UPDATED  # what lies there was spoilt; ours is whole
     if relation in (THERE, NEWER):
@@ -122,10 +121,7 @@ def _copy(folder: Path, incoming: Path) -> tuple[int, int]:
     """(files, bytes) that had to be copied: what lies there whole from a copy that broke off stays, what was begun goes on."""
     incoming.mkdir(parents=True, exist_ok=True)
     files = size = 0
-    with os.scandir(folder) as entries:
-        names = sorted(
-            entry.name for entry in entries if entry.is_file(follow_symlinks=False) and not entry.name.endswith(".part")
-        )
+    names = file_names(folder)
     with os.scandir(incoming) as entries:
         left_over = [entry.name for entry in entries if entry.name not in names]
     for name in left_over:
@@ -134,6 +130,14 @@ def _copy(folder: Path, incoming: Path) -> tuple[int, int]:
         if copied := _copy_file(folder / name, incoming / name):
             files, size = files + 1, size + copied
     return files, size
+
+
+def file_names(folder: Path) -> list[str]:
+    """The files that a run consists of."""
+    with os.scandir(folder) as entries:
+        return sorted(
+            entry.name for entry in entries if entry.is_file(follow_symlinks=False) and not entry.name.endswith(".part")
+        )
 
 
 def _copy_file(source: Path, target: Path) -> int:
@@ -182,7 +186,7 @@ def _put_in_place(incoming: Path, there: Path) -> None:
 def _folder(target: str) -> Path:
     if "://" in target:
         raise UsageError(
-            "runs are moved to a folder", step="move runs", value=target.partition("://")[0] + "://...",
-            limit="a folder, also of a mounted share", remedy="mount the share and give its folder",
+            "runs are moved to a folder, or pushed to a service", step="move runs", value=target.partition("://")[0] + "://...",
+            limit="a folder, also of a mounted share; http(s)://HOST:PORT to push", remedy="mount the share and give its folder",
         )  # fmt: skip
     return Path(target)

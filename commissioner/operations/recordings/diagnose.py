@@ -13,13 +13,14 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
-from commissioner.diagnose.points.table import Points, read_points
+from commissioner.diagnose.points.table import read_points
 from commissioner.diagnose.search.journal import Accepted, Step
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
@@ -28,7 +29,6 @@ from commissioner.operations.recordings.running import diagnosed, is_running
 from commissioner.operations.recordings.sheets import are_sheets, are_three
 from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
@@ -80,7 +80,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     """Recordings together, of one motor at standstill or running; where all files are tables of test points, each on its own.
 
     Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
-    `go_on` is asked between causes; a no ends the search with what was found, and the document says so.
+    A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(Path(path), said) for path in request.files]

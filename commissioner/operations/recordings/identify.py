@@ -13,6 +13,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.analysis import Identification
 from commissioner.identify.analysis import identify as analyse
 from commissioner.identify.contract import FluxReached, IdentifiedDocument
+from commissioner.identify.document import document as identification_document
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
@@ -102,7 +103,7 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     trust = trust_from(request.trust)
     observe(Began("identifying"))
     found, decided = _with_the_plate(recording, plate, cast("Estimator", request.estimator), trust)
-    document: IdentifiedDocument = {**found.as_json(), "flux_guard": _flux_reached(found), "written": []}
+    document: IdentifiedDocument = {**identification_document(found), "flux_guard": _flux_reached(found), "written": []}
     document["remarks"] = [*decided, *document["remarks"]]
     return Identified(document, found, plate, request.files)
 

@@ -18,8 +18,6 @@ NOTHING = frozenset(
 )  # fmt: skip
 """What stands in a cell that holds no number, in lower case."""
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
-GROUPED = re.compile(r"[+-]?\d{1,3}([.,' \u00a0]\d{3})+")
-"""A number that may be thousands in groups as well as one with three decimals."""
 CLOCK = re.compile(
     r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{2,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2})([.,:]\d+)?Z?"
 )

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 
 SAMPLE = 1 << 16
-CHINESE = re.compile(r"[一-鿿]")
-"""The ideographs that column names use."""
 KNOWN_CHINESE = re.compile("[时時间間电電流压壓相秒安伏通道线線速频頻率功采样周期数据序号]")
 
 

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from commissioner.recordings.reading.cells import NUMBER
 from commissioner.recordings.units import read_unit
 
 INTERVAL = frozenset(
@@ -100,7 +99,3 @@ def metadata_of(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
     for name, value, _ in said:
         out.setdefault(name.strip(), value)
     return out
-
-
-def number_of(text: str) -> float | None:
-    return float(text) if NUMBER.fullmatch(text) and "," not in text and text.count(".") < 2 else None

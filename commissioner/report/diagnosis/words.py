@@ -48,7 +48,7 @@ def headline(document: Document) -> str:
     if document["verdict"] == "refused":
         return "These data cannot carry an answer."
     if not is_finished(document):
-        found = f"Found so far: {listed([class_name(c) for c in causes])}." if causes else "Nothing found so far."
+        found = f"Found so far: {listed([class_name(c) for c in causes])}." if causes else "No cause is named yet."
         return f"Not finished: stopped when its time was over, before all causes were tried. {found}"
     if document["kind"] == "points":
         return _points_headline(document)

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
+from commissioner.identify.document import document as identification_document
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
-from commissioner.procedure.verdict import PARAMETERS
 from commissioner.report.run.contract import RunDocument, WrittenRow
 
 
@@ -35,7 +36,11 @@ def summarise(
         "diagnosis": None,
     }
     if identification is not None:
-        document |= {key: value for key, value in identification.as_json().items() if key not in ("outcome", "reason")}
+        document |= {
+            key: value
+            for key, value in identification_document(identification).items()
+            if key not in ("outcome", "reason")
+        }
         document["duration_s"] = ended.energised_s
         document |= _more(findings, document["remarks"])
     document["flux_guard"] = {
@@ -72,6 +77,9 @@ def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:
     longer, match = findings.longer_test, findings.plate_match
     more: dict[str, Any] = {"winding_temperature_degc": findings.winding_degc, "longer_test": longer}
     said = list(remarks)
+    if findings.link.is_reduced and findings.identity is not None:
+        more["link"] = asdict(findings.link)
+        said.insert(0, f"slow link: {findings.link.sentence(findings.identity.control_period_s)}")
     if longer is not None:
         said.append(longer.sentence)
     if match is not None:

@@ -62,16 +62,6 @@ def read_journal(path: Path) -> list[Record]:
     return _records(path.read_bytes())[0] if path.is_file() else []
 
 
-def follow_journal(path: Path, offset: int) -> tuple[list[Record], int]:
-    """The whole records from byte `offset` on, and where to go on: a line that is still being written is left for later."""
-    if not path.is_file():
-        return [], offset
-    with path.open("rb") as file:
-        file.seek(offset)
-        records, size = _records(file.read())
-    return records, offset + size
-
-
 @dataclass(frozen=True)
 class Line:
     """One line as it lies in the file; `record` None: it is not a whole record. `digest` is what the next line must carry."""

@@ -84,7 +84,7 @@ class Texts:
 
     def _value(self, text: str) -> str:
         """What stood in a sentence's gap: a number with this language's mark, a word that is known, or as it was."""
-        if re.fullmatch(r"[+-]?\d+\.\d+(?:e[+-]?\d+)?", text):
+        if re.fullmatch(r"[+-]?\d+\.\d+(?:e[+-]?\d+)?(?: [\w/ ]+)?", text):
             return text.replace(".", ",") if self.language == "de" else text
         return self._catalogue.messages.get(text, text)
 

@@ -14,11 +14,12 @@ def all_routers() -> list[APIRouter]:
         events,
         health,
         history,
+        incoming,
         library,
         recordings,
         runs,
         write,
     )
 
-    modules = (health, library, checks, runs, control, events, write, history, recordings, access)
+    modules = (health, library, checks, runs, control, events, write, history, recordings, incoming, access)
     return [module.router for module in modules]

@@ -9,8 +9,9 @@ import argparse
 
 import numpy as np
 
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.bars import slow_rotor
-from commissioner.diagnose.points.table import Points, read_points
+from commissioner.diagnose.points.table import read_points
 
 FREQUENCIES = ((50, 25, 12.5), (50, 25, 12.5, 5), (50, 12.5), (60, 30, 15), (50, 40, 30, 20, 10))
 

@@ -10,6 +10,7 @@ import pytest
 
 from commissioner.errors import ConfigurationError, DataRefused, UsageError
 from commissioner.identify.analysis import identify
+from commissioner.identify.document import document as identification_document
 from commissioner.records import StandstillRecording
 from tests.support.standstill import linear_current, multitone
 
@@ -71,7 +72,7 @@ def test_what_the_gradient_law_misses_of_least_squares_is_in_its_standard_errors
 
 
 def test_the_document_is_json_with_the_contracts_keys():
-    document = identify(recording()).as_json()
+    document = identification_document(identify(recording()))
     again = json.loads(json.dumps(document, allow_nan=False))
     assert {
         "outcome",
@@ -279,7 +280,7 @@ def test_a_voltage_column_a_row_late_is_found_and_said():
     told, wanted = identify(late), identify(good)
     for value, true in zip(told.parameters.as_tuple(), wanted.parameters.as_tuple(), strict=True):
         assert value == pytest.approx(true, rel=2e-3)
-    assert abs(told.as_json()["time_shift_periods"]["value"]) == pytest.approx(1.0, abs=0.01)
+    assert abs(identification_document(told)["time_shift_periods"]["value"]) == pytest.approx(1.0, abs=0.01)
 
 
 def test_an_axis_some_degrees_off_is_refused_and_a_few_are_told():

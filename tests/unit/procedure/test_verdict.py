@@ -4,9 +4,11 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
-from commissioner.motor.circuit import InverseGamma, Quantity
+import pytest
+
+from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import prior
-from commissioner.procedure.verdict import PARAMETERS, Decision, Evidence, decide
+from commissioner.procedure.verdict import Decision, Evidence, decide
 from commissioner.settings import load_motor, load_procedure
 
 MOTORS = Path(__file__).parents[2] / "data" / "motors" / "motors.csv"
@@ -73,3 +75,19 @@ def test_copper_loss_beyond_the_plates_losses_is_an_objection_of_its_own():
     assert 3 * 8.0 * PLATE.rated_current_a**2 > losses_w
     verdict = decide(Evidence(values, ((0.0, values),)), PLATE, ACCEPTANCE, write_back=True)
     assert verdict.decision is Decision.REJECT and "copper loss" in verdict.reason
+
+
+@pytest.mark.parametrize(("unusual", "word"), [
+    ({"unlike": ("the current sensors' gains differ",)}, "gains differ"), ({"lost_samples": 3}, "lost"), ({"guard_acted": True}, "flux guard"),
+])  # fmt: skip
+def test_what_is_only_unusual_is_rejected_where_that_was_asked_for(unusual, word):
+    evidence = replace(Evidence(VALUES, ((0.0, VALUES),)), **unusual)
+    assert decide(evidence, PLATE, ACCEPTANCE, write_back=True).decision is Decision.WRITE_BACK
+    strict = decide(evidence, PLATE, load_procedure(strict=True).acceptance, write_back=True)
+    assert strict.decision is Decision.REJECT and word in strict.reason and strict.objections[0].remedy
+    assert (
+        decide(
+            Evidence(VALUES, ((0.0, VALUES),)), PLATE, load_procedure(strict=True).acceptance, write_back=True
+        ).decision
+        is Decision.WRITE_BACK
+    )

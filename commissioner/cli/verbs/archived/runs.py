@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs
+from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs, write_runs
 from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.catalogue import RunSummary
 
@@ -33,6 +33,15 @@ def list_runs(folder: Path, *, as_json: bool, wanted: Wanted | None = None, data
     screen.out.print(screen.table("", ("run", "outcome", "motor", "drive", "person", "holds"), rows))
     if (more := found.total - len(rows)) > 0:
         screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
+
+
+def write_table(folder: Path, out: Path, *, as_json: bool, wanted: Wanted, database: str | None = None) -> None:
+    """The runs that are wanted as a file for a spreadsheet or a query."""
+    done = write_runs(Archive(folder, database), wanted, out)
+    if as_json:
+        screen.emit(done)
+    else:
+        screen.out.print(f"{done.runs} runs in {screen.text(done.table)}", soft_wrap=True)
 
 
 def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -> None:

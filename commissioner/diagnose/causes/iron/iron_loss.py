@@ -12,13 +12,13 @@ from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Procedu
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.sampling.sampling_delay import EARLY, SamplingDelay
 from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.kernels.kinds import BRANCH, CABLE, IRON_LOSS
 from commissioner.diagnose.plant.model import Model, Term
 
 if TYPE_CHECKING:
     from commissioner.diagnose.fit.gauss_newton import Fit
-    from commissioner.diagnose.points.table import Points
 
 SAME_STEP = 0.03
 """Of conductance times period: a capacitance so near is the conductance's own."""

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Form, Words
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed, spline_value
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.kernels.kinds import LEAK_SPLIT, LEAKAGE_CURVE
 from commissioner.diagnose.plant.model import Model, Term
-
-if TYPE_CHECKING:
-    from commissioner.diagnose.points.table import Points
-
 
 LEAST_SPREAD = 1.3
 """Of the largest over the smallest current of a table, from which on it shows how the leakage falls."""

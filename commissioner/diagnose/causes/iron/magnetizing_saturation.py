@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +10,9 @@ from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Form, W
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.iron.side import split
 from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed, spline_value
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.kernels.kinds import IRON_CURVE
 from commissioner.diagnose.plant.model import Model, Term
-
-if TYPE_CHECKING:
-    from commissioner.diagnose.points.table import Points
 
 FOOT_SHARE = 0.5
 """Of the flux reached, at which a foot that ends within three intervals of the dictionary has ended."""

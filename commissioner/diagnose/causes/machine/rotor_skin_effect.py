@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.diagnose.causes.cause import Cause, Confounder, Entry, Words
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.causes.setting import Array, Numbers, Setting, Sizes, listed
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.kernels.kinds import BRANCH
 from commissioner.diagnose.plant.model import Model, Term
-
-if TYPE_CHECKING:
-    from commissioner.diagnose.points.table import Points
 
 
 def in_table(x: Array, points: Points, scale: Mapping[str, float]) -> dict[str, float]:

@@ -22,7 +22,6 @@ from commissioner.errors import (
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.reading import read_status
-from commissioner.registers.codec import Value
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.status import DriveState
 from commissioner.registers.tuning import Step, Tuning
@@ -272,8 +271,3 @@ class Tuner:
 
     def _raw(self, name: str) -> int:
         return self._items.port.read(self.profile.item(name).address, 1)[0]
-
-
-def as_values(tuned: Tuned) -> dict[str, Value]:
-    """For the journal."""
-    return dict(tuned.values)

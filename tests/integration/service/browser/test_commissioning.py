@@ -111,7 +111,7 @@ def test_a_plate_is_judged_while_it_is_typed(service, browser):
         expect(hand.page.locator("#judgement")).to_contain_text("45,8\u00a0%: Sternspannung mit Dreieckstrom?")
         hand.page.locator("#pole_pairs").fill("2,5")
         hand.page.locator("#rated_voltage_v").focus()
-        expect(hand.page.locator("[data-field=pole_pairs] .msg")).to_contain_text("Ist keine ganze Zahl")
+        expect(hand.page.locator("[data-field=pole_pairs] .msg")).to_contain_text("Muss eine ganze Zahl sein")
         assert hand.complaints == []
 
 

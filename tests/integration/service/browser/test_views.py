@@ -139,6 +139,7 @@ def test_a_file_that_is_dropped_is_answered_by_the_same_verb(service, browser):
     """`identify`, whose refusal has step, value, limit and remedy here as on the command line."""
     with technician(browser, service) as hand:
         hand.go("/")
+        expect(hand.page.locator("#drop[data-takes=files]")).to_be_visible()
         hand.page.evaluate(DROP, ["pump.csv", "time_s,current_u_a\n0,1\n1,2\n"])
         assert hand.page.evaluate("() => document.querySelector('#file').files[0].name") == "pump.csv"
         hand.button("Send the file")

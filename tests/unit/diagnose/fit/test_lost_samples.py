@@ -103,9 +103,9 @@ def test_held_samples_are_put_right_though_the_noise_was_measured_low(nominal, s
     excess = true.chi2 / float(true.normal.count.sum()) - 1.0
     low = replace(noise, sigma_a=noise.sigma_a / np.sqrt(1.0 + excess), uncertainty=excess)
     current = fit(nominal, record, setting.layout, low)
-    losses = followed(_mended(record, current, setting.layout, Problem(low, ())))[0][2]
+    losses = followed(_mended(record, current, setting.layout, Problem(low, ())))[2]
     assert sum(x.samples for x in losses) == held.size
-    assert followed(_mended(record, current, setting.layout, Problem(replace(low, uncertainty=0.0), ())))[0][2] == ()
+    assert followed(_mended(record, current, setting.layout, Problem(replace(low, uncertainty=0.0), ())))[2] == ()
 
 
 def with_spikes(rows, random):

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points
-from commissioner.diagnose.points.table import Points, read_points
+from commissioner.diagnose.points.table import read_points
 from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from tests.support.standstill import usable_motors

@@ -1,0 +1,65 @@
+"""Runs pushed by other computers: what is here of one, a piece of a file, and its arrival."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Path, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+
+from commissioner.service.access.accounts import Role
+from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
+from commissioner.service.runs.incoming import FILE, LARGEST, MOST_FILES, RUN
+
+router = APIRouter()
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+Run = Annotated[str, Path(pattern=RUN)]
+File = Annotated[str, Path(pattern=FILE)]
+
+
+class Arrival(BaseModel):
+    """The names of all files of the run."""
+
+    model_config = ConfigDict(extra="forbid")
+    files: Annotated[list[Annotated[str, Field(pattern=FILE)]], Field(min_length=1, max_length=MOST_FILES)]
+
+
+@router.get("/api/incoming/{run}")
+async def offered(
+    request: Request, run: Run, _who: Operator, journal_bytes: Annotated[int, Query(ge=0, le=LARGEST)] = 0
+) -> dict[str, Any]:
+    """What is here of a run that somebody wants to push, so that only the rest is sent."""
+    return await asyncio.to_thread(parts_of(request).incoming.offered, run, journal_bytes)
+
+
+@router.put("/api/incoming/{run}/{file}")
+async def piece(
+    request: Request, run: Run, file: File, _who: Operator, start: Annotated[int, Query(ge=0, le=LARGEST)] = 0
+) -> dict[str, Any]:
+    """The body is a piece of the file, from byte `start` on; what stood there goes. 409: a piece before it is missing."""
+    body = await request.body()
+    held = await asyncio.to_thread(parts_of(request).incoming.keep, run, file, start, body)
+    return {"run": run, "file": file, "bytes": held}
+
+
+@router.post("/api/incoming/{run}")
+async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -> dict[str, Any]:
+    """Everything is here: proved by its chain, then put in place. `what`: copied, updated, there already, newer there, left, conflict."""
+    parts = parts_of(request)
+    _check_at_rest(parts, run)
+    moved = await asyncio.to_thread(parts.incoming.arrive, run, arrival.files)
+    await asyncio.to_thread(
+        parts.audit.write, who.person, who.address, "took in a pushed run", run=run, reason=moved.what
+    )
+    return asdict(moved)
+
+
+def _check_at_rest(parts: Parts, run: str) -> None:
+    live = parts.desk.runs.get(run)
+    if live is not None and not live.is_over:
+        raise Refusal(409, "this run goes on here", step="push", value=run, limit="a run that has ended",
+                      remedy="wait for its end, then push again")  # fmt: skip

@@ -1,0 +1,84 @@
+"""Runs that other computers push: kept apart until they are whole and proved, then put into the archive."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import time
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from commissioner.operations.history import share
+from commissioner.run.archive.documents import open_no_link
+from commissioner.run.archive.verify import DAMAGED, verify
+from commissioner.run.index.index import JOURNAL
+from commissioner.service.problems import Refusal
+
+RUN = r"^[0-9]{8}-[0-9]{6}-[\w.\-]{1,150}$"
+FILE = r"^[A-Za-z0-9][\w.\-]{0,99}$"
+LARGEST, MOST_FILES = 2_000_000_000, 100
+"""Bytes of one file, files of one run."""
+FORGOTTEN_S = 7 * 86400.0
+"""What broke off and was never gone on with is removed after so long."""
+
+
+class Incoming:
+    """`root`: where runs stand until they are whole; `runs`: the archive."""
+
+    def __init__(self, root: Path, runs: Path) -> None:
+        self._root, self._runs = root, runs
+
+    def offered(self, run: str, journal_bytes: int) -> dict[str, Any]:
+        """What is here of a run: its journal in the archive (bytes, and the digest of at most `journal_bytes` of them), whether
+        that lies damaged, and the files that an earlier push began."""
+        self._forget()
+        path, there = self._runs / run / JOURNAL, None
+        if path.is_file():
+            held = path.read_bytes()
+            there = {
+                "bytes": len(held),
+                "sha256": hashlib.sha256(held[:journal_bytes]).hexdigest(),
+                "is_damaged": len(held) == journal_bytes and verify(path.parent).state == DAMAGED,
+            }
+        folder = self._root / run
+        begun = sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
+        return {"run": run, "journal": there, "begun": {path.name: _state(path) for path in begun}}
+
+    def keep(self, run: str, file: str, start: int, piece: bytes) -> int:
+        """The bytes that are here of a file once `piece` stands at `start`. Refusal: a gap, or more than a run has."""
+        folder = self._root / run
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        path = folder / file
+        held = path.stat().st_size if path.is_file() else 0
+        if start > held:
+            raise Refusal(409, "a piece is missing before this one", step="push", value=start, limit=held,
+                          remedy="go on where the file ends: GET this run says where")  # fmt: skip
+        if start + len(piece) > LARGEST or (not path.exists() and len(list(folder.iterdir())) >= MOST_FILES):
+            raise Refusal(413, "no run is so large", step="push", value=start + len(piece),
+                          limit=f"{LARGEST} bytes a file, {MOST_FILES} files", remedy="copy it by hand to a share")  # fmt: skip
+        with open(path, "r+b" if held else "wb", opener=open_no_link) as target:
+            target.truncate(start)
+            target.seek(start)
+            target.write(piece)
+        return start + len(piece)
+
+    def arrive(self, run: str, files: Collection[str]) -> share.Moved:
+        """All `files` are here: prove the run by its chain and put it in place. UsageError: there is no journal among them."""
+        folder = self._root / run
+        for path in list(folder.iterdir()) if folder.is_dir() else []:
+            if path.name not in files:
+                path.unlink()
+        (moved,) = share.push(self._root, str(self._runs), [run])
+        shutil.rmtree(folder, ignore_errors=True)
+        return moved
+
+    def _forget(self) -> None:
+        for folder in self._root.iterdir() if self._root.is_dir() else ():
+            if time.time() - folder.stat().st_mtime > FORGOTTEN_S:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _state(path: Path) -> dict[str, Any]:
+    with path.open("rb") as file:
+        return {"bytes": path.stat().st_size, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}

@@ -1,0 +1,40 @@
+"""A plate judged field by field: what each field must be is said once, by the loader of motor files."""
+
+import pytest
+from pydantic import ValidationError
+
+from commissioner.service.library import judge_plate
+from commissioner.service.page.texts import Texts
+from commissioner.settings import MotorFile
+from commissioner.validation import wanted
+
+PLATE = {"rated_power_w": 2200, "rated_voltage_v": 400, "rated_frequency_hz": 50, "rated_current_a": 5.0, "rated_speed_rpm": 1436,
+         "power_factor": 0.8, "pole_pairs": 2, "connection": "star"}  # fmt: skip
+WRONG = (
+    ("pole_pairs", "2,5", "must be a whole number", "muss eine ganze Zahl sein"),
+    ("rated_power_w", "much", "must be a number in W", "muss eine Zahl in W sein"),
+    ("rated_voltage_v", "12", "must be 24 V or more", "muss mindestens 24 V sein"),
+    ("rated_current_a", "0,01", "must be 0.05 A or more", "muss mindestens 0,05 A sein"),
+    ("rated_speed_rpm", "70000", "must be at most 60000 1/min", "darf höchstens 60000 1/min sein"),
+    ("power_factor", "0,1", "must be above 0.2", "muss über 0,2 liegen"),
+    ("inertia_kg_m2", "-1", "must be above 0 kg m2", "muss über 0 kg m2 liegen"),
+    ("connection", "both", "must be one of 'star' or 'delta'", "muss Stern oder Dreieck sein"),
+    ("rated_frequency_hz", "", "is missing", "fehlt"),
+)
+
+
+@pytest.mark.parametrize(("key", "typed", "english", "german"), WRONG)
+def test_a_field_says_what_it_must_be_in_both_languages(key, typed, english, german):
+    judged = judge_plate(PLATE | {key: typed})
+    assert [name for name, field in judged["fields"].items() if not field["ok"]] == [key]
+    field = judged["fields"][key]
+    assert (field["what"], Texts("de").tell(field["what"])) == (english, german)
+    assert field["remedy"] and Texts("de").knows(field["remedy"])
+
+
+@pytest.mark.parametrize(("key", "value"), [("rated_voltage_v", 12), ("pole_pairs", "x"), ("power_factor", 2)])
+def test_page_and_motor_file_say_the_same(key, value):
+    with pytest.raises(ValidationError) as error:
+        MotorFile.model_validate(PLATE | {key: value})
+    said = judge_plate(PLATE | {key: value})["fields"][key]["what"].removeprefix("must be ")
+    assert f": {said}" in wanted(error.value.errors()[0], MotorFile)
