@@ -13,10 +13,10 @@ from commissioner.diagnose.points.table import is_points_table
 from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
 from commissioner.operations.recordings.trust import Trust, refused, trusted_data
-from commissioner.motor.circuit import PARAMETERS
 from commissioner.recordings.table import Table
 
 NOTHING_LEFT = (
