@@ -35,7 +35,8 @@ class SampleBlock:
 
     `lost_before` counts the samples missing between the previous block and this one; they are never filled.
     `current_*_a[k]` is sampled at `(first_index + k) * sample_period_s`; `voltage_axis_v[k]` is the mean voltage
-    commanded along the axis over the period that starts there. `age_s`: how old the last sample can have been, at
+    commanded along the axis over the period that starts there. Where `averaged` > 1 control periods make a sample, all of
+    its values are means over them (currents of the control periods' starts). `age_s`: how old the last sample can have been, at
     most, when it arrived (`safety.freshness`).
     """
 
@@ -51,6 +52,7 @@ class SampleBlock:
     lost_before: int = 0
     clipped: bool = False
     age_s: float = 0.0
+    averaged: int = 1
 
     @property
     def count(self) -> int:
@@ -70,7 +72,8 @@ class StandstillRecording:
     """A standstill recording in the contract's format. Missing samples are missing rows: `time_s` jumps.
 
     `segment` numbers stretches between which the motor was de-energised. `metadata` holds the contract's keys
-    (`rated_power_w` ... `sample_period_s`) as they stood in the file.
+    (`rated_power_w` ... `sample_period_s`) as they stood in the file. `averaged`: where rows are means, over how many of the
+    sample periods each, which then are the drive's control periods; one number within a segment.
     """
 
     time_s: Signal
@@ -85,6 +88,7 @@ class StandstillRecording:
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     source: str = ""
     notes: tuple[ReadingNote, ...] = ()
+    averaged: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--rtu", default="", metavar="PATH", help="serve Modbus RTU on a serial device, or `pty`")
     parser.add_argument("--baud", type=int, default=921600)
     parser.add_argument("--parity", choices="NEO", default="N")
+    parser.add_argument("--pace", action="store_true", help="a pty takes the time that its baud rate takes")
+    parser.add_argument(
+        "--turnaround-ms", type=float, default=0.0, help="a paced line's slave begins its answer so late"
+    )
     parser.add_argument(
         "--tls", type=_port, default=-1, metavar="PORT", help="serve Modbus over TLS; 0 = any free port"
     )
@@ -86,6 +90,7 @@ def _print_truth(truth: dict[str, object]) -> None:
 
 def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
     from sim.truth import answer_key
+    from sim.wire.pace import Pace
     from sim.wire.server import serve
     from sim.wire.station import Options
 
@@ -107,6 +112,7 @@ def _serve(scenario: Scenario, options: argparse.Namespace) -> int:
         options.rtu,
         options.baud,
         options.parity,
+        Pace(options.baud, 1e-3 * options.turnaround_ms) if options.pace else Pace(),
     )
     asyncio.run(_serve_until_signal(scenario, serving, serve))
     return 0

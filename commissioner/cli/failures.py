@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import errno
-import signal
 import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
-from types import FrameType
 from typing import Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from commissioner.cli.signals import be_deaf, listen
 from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
 
@@ -27,7 +26,21 @@ INTERRUPTED = 130
 def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     """Carry the verb out and leave with its exit code; with --json every failure is one document, too."""
     as_json, hide = "--json" in arguments, Secrets(arguments).hide
-    signal.signal(signal.SIGTERM, _terminated)
+    listen()
+    try:
+        error = _carried_out(app, arguments, as_json, hide)
+    except KeyboardInterrupt:  # a second one while the first was being answered
+        error = _stopped()
+    finally:
+        be_deaf()
+    _say(error, as_json, hide)
+    sys.exit(error.exit_code)
+
+
+def _carried_out(
+    app: typer.Typer, arguments: Sequence[str], as_json: bool, hide: Callable[[Any], Any]
+) -> CommissionerError:
+    """Why the verb could not be carried out; SystemExit where it could."""
     try:
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
         if code != INTERRUPTED:
@@ -55,12 +68,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
         error = _too_much(arguments)
     except Exception as surprise:
         error = _defect(surprise, arguments)
-    _say(error, as_json, hide)
-    sys.exit(error.exit_code)
-
-
-def _terminated(number: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt(signal.Signals(number).name)
+    return error
 
 
 def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) -> None:

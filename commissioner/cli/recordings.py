@@ -10,6 +10,7 @@ import typer
 recordings_app = typer.Typer(
     no_args_is_help=True, help="Recordings from other instruments: see what is understood, convert."
 )
+MOST_STATES = 12
 Map = Annotated[
     Path | None, typer.Option("--map", help='TOML file that says what channels are: [columns] "CH1" = "current_u_a".')
 ]
@@ -54,6 +55,12 @@ def recordings_import(
     screen.out.print(screen.table(document["kind"], ("column", "taken as", "unit", "factor to SI", "range"), rows))
     if document["sample_period_s"]:
         screen.out.print(f"{document['rows']} rows, {document['sample_period_s']:.6g} s apart")
+    if document["states"]:
+        said = ", ".join(
+            f"{s['state']} {s['start_s']:.3g} ... {s['end_s']:.3g} s" for s in document["states"][:MOST_STATES]
+        )
+        more = f" and {len(document['states']) - MOST_STATES} more" if len(document["states"]) > MOST_STATES else ""
+        screen.out.print(f"state: {said}{more}")
     for kind, order in document["phase_order"].items():
         screen.out.print(f"{kind}s follow each other as {order}")
     for change in document["changes"]:

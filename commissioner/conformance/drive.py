@@ -192,15 +192,16 @@ class Drive:
         yield from self.command(DISABLE_VOLTAGE)
         yield from self.must_reach(DriveState.SWITCH_ON_DISABLED, "disable voltage")
 
-    def window(self, index: int) -> Steps[RawWindow]:
-        """The window from `index` on, the watchdog fed."""
+    def window(self, index: int, registers: int | None = None) -> Steps[RawWindow]:
+        """The window from `index` on, or its first registers, the watchdog fed."""
         self.heartbeat = (self.heartbeat + 1) & 0xFFFF
         request = [self.heartbeat, index >> 16 & 0xFFFF, index & 0xFFFF]
         address, layout = self.item("heartbeat").address, self.layout
+        asked = layout.words if registers is None else registers
         if self.profile.link.has_read_write_multiple:
-            return self.decoded((yield from pdu.exchange(address, request, layout.address, layout.words)))
+            return self.decoded((yield from pdu.exchange(address, request, layout.address, asked)))
         yield from pdu.write(address, request)
-        return self.decoded((yield from pdu.read(layout.address, layout.words)))
+        return self.decoded((yield from pdu.read(layout.address, asked)))
 
     def decoded(self, words: Words) -> RawWindow:
         """The window's words as they claim to be; a count that cannot be is cut to what is there."""

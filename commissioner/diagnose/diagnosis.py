@@ -18,6 +18,7 @@ from commissioner.diagnose.fit.gauss_newton import Fit, inverse
 from commissioner.diagnose.intake.audit import Audit, prepare
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
+from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.journal import Said, Step, followed, replayed
@@ -93,6 +94,13 @@ def diagnose(
     Once `go_on` says no, the search is given up within a segment's prediction; the answer says so, and names nothing.
     Never raises on poor data: what cannot carry an answer comes back as `refused` with the reason.
     """
+    averaged = [int(np.max(r.averaged)) for r in recordings if r.averaged is not None]
+    if averaged:
+        refusal = refused(
+            "the samples are means over several control periods", max(averaged), "1 control period a sample",
+            "diagnose a recording of every sample: a faster link, or a scope",
+        )  # fmt: skip
+        return _refused(refusal, Audit(()))
     record, audit = prepare(recordings)
     if audit.refusal:
         return _refused(audit.refusal, audit)

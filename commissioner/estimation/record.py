@@ -11,6 +11,7 @@ from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.numbers import Scales
+from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 
@@ -90,7 +91,8 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     windows: list[Window] = []
     remarks: list[str] = []
     has_speed = all(r.speed_rad_per_s is not None for r in recordings)
-    has_zero = all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
+    computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
+    has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
     sigmas = []
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
@@ -127,7 +129,12 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
         most = MOST_SAMPLES // len(windows)
         windows = [first_part(w, min(most, w.count)) for w in windows]
         remarks.append(f"Of each stretch the first {most * period:.3g} s are used.")
-    if not has_zero:
+    if computed:
+        remarks.append(
+            f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
+            "the sum, and unlike gains of the sensors are hard to see."
+        )
+    elif not has_zero:
         remarks.append(
             "Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see."
         )

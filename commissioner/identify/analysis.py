@@ -43,6 +43,11 @@ from commissioner.motor.nameplate import Nameplate, RatedFlux, prior, rated_flux
 from commissioner.records import StandstillRecording
 
 COPPER_ZERO_DEGC = -234.5
+LEVEL, NEAR = 0.75, 0.08
+"""Peak stator flux, of the rated one, that L_M is told for wherever the tests came as near to it as the second says: by how much
+they miss it differs from run to run, and saturating iron would make that a difference of L_M."""
+BEYOND_DOUBT = 0.25
+"""Of what L_M changes by between the flux that a test reached and the one it is told for: its standard error there."""
 MOST_SHIFTS = 6
 TRIAL_STEPS = 3
 """For the delay of a fit that needed none: from its end it is two steps away."""
@@ -113,8 +118,8 @@ def identify(
     examined = audit(recording)
     require_amperes(examined, plate)
     require_volts(examined, plate)
-    require_tones(examined, recording.sample_period_s)
     period_s = recording.sample_period_s
+    require_tones(examined, period_s)
     first, *others = _by_test(examined)
 
     def one(stretches: Sequence[Stretch]) -> AxisFit:
@@ -206,7 +211,8 @@ def _summary(
     shift: TimeShift,
 ) -> Identification:
     rated = rated_flux(plate, float(np.mean([r.parameters.stator_resistance_ohm for r in results])))
-    flux = min(rated.stator_peak_wb, *(r.peak_stator_flux_wb for r in results))
+    reached = min(rated.stator_peak_wb, *(r.peak_stator_flux_wb for r in results))
+    flux = told_level_wb(reached, rated.stator_peak_wb)
     at_flux = [axis_at(r, flux) for r in results]
     combined = combine(at_flux, np.mean([r.batch.inverter_covariance_at(flux) for r in results], axis=0))
     first = min(results, key=lambda r: float(np.trace(r.covariance)))
@@ -238,21 +244,30 @@ def _summary(
             *examined.remarks,
             *([shift.sentence] if shift.is_significant else []),
             *combined.remarks,
-            *_remarks(results, rated, flux),
+            *_remarks(results, rated, flux, reached),
         ),
     )
 
 
+def told_level_wb(reached_wb: float, rated_wb: float) -> float:
+    """The peak stator flux that the parameters are told for, where all tests reached `reached_wb`."""
+    level_wb = LEVEL * rated_wb
+    return level_wb if abs(reached_wb - level_wb) <= NEAR * level_wb else reached_wb
+
+
 def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
-    """An axis' values at a flux all axes reached: only there can saturating iron be compared."""
+    """An axis' values at a flux all axes reached, or nearly: only there can saturating iron be compared."""
     machine, covariance = result.batch.inverse_gamma_at(flux_wb)
     own = result.batch.inverse_gamma_at(result.peak_stator_flux_wb)[0]
     machine = carry_over(result.parameters, own, machine)
     law_std = result.law_error * np.array(machine.as_tuple())
+    if flux_wb > result.peak_stator_flux_wb:
+        beyond_h = machine.magnetizing_inductance_h - result.parameters.magnetizing_inductance_h
+        law_std[3] = math.hypot(law_std[3], BEYOND_DOUBT * beyond_h)
     return AxisEstimate(result.axis_deg, machine, covariance + np.diag(np.square(law_std)))
 
 
-def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) -> list[str]:
+def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, reached_wb: float) -> list[str]:
     remarks = []
     for result in results:
         if result.disagreement_sigmas > LARGEST_DISAGREEMENT:
@@ -269,5 +284,10 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float) ->
         f"L_M holds at a peak stator flux of {flux_wb:.3g} Wb, {flux_wb / rated.stator_peak_wb:.0%} of the rated"
         + (" one, and is not extrapolated" if flux_wb < 0.7 * rated.stator_peak_wb else " one")
     )
+    if flux_wb > reached_wb:
+        remarks.append(
+            f"the tests reached {reached_wb:.3g} Wb; from there to {flux_wb:.3g} Wb, the level that L_M is told for in every run, "
+            "their own magnetizing curve leads; a quarter of the way is in L_M's standard error"
+        )
     remarks.append("gain errors of current and DC-link sensors scale all values and are not in the standard errors")
     return remarks

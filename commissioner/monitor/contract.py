@@ -29,8 +29,25 @@ class LoadPeriod(TypedDict):
     speed_ripple_rms_rad_per_s: float
 
 
+class PartialMonitoring(TypedDict):
+    """What part of the data says (`outcome`: partial): numbers that could be had, and under `withheld` why others could not."""
+
+    outcome: str
+    mean_speed_rad_per_s: Measured | None
+    mean_torque_nm: Measured | None
+    parameters: None
+    periods: list[dict[str, Any]]
+    indicators: dict[str, Any]
+    withheld: dict[str, str]
+    trend: dict[str, Any] | None
+    states: list[State]
+    audit: dict[str, Any]
+    quantities: str
+    files: NotRequired[dict[str, str]]
+
+
 class State(TypedDict):
-    """A stretch of the recording: off | residual | start | ramp | load step | steady | coast-down; `used`: the answer is of it.
+    """A stretch of the recording: off | residual | standstill | lost | start | ramp | load step | steady | coast-down; `used`: the answer is of it.
     Of a steady stretch beside it, or one that is too short, its own speed and torque; `withheld`: why they are of the terminals
     and the plate only."""
 

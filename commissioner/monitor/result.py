@@ -7,15 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.monitor.chain import Observation, Refused
-from commissioner.monitor.contract import Measured, MonitoringDocument, RefusedMonitoring
+from commissioner.monitor.contract import Measured, MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
+from commissioner.monitor.partial import Partial
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
 from commissioner.monitor.trend.trend import Entry, Verdict
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS
 
 OPEN = 0.25
 """A combination that keeps more than this share of its prior variance was not fixed by the data."""
+UNBALANCE_NOISE, SIDE_BAND_NOISE_DB = 0.002, 3.0
+"""Scatter from recording to recording of the current's unbalance (clamps of 0.1 %) and of a side band's level near the floor."""
 LARGE_WEIGHT = 0.2
 """A parameter with less weight (of a unit vector) is not named as part of that combination."""
 WORDS = {
@@ -118,6 +121,33 @@ def refused_document(refused: Refused) -> RefusedMonitoring:
         "indicators": _terminal(refused.audited),
         "audit": audit_document(refused.audited, refused.findings),
     }
+
+
+def partial_document(part: Partial, stretches: list[State], audited: Audited) -> PartialMonitoring:
+    """The numbers that could be had, and why others could not."""
+    speed, torque = part.speed_rad_per_s, part.torque_nm
+    return {
+        "outcome": "partial",
+        "mean_speed_rad_per_s": None if speed is None else quantity(speed.value, speed.std),
+        "mean_torque_nm": None if torque is None else quantity(torque.value, torque.std),
+        "parameters": None,
+        "periods": [{"frequency_hz": line.frequency_hz, "above_floor": line.above_floor} for line in part.lines],
+        "indicators": {"supply_frequency_hz": part.supply_hz, **part.indicators},
+        "withheld": dict(part.withheld),
+        "trend": None,
+        "states": stretches,
+        "audit": audit_document(audited, (*audited.findings, *part.findings)),
+        "quantities": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
+    }
+
+
+def entry_of_part(part: Partial, source: str) -> Entry | None:
+    """What a baseline stores of currents alone: the operating point by the slip; None where the speed is not known."""
+    if part.speed_rad_per_s is None or part.by_slip_nm is None:
+        return None
+    noise = {"current_unbalance": UNBALANCE_NOISE, "rotor_side_band_db": SIDE_BAND_NOISE_DB}
+    watched = {name: (float(part.indicators[name]), std) for name, std in noise.items() if name in part.indicators}
+    return Entry(source, part.speed_rad_per_s.value, part.by_slip_nm, part.supply_hz, watched)
 
 
 def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:

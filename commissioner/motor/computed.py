@@ -8,6 +8,11 @@ import numpy as np
 
 from commissioner.records import ReadingNote, Signal, StandstillRecording
 
+COMPUTED = "computed_current_w_a"
+WHICH = (
+    "Which of the three was computed cannot be told from the sum: a gain, offset or clipped peak of one sensor stands in the computed "
+    "one as well, and is looked for in each pair"
+)
 SAMPLED = 20_000
 MOST_DIGITS = 15
 
@@ -18,9 +23,21 @@ def without_computed_third(recording: StandstillRecording) -> StandstillRecordin
     if w is None or not is_negative_sum(recording.current_u_a, recording.current_v_a, w):
         return recording
     note = ReadingNote(
-        "computed_current_w_a", "third current computed from two (current_w_a is minus their sum): not used"
+        COMPUTED, f"third current computed from two (the three sum to zero to the last digit): not used. {WHICH}"
     )
     return replace(recording, current_w_a=None, notes=(*recording.notes, note))
+
+
+def other_pairs(recording: StandstillRecording) -> list[tuple[str, StandstillRecording]]:
+    """The recording as it is where another of the three columns is the computed one, with that column's name: the two others
+    stand as u and v of a frame turned to them."""
+    u, v = recording.current_u_a, recording.current_v_a
+    w = -(u + v)
+    turned = [("u", v, w, 120.0), ("v", w, u, 240.0)]
+    return [
+        (name, replace(recording, current_u_a=a, current_v_a=b, axis_deg=(recording.axis_deg - turn) % 360.0))
+        for name, a, b, turn in turned
+    ]
 
 
 def is_negative_sum(u: Signal, v: Signal, w: Signal) -> bool:

@@ -33,6 +33,8 @@ def assemble(
         rows.append((segment, block))
     if not rows:
         return None
+    averaged = np.concatenate([np.full(block.count, block.averaged, dtype=np.int64) for _, block in rows])
+    has_means, period_s = bool(np.any(averaged > 1)), rows[0][1].sample_period_s / rows[0][1].averaged
     third = [block.current_w_a for _, block in rows if block.current_w_a is not None]
     return StandstillRecording(
         time_s=np.concatenate(times),
@@ -43,9 +45,10 @@ def assemble(
         current_v_a=np.concatenate([block.current_v_a for _, block in rows]),
         current_w_a=np.concatenate(third) if len(third) == len(rows) else None,
         dc_link_v=np.concatenate([np.full(block.count, block.dc_link_v) for _, block in rows]),
-        sample_period_s=rows[0][1].sample_period_s,
-        metadata=metadata,
+        sample_period_s=period_s,
+        metadata={**metadata, "sample_period_s": period_s} if has_means else metadata,
         source=source,
+        averaged=averaged if has_means else None,
     )
 
 
@@ -77,6 +80,8 @@ def columns(recording: StandstillRecording) -> dict[str, Signal]:
     }
     if recording.current_w_a is not None:
         table["current_w_a"] = recording.current_w_a
+    if recording.averaged is not None:
+        table["averaged_periods"] = recording.averaged.astype(np.float64)
     if recording.dc_link_v is not None:
         table["dc_link_v"] = recording.dc_link_v
     return table

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 from commissioner.errors import CheckFailed
 from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.link_plan import StreamPace, least_baud, plan_link
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.status import DriveState
 
@@ -45,18 +46,6 @@ class DriveLimits:
     winding_max_degc: float
 
 
-@dataclass(frozen=True)
-class StreamPace:
-    """What the link carries: the fastest of a few reads of a whole sample window, made before anything is energised, and the
-    samples and registers of one window."""
-
-    round_trip_s: float
-    samples: int
-    registers: int
-
-
-BITS_PER_REGISTER, OVERHEAD_BITS = 22, 430
-"""On a serial line of 11 bits a character: of a window and of the request, answer head and silences around it."""
 SMALLEST_DRIVE = 0.9
 """Peak rated current of the drive, of the test current: on a smaller drive tests aim lower (`Findings.test_current_a`)."""
 
@@ -166,17 +155,25 @@ def _dc_link(statuses: Sequence[DriveStatus], limits: DriveLimits) -> Iterator[C
 
 
 def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[CheckResult]:
-    """One window is asked for at a time: where it takes longer than its samples last, the drive's memory overruns."""
+    """One window is asked for at a time: where it takes longer than its samples last, a sample must be less, or kept in the
+    drive (`link_plan`)."""
     if pace is None:
         return
-    window_s = pace.samples * sample_period_s
-    baud = (BITS_PER_REGISTER * pace.registers + OVERHEAD_BITS) / window_s
+    plan = plan_link(pace, sample_period_s)
+    took, rate = (
+        f"{1e3 * pace.round_trip_s:.3g} ms for {pace.samples} samples",
+        f"{1.0 / sample_period_s:.0f} samples a second",
+    )
+    limit = f"at most {1e3 * pace.samples * sample_period_s:.3g} ms: the drive takes {rate}"
     yield CheckResult(
         "the link keeps up with the samples",
-        pace.round_trip_s <= window_s,
-        f"{1e3 * pace.round_trip_s:.3g} ms for {pace.samples} samples",
-        f"at most {1e3 * window_s:.3g} ms: the drive takes {1.0 / sample_period_s:.0f} samples a second",
-        f"use a link that answers sooner: a cable in place of radio, VPN or gateway; a serial line of {baud:.0f} Bd or more",
+        plan is not None,
+        took if plan is None or not plan.is_reduced else f"{took}: {plan.sentence(sample_period_s)}",
+        limit
+        if plan is not None and not plan.is_reduced
+        else f"{limit}; slower with means, or with samples kept in the drive",
+        "use a link that answers sooner: a cable in place of radio, VPN or gateway; a serial line of "
+        f"{least_baud(pace, sample_period_s, is_reduced=plan is None):.0f} Bd or more",
     )
 
 

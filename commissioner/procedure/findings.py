@@ -39,6 +39,15 @@ class ChecksJudged:
 
 
 @dataclass(frozen=True)
+class LinkPlanned:
+    """A link that does not carry every sample: what a sample is instead, and the plan in words, its cost included."""
+
+    channels: tuple[str, ...]
+    averaged: int
+    plan: str
+
+
+@dataclass(frozen=True)
 class FirstCurrentSeen:
     """The static stator inductance at a tenth of the staircase's current, over the plate's typical one; the two levels."""
 

@@ -19,8 +19,9 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.plate_match import PlateMatch
 from commissioner.procedure.assembly import assemble, highest_stator_flux_wb
-from commissioner.procedure.checks import CheckResult, DriveLimits, StreamPace, check_failed, judge_drive
-from commissioner.procedure.findings import ChecksJudged, DriveIdentified, VerdictReached
+from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed, judge_drive
+from commissioner.procedure.findings import ChecksJudged, DriveIdentified, LinkPlanned, VerdictReached
+from commissioner.procedure.link_plan import LinkPlan, StreamPace, plan_link
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.states import Event
 from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of, match_of
@@ -42,6 +43,8 @@ Step = Generator[Command, Any, Event]
 
 BELOW_TRIP = 0.85
 """Of the drive's current limit: what tests aim at where that is less than they would take otherwise."""
+WINDOWS_A_WATCHDOG = 4.0
+"""Whole windows that a watchdog must outlast: one that is lost, its time-out, and one more."""
 DWELL_READINGS = 4
 """Status readings spread over the standstill dwell time."""
 
@@ -64,6 +67,13 @@ class Job:
     @property
     def scale_ramp_per_s(self) -> float:
         return self.plan.excitation.scale_ramp_per_s
+
+    @property
+    def watchdog_s(self) -> float:
+        """The drive's: as planned, and longer, up to the longest allowed, where a few windows take longer."""
+        planned = self.plan.supervision
+        slow_s = WINDOWS_A_WATCHDOG * self.pace.round_trip_s if self.pace else 0.0
+        return max(planned.watchdog_s, min(slow_s, planned.max_watchdog_s))
 
     @property
     def test_current_a(self) -> float:
@@ -104,6 +114,7 @@ class Findings:
     """What one run has learnt so far; the report is made from it however the run ends."""
 
     identity: DriveIdentity | None = None
+    link: LinkPlan = field(default_factory=LinkPlan)
     snapshot: ParameterSnapshot | None = None
     checks: tuple[CheckResult, ...] = ()
     winding_degc: float | None = None
@@ -195,8 +206,12 @@ def check(job: Job, findings: Findings) -> Step:
     failure = check_failed(results)
     if failure is not None:
         raise failure
+    findings.link = plan_link(job.pace, findings.identity.control_period_s) or findings.link
+    if findings.link.is_reduced:
+        period_s = findings.identity.control_period_s
+        yield Tell(LinkPlanned(findings.link.channels, findings.link.averaged, findings.link.sentence(period_s)))
     findings.snapshot = yield TakeSnapshot()
-    yield ArmWatchdog(job.plan.supervision.watchdog_s)
+    yield ArmWatchdog(job.watchdog_s)
     return Event.CHECKS_PASSED
 
 

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from commissioner.errors import ConfigurationError, DataRefused
+from commissioner.monitor.intake.states import states
 from commissioner.recordings.importers import contract_table
+from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.mapping import ChannelMap
-from commissioner.recordings.table import CONTRACT_COLUMNS, Table, check_ending, sample_period, write_table
+from commissioner.recordings.table import (
+    CONTRACT_COLUMNS,
+    Table,
+    check_ending,
+    sample_period,
+    to_currents,
+    to_running,
+    write_table,
+)
 from commissioner.recordings.whole import whole_file
+from commissioner.report import band
 from commissioner.report.page import BLUE, GREEN, ORANGE, PLOT_STYLE, Page, Picture, Section, picture, render
 from commissioner.report.page import Table as Rows
 
@@ -37,6 +50,7 @@ def understand(path: Path, mapping: ChannelMap | None = None) -> tuple[Table, di
         "columns": columns,
         "metadata": dict(table.metadata),
         "changes": [{"code": note.code, "what": note.what} for note in table.notes],
+        "states": _states(table, period),
         "phase_order": {kind: order for kind in ("current", "voltage") if (order := _order(table, kind, period))},
     }
 
@@ -73,7 +87,7 @@ def page_of(table: Table, document: Mapping[str, Any]) -> Page:
     ]
     said = [change["what"] for change in document["changes"]] or ["Nothing was changed."]
     parts: list[str | Rows | Picture] = [Rows(("column", "taken as", "unit", "factor to SI", "rms"), rows), *said]
-    pictures: list[str | Rows | Picture] = [p for p in (_drawn(table),) if p is not None]
+    pictures: list[str | Rows | Picture] = [p for p in (_drawn(table, document["states"]),) if p is not None]
     period = document["sample_period_s"]
     facts = [
         ("kind", document["kind"]),
@@ -82,6 +96,43 @@ def page_of(table: Table, document: Mapping[str, Any]) -> Page:
     ]
     sections = [Section("Columns", parts), *([Section("Signals", pictures)] if pictures else [])]
     return Page("Recording", Path(table.source).name, "plain", facts, sections)
+
+
+def _states(table: Table, period: float | None) -> list[dict[str, Any]]:
+    """The stretches of a recording over time; nothing of tables that are none."""
+    if period is None or "time_s" not in table.columns:
+        return []
+    if "voltage_axis_v" in table.columns:
+        return _at_standstill(table)
+    try:
+        recording = to_running(table) if kind_of(table) == "running" else to_currents(table)
+        known = None if has_no_plate(table.metadata) else plate_of(table.metadata, table.source, None)
+    except (DataRefused, ConfigurationError):
+        return []
+    return [
+        {"state": s.state, "start_s": s.start_s, "end_s": s.end_s, "current_a": s.current_a}
+        for s in states(recording, known)
+    ]
+
+
+def _at_standstill(table: Table) -> list[dict[str, Any]]:
+    """Of each segment: off without voltage and current, residual with current alone, else standstill; lost between them."""
+    time, volts = table.columns["time_s"], np.nan_to_num(table.columns["voltage_axis_v"])
+    segment = table.columns.get("segment", np.zeros(time.size))
+    currents = [np.abs(np.nan_to_num(v)) for n, v in table.columns.items() if n.startswith("current_")]
+    size = np.max(currents, axis=0) if currents else np.zeros(time.size)
+    edges = [0, *(np.flatnonzero(np.diff(segment) != 0.0) + 1).tolist(), time.size]
+    out: list[dict[str, Any]] = []
+    for a, b in pairwise(edges):
+        is_on, flows = bool(np.any(volts[a:b])), bool(size[a:b].max() > 0.02 * max(size.max(), 1e-12))
+        name = "standstill" if is_on else "residual" if flows else "off"
+        begin, end = float(time[a]), float(time[b - 1])
+        if out and begin < out[-1]["end_s"]:
+            return []
+        out.append(
+            {"state": name, "start_s": begin, "end_s": end, "current_a": float(np.sqrt(np.mean(size[a:b] ** 2)))}
+        )
+    return out
 
 
 def _range(table: Table, meaning: str | None) -> dict[str, str]:
@@ -108,7 +159,7 @@ def _order(table: Table, kind: str, period: float | None) -> str | None:
     return "u-v-w" if forward > 2 * backward else "u-w-v" if backward > 2 * forward else None
 
 
-def _drawn(table: Table) -> Picture | None:
+def _drawn(table: Table, stretches: list[dict[str, Any]]) -> Picture | None:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -121,12 +172,23 @@ def _drawn(table: Table) -> Picture | None:
         return None
     step = max(1, time.size // MOST_DRAWN)
     with mpl.rc_context(PLOT_STYLE):
-        figure = Figure(figsize=(9.0, 2.2 * len(groups)))
+        has_band = len(stretches) > 0 and stretches[-1]["end_s"] > stretches[0]["start_s"]
+        rows = len(groups) + has_band
+        figure = Figure(figsize=(9.0, 2.2 * len(groups) + 0.5 * has_band))
+        grid = figure.add_gridspec(rows, 1, height_ratios=[4.0] * len(groups) + [0.6] * has_band)
         for k, group in enumerate(groups):
-            axes = figure.add_subplot(len(groups), 1, k + 1)
+            axes = figure.add_subplot(grid[k, 0])
             for name, colour in zip(group, (BLUE, ORANGE, GREEN, BLUE, ORANGE, GREEN), strict=False):
                 axes.plot(time[::step], table.columns[name][::step], color=colour, label=name, linewidth=0.8)
             axes.set_ylabel("A" if group[0].startswith("current") else "V")
             axes.legend(loc="upper right")
+            if has_band:
+                axes.set_xlim(stretches[0]["start_s"], stretches[-1]["end_s"])
+        if has_band:
+            band.draw(figure.add_subplot(grid[-1, 0]), stretches)
         figure.axes[-1].set_xlabel("time, s")
-        return picture(figure, "The signals as they were understood, in SI units.", raster=True)
+        return picture(
+            figure,
+            "The signals as they were understood, in SI units; below them what state the motor was in.",
+            raster=True,
+        )

@@ -55,9 +55,21 @@ def read_running(path: Path, mapping: ChannelMap | None = None) -> RunningRecord
 def import_table(path: Path, mapping: ChannelMap | None = None) -> Table:
     """As `contract_table`, of a running motor: DataRefused where time, currents or voltages of one are missing."""
     table = contract_table(path, mapping)
+    require_running(table)
+    return table
+
+
+def require_running(table: Table) -> None:
+    """DataRefused where time, currents or voltages of a running motor are missing."""
     if "voltage_axis_v" not in table.columns and (missing := _missing(table.columns)):
         raise _lacks(table, missing)
-    return table
+
+
+def has_currents_only(table: Table) -> bool:
+    """Whether time and currents are there and no voltage at all."""
+    columns = table.columns
+    currents = sum(f"current_{phase}_a" in columns for phase in "uvw")
+    return "time_s" in columns and currents >= 2 and not any(name.startswith("voltage_") for name in columns)
 
 
 def contract_table(path: Path, mapping: ChannelMap | None = None) -> Table:

@@ -46,6 +46,11 @@ def plate_of(metadata: Mapping[str, float | str], source: str, motor: str | None
     return plate
 
 
+def has_no_plate(metadata: Mapping[str, float | str]) -> bool:
+    """Whether nothing of a plate is given; one that is given in part is an error that names what is missing."""
+    return not any(key in metadata for key in RATED_VALUES)
+
+
 def start_from(path: Path) -> Start:
     """What commissioning found: the `parameters` of a run's result, as the start and the prior of the fit."""
     if not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:

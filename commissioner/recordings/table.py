@@ -19,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
+from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.computed import without_computed_third
@@ -35,6 +36,7 @@ from commissioner.records import (
 )
 
 MAX_METADATA_LINES = 1000
+MOST_AVERAGED = 1000
 KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
 """Of a comment; `=` is not what we write, yet a value written so must not be lost without a word."""
 STEP_TOLERANCE, MOST_ROUNDED = 0.02, 0.1
@@ -172,7 +174,7 @@ def to_standstill(table: Table) -> StandstillRecording:
             "use `commissioner monitor` for a running motor",
         )
     _require(table, needed, "a standstill recording")
-    optional = [name for name in ("current_w_a", "dc_link_v") if name in columns]
+    optional = [name for name in ("current_w_a", "dc_link_v", "averaged_periods") if name in columns]
     _require_finite(table, [*needed, *optional])
     segment = columns["segment"]
     if np.any(segment != np.round(segment)):
@@ -192,8 +194,25 @@ def to_standstill(table: Table) -> StandstillRecording:
         metadata=table.metadata,
         source=table.source,
         notes=table.notes,
+        averaged=_averaged(table, segment),
     )
     return without_computed_third(recording)
+
+
+def _averaged(table: Table, segment: Signal) -> NDArray[np.int64] | None:
+    """Of how many sample periods each row is the mean; None where the column is not there, or every row is a sample."""
+    column = table.columns.get("averaged_periods")
+    if column is None or np.all(column == 1.0):
+        return None
+    of_segment = np.diff(column)[np.diff(segment) == 0]
+    off = (column != np.round(column)) | (column < 1.0) | (column > MOST_AVERAGED)
+    if np.any(off) or np.any(of_segment != 0.0):
+        raise _refuse(
+            table.source, "averaged_periods is no number of sample periods, or changes inside a segment",
+            float(column[off][0]) if np.any(off) else "changes", f"1 ... {MOST_AVERAGED}, one number a segment",
+            "give of how many control periods each row is the mean, or leave the column out",
+        )  # fmt: skip
+    return column.astype(np.int64)
 
 
 def to_running(table: Table) -> RunningRecording:
@@ -233,6 +252,20 @@ def to_running(table: Table) -> RunningRecording:
         source=table.source,
         notes=table.notes,
     )
+
+
+def to_currents(table: Table) -> RunningRecording:
+    """The table as a running recording without voltages (NaN throughout). DataRefused: fewer than two currents, or no time."""
+    currents = ("current_u_a", "current_v_a", "current_w_a")
+    _require(table, ("time_s", *_all_but_one(currents, table.columns)), "a recording of a motor's currents")
+    time = table.columns["time_s"]
+    empty = np.full(time.size, np.nan)
+    u, v, w = (table.columns.get(name, empty) for name in currents)
+    period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
+    return RunningRecording(
+        time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,
+        table.source, table.notes,
+    )  # fmt: skip
 
 
 def _all_but_one(names: tuple[str, str, str], columns: Mapping[str, Signal]) -> tuple[str, ...]:
@@ -354,6 +387,7 @@ def _not_numeric(path: Path, name: str, seen: object) -> DataRefused:
 CONTRACT_COLUMNS = frozenset(
     {
         "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
+        "averaged_periods",
         "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",
         *POINT_COLUMNS, *POINT_RESISTANCES,
     }

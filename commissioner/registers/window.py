@@ -64,6 +64,7 @@ class StreamFormat:
     voltage_scale_v: float
     current_scale_a: float
     dc_link_scale_v: float
+    averaged: int = 1
 
     @property
     def channels(self) -> int:
@@ -73,6 +74,10 @@ class StreamFormat:
     def samples_per_window(self) -> int:
         """The most samples one fetch can bring."""
         return self.layout.data_registers // self.channels
+
+    def registers_for(self, samples: int) -> int:
+        """Of a window that brings no more than these."""
+        return self.layout.header_words + self.channels * min(max(samples, 1), self.samples_per_window)
 
 
 @dataclass(frozen=True)
@@ -117,11 +122,13 @@ def encode_request(heartbeat: int, next_index: int) -> Words:
     return (heartbeat & 0xFFFF, next_index >> 16 & 0xFFFF, next_index & 0xFFFF)
 
 
-def decode_window(words: Sequence[int], cursor: StreamCursor) -> Window | WindowRefusal:
-    """The reply as samples in SI units, or why it must not be used. Never raises for any words."""
+def decode_window(words: Sequence[int], cursor: StreamCursor, asked: int | None = None) -> Window | WindowRefusal:
+    """The reply as samples in SI units, or why it must not be used. Never raises for any words. `asked`: registers asked for,
+    where not the whole window: over a slow link a shorter answer is here sooner."""
     layout = cursor.stream.layout
-    if len(words) != layout.words:
-        return WindowRefusal(Refusal.LENGTH, f"{len(words)} registers", f"{layout.words} registers")
+    wanted = layout.words if asked is None else asked
+    if len(words) != wanted:
+        return WindowRefusal(Refusal.LENGTH, f"{len(words)} registers", f"{wanted} registers")
     packed = struct.pack(f">{len(words)}H", *words)
     header = _decode_header(layout, packed)
     refusal = _examine(packed, header, cursor)
@@ -137,8 +144,9 @@ def _decode_header(layout: WindowLayout, packed: bytes) -> dict[str, int]:
 def _examine(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:
     stream = cursor.stream
     used = header["count"] * header["channel_mask"].bit_count()
-    if used > stream.layout.data_registers:
-        return WindowRefusal(Refusal.COUNT, f"{used} data registers", f"at most {stream.layout.data_registers}")
+    most = len(packed) // 2 - stream.layout.header_words
+    if used > most:
+        return WindowRefusal(Refusal.COUNT, f"{used} data registers", f"at most {most}")
     start = 2 * stream.layout.header_words
     check_sum = crc16_bytes(packed[: start - 2] + packed[start : start + 2 * used])
     if header["crc16"] != check_sum:
@@ -188,4 +196,5 @@ def _block(packed: bytes, header: dict[str, int], stream: StreamFormat, lost: in
         dc_link_v=header["dc_link_raw"] * stream.dc_link_scale_v,
         lost_before=lost,
         clipped=is_clipped,
+        averaged=stream.averaged,
     )

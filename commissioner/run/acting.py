@@ -10,7 +10,6 @@ from commissioner.link.wire.port import LinkStats, Words
 from commissioner.registers.profile import DriveProfile
 from commissioner.safety import commands as ask
 
-CHANNELS = ("voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
 SETTINGS = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.SetScale, ask.SetBias)
 
 
@@ -34,7 +33,8 @@ def set_up(inverter: Inverter, command: ask.Command) -> None:
                 scale=0.0,
                 scale_ramp_per_s=command.scale_ramp_per_s,
                 duration_s=command.duration_s,
-                channels=CHANNELS,
+                channels=command.channels,
+                decimation=command.averaged,
             )
         case _:
             raise TypeError(f"no such command: {command!r}")

@@ -15,7 +15,7 @@ from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.link.drive.facts import Action, Intent
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import load_profile, reference
 from commissioner.link.wire.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
@@ -55,7 +55,7 @@ class Order:
         folder = RunFolder.create(runs, Path(self.profile.file).stem, self.key)
         lock.name_run(folder.path.name)
         request = {
-            "url": without_secrets(self.url), "profile": self.profile.file, "nameplate": self.nameplate,
+            "url": without_secrets(self.url), "profile": reference(self.profile), "nameplate": self.nameplate,
             "plan": self.plan, "write_back": self.write_back,
         }  # fmt: skip
         folder.save("request.json", request | more)

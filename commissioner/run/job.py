@@ -14,12 +14,13 @@ from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate, prior
-from commissioner.procedure.checks import BITS_PER_REGISTER, OVERHEAD_BITS, DriveLimits, StreamPace
+from commissioner.procedure.checks import DriveLimits
+from commissioner.procedure.link_plan import BITS_PER_REGISTER, OVERHEAD_BITS, StreamPace
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
 from commissioner.registers.convention import our_values
 from commissioner.registers.profile import DriveProfile
-from commissioner.run.acting import CHANNELS
+from commissioner.safety.commands import ALL_CHANNELS
 from commissioner.safety.limits import Bounds
 from commissioner.safety.watch import WatchLimits
 
@@ -30,6 +31,8 @@ FLUX_FRACTION = 1.1
 LATENCY_PROBES = 20
 PACE_PROBES = 5
 """Only a link whose fastest answer is too slow is surely too slow: the others of a busy host are none of its own."""
+WINDOWS = 1.5
+"""A sample waits for the window before its own, and for half of its own, until it is seen."""
 WORST_LATENCY_FACTOR = 3.0
 """The guard predicts across this multiple of the slowest probe: later answers are slower than the first ones."""
 
@@ -57,6 +60,9 @@ def make_job(
     for _ in range(LATENCY_PROBES):
         inverter.read_status()
     names, factors = names_of(profile)
+    pace = _pace(inverter, now_s)
+    latency_s = port.stats.latency_s(1.0)
+    sample_to_command_s = 0.0 if pace is None else WINDOWS * pace.round_trip_s + latency_s
     return Job(
         plan=plan,
         nameplate=nameplate,
@@ -64,21 +70,27 @@ def make_job(
         parameter_names=names,
         parameter_factors=factors,
         write_back=write_back,
-        link_latency_s=min(WORST_LATENCY_FACTOR * port.stats.latency_s(1.0), plan.supervision.reply_timeout_s),
-        pace=_pace(profile, port, now_s),
+        link_latency_s=min(
+            max(WORST_LATENCY_FACTOR * latency_s, sample_to_command_s), plan.supervision.reply_timeout_s
+        ),
+        pace=pace,
     )
 
 
-def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> StreamPace | None:
+def _pace(inverter: Inverter, now_s: Callable[[], float]) -> StreamPace | None:
     """Of reads of the whole window, which moves nothing in the drive; None of a drive that has none or does not show it now.
-    A serial line's time is that of its rate: a pseudo terminal, or a drive paced by its reader, takes this computer's instead."""
+    A serial line takes what its rate does, at the least: a pseudo terminal passes bytes at once."""
+    profile, port = inverter.profile, inverter.port
     layout = profile.window
     if layout is None:
         return None
-    samples = layout.data_registers // len(CHANNELS)
+    decimation = profile.items.get("decimation")
+    most = int(decimation.maximum) if decimation is not None and decimation.maximum is not None else 1
+    kept = int(inverter.read_kept_samples())
+    window = (layout.data_registers // len(ALL_CHANNELS), layout.words, layout.data_registers, most, kept)
+    at_least_s = 0.0
     if isinstance(port, ModbusPort) and port.bit_s is not None:
-        bits = layout.words * BITS_PER_REGISTER + OVERHEAD_BITS
-        return StreamPace(bits * port.bit_s, samples, layout.words)
+        at_least_s = (layout.words * BITS_PER_REGISTER + OVERHEAD_BITS) * port.bit_s
     times_s = []
     for _ in range(PACE_PROBES):
         began_s = now_s()
@@ -87,7 +99,7 @@ def _pace(profile: DriveProfile, port: Port, now_s: Callable[[], float]) -> Stre
         except RequestRefused:
             return None
         times_s.append(now_s() - began_s)
-    return StreamPace(min(times_s), samples, layout.words)
+    return StreamPace(max(min(times_s), at_least_s), *window)
 
 
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:
@@ -135,7 +147,7 @@ def watch_limits(job: Job) -> WatchLimits:
         flux_fraction=FLUX_FRACTION,
         axis_time_s=job.axis_time_s,
         lost_samples_s=LOST_SAMPLES_S,
-        age_s=job.plan.supervision.watchdog_s,
+        age_s=job.watchdog_s,
         dc_link_v=(limits.dc_link_min_v, limits.dc_link_max_v),
         heatsink_degc=limits.heatsink_max_degc,
         winding_degc=limits.winding_max_degc,

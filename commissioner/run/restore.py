@@ -11,7 +11,7 @@ from typing import Any
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.records import ParameterSnapshot, WrittenParameter
@@ -59,7 +59,7 @@ def restore(run: RunSummary, url: str | None, reply_timeout_s: float = 0.5, key:
             remedy="choose an earlier run of this drive: `commissioner runs list`",
         )  # fmt: skip
     request = read_saved(folder, "request.json", "profile", "url")
-    profile = load_profile(request["profile"])
+    profile = archived_profile(str(request["profile"]))
     address = parse_url(url or request["url"])
     if isinstance(address, TlsUrl) and url is None:
         raise UsageError(

@@ -15,7 +15,7 @@ from typing import Any
 from commissioner.errors import Aborted, CommissionerError, DriveFault, WriteBackFailed
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, ParametersWritten, RunEnded, VerdictReached
-from commissioner.records import ParameterSnapshot, SampleBlock, WrittenParameter
+from commissioner.records import DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, with_host, write_lost
@@ -32,7 +32,7 @@ STATUS_EVERY_S = 0.25
 TOUCHING = (ask.ArmWatchdog, ask.SetDriveLimits, ask.LoadExcitation, ask.Enable)
 """Before the first of these the drive is somebody else's: it is only looked at, and not switched off either."""
 
-JUDGED_REPLIES = (ask.Identify, ask.ReadNameplate, ask.ReadStatus, ask.TakeSnapshot, ask.WriteParameters)
+JUDGED_REPLIES = (ask.Identify, ask.ReadNameplate, ask.ReadStatus, ask.Supervise, ask.TakeSnapshot, ask.WriteParameters)
 """What a course decides upon besides the samples: kept, so that `replay` can decide again."""
 
 Course = Generator[ask.Command, Any, RunEnded]
@@ -158,6 +158,8 @@ class Runner:
                 return inverter.read_nameplate()
             case ask.ReadStatus():
                 return inverter.read_status()
+            case ask.Supervise(seconds=seconds):
+                return self._supervise(seconds)
             case ask.TakeSnapshot():
                 return self._take_snapshot()
             case ask.WriteParameters():
@@ -177,6 +179,8 @@ class Runner:
                 live = self._disarm(reason)
                 if live is not None:
                     raise live
+                if self._stream is not None:
+                    self._stream.is_over = True
                 stop_if(judge_status(self._inverter.read_status(), self._watch))
             case _:
                 set_up(self._inverter, command)
@@ -226,6 +230,9 @@ class Runner:
             return None
         progress = self._progress
         self._folder.append(block, progress.segment)
+        if not progress.facts.energised:  # kept in the drive, and downloaded now
+            stop_if(self._stream.sensors.judge(block))
+            return block
         seconds = (block.count + block.lost_before) * block.sample_period_s
         progress.session_s += seconds
         progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + seconds)
@@ -235,6 +242,24 @@ class Runner:
             progress.next_status_s = progress.session_s + STATUS_EVERY_S
             self._stream.ask_status()
         return block
+
+    def _supervise(self, seconds: float) -> DriveStatus:
+        """Until so much time has passed: heartbeats, and the drive's status as often as while samples come."""
+        assert self._stream is not None
+        inverter, progress = self._inverter, self._progress
+        began_s = inverter.now_s()
+        while True:
+            status = self._stream.ask_status()
+            left_s = began_s + seconds - inverter.now_s()
+            if left_s <= 0.0 or not status.is_energised:
+                break
+            inverter.beat()
+            inverter.sleep(max(0.0, min(STATUS_EVERY_S, 0.3 * (progress.facts.watchdog_s or 0.0), left_s)))
+        inverter.beat()
+        passed_s = inverter.now_s() - began_s
+        progress.session_s += passed_s
+        progress.facts = replace(progress.facts, energised_s=progress.facts.energised_s + passed_s)
+        return status
 
     def _tell(self, record: object) -> None:
         if isinstance(record, EstimateUpdated):

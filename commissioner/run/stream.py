@@ -9,7 +9,7 @@ import numpy as np
 
 from commissioner.errors import Aborted, DriveFault
 from commissioner.link.drive.inverter import Inverter
-from commissioner.records import SampleBlock
+from commissioner.records import DriveStatus, SampleBlock
 from commissioner.registers.window import StreamCursor
 from commissioner.safety.freshness import DriveClock
 from commissioner.safety.sensors import SensorWatch
@@ -19,6 +19,10 @@ EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
 LATE_S = 0.05
 """A sample that may be older than this: the drive is asked how many it has made, as often as this at the most."""
+WINDOWS = 2.0
+"""Over a slow link even the newest sample is older, by this many times what its window took to come."""
+ROOM = 1.2
+"""More room in a window than samples can be there: some are made while the request is under way."""
 CATCH_UP_S, CATCH_UP_WINDOWS = 0.02, 8
 """Behind by this much: so many windows are read before anything is computed from them."""
 
@@ -30,8 +34,10 @@ class Stream:
         self, inverter: Inverter, cursor: StreamCursor, began_s: float, sensors: SensorWatch, watch: WatchLimits
     ) -> None:
         self.sensors = sensors
+        self.is_over = False
+        """The motor is de-energised: what the drive has kept has no age that matters."""
         self._inverter, self._cursor, self._watch = inverter, cursor, watch
-        self._began_s, self._asked_s = began_s, -math.inf
+        self._began_s, self._asked_s, self._took_s = began_s, -math.inf, 0.0
         self._clock: DriveClock | None = None
         self._waiting: SampleBlock | None = None
 
@@ -41,10 +47,10 @@ class Stream:
         DriveFault: no sample for `longest_s`.
         """
         block, self._waiting = self._waiting or self._await_block(longest_s), None
-        if block is None:
-            return None
+        if block is None or self.is_over:
+            return block
         for _ in range(CATCH_UP_WINDOWS - 1):
-            if self._age_s(block) < CATCH_UP_S:
+            if self._age_s(block) < CATCH_UP_S + WINDOWS * self._took_s:
                 break
             more = self._fetch()
             if more is None:
@@ -54,12 +60,12 @@ class Stream:
                 break
             block = _joined(block, more)
         age_s = self._age_s(block)
-        if age_s > LATE_S and self._inverter.now_s() - self._asked_s > LATE_S:
+        if age_s > LATE_S + WINDOWS * self._took_s and self._inverter.now_s() - self._asked_s > LATE_S:
             self.ask_status()
             age_s = self._age_s(block)
         return replace(block, age_s=age_s)
 
-    def ask_status(self) -> None:
+    def ask_status(self) -> DriveStatus:
         """Judge the drive's status, and take from it how many samples there are and how large the newest is."""
         self._asked_s = self._inverter.now_s()
         status = self._inverter.read_status()
@@ -67,6 +73,7 @@ class Stream:
         if self._clock is not None and status.samples_produced > 0:
             self._clock = self._clock.at_most(status.samples_produced, self._asked_s)
         self.sensors.claim(status)
+        return status
 
     def _await_block(self, longest_s: float) -> SampleBlock | None:
         deadline = self._inverter.now_s() + longest_s
@@ -89,16 +96,27 @@ class Stream:
     def _fetch(self) -> SampleBlock | None:
         """One window. A window that is not full ends with the newest sample, which pins the drive's clock."""
         asked_s = self._inverter.now_s()
-        window = self._inverter.fetch(self._cursor)
+        most = self._most(asked_s)
+        window = self._inverter.fetch(self._cursor, most)
+        self._took_s = self._inverter.now_s() - asked_s
         self._cursor, self._has_ended = window.cursor, window.has_ended
         block = window.block
         if block is None:
             return None
         if self._clock is None:
             self._clock = DriveClock(self._began_s, block.sample_period_s)
-        if block.count < self._cursor.stream.samples_per_window:
+        if block.count < (most or self._cursor.stream.samples_per_window):
             self._clock = self._clock.at_most(self._cursor.next_index, asked_s)
         return block
+
+    def _most(self, now_s: float) -> int | None:
+        """Samples that can be there: over a slow link room for more would only delay them. None: a whole window."""
+        stream = self._cursor.stream
+        if stream.averaged == 1 or self.is_over:
+            return None
+        began_s = self._began_s if self._clock is None else self._clock.began_after_s
+        there = (now_s - began_s) / stream.sample_period_s - self._cursor.next_index
+        return min(stream.samples_per_window, math.ceil(ROOM * max(there, 0.0)) + 2)
 
     def _age_s(self, block: SampleBlock) -> float:
         assert self._clock is not None

@@ -13,7 +13,7 @@ from typing import Any
 from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError
 from commissioner.link.drive.facts import WriteReport
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import archived_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TlsUrl, parse_url
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
@@ -162,7 +162,7 @@ def _ready(run: RunSummary, url: str | None) -> _Ready:
             remedy="give the drive's whole address with --drive",
         )
     snapshot = read_snapshot(folder, read_journal(folder / "journal.jsonl"))
-    profile = load_profile(str(request["profile"]))
+    profile = archived_profile(str(request["profile"]))
     prove(folder, profile, snapshot)
     return _Ready(folder, profile, address, read_plate(folder), snapshot)
 

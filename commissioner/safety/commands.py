@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate
 
+ALL_CHANNELS = ("voltage_axis_v", "current_u_a", "current_v_a", "current_w_a")
+TWO_CURRENTS = ALL_CHANNELS[:3]
+
 
 @dataclass(frozen=True)
 class Command:
@@ -60,7 +63,8 @@ class SetDriveLimits(Command):
 class LoadExcitation(Command):
     """What the drive will generate once enabled; it starts with bias 0 and scale 0.
 
-    Tones are (amplitude in volts along the axis, frequency in Hz, phase in rad).
+    Tones are (amplitude in volts along the axis, frequency in Hz, phase in rad). A sample is the mean of `channels` over
+    `averaged` control periods.
     """
 
     axis_deg: float
@@ -68,6 +72,8 @@ class LoadExcitation(Command):
     bias_ramp_v_per_s: float
     scale_ramp_per_s: float
     duration_s: float
+    channels: tuple[str, ...] = ALL_CHANNELS
+    averaged: int = 1
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,13 @@ class Enable(Command):
 @dataclass(frozen=True)
 class Fetch(Command):
     """-> SampleBlock, or None once the drive has ended the session; feeds the watchdog"""
+
+
+@dataclass(frozen=True)
+class Supervise(Command):
+    """Let the energised motor's time pass without samples: the watchdog is fed and the drive's status judged. -> DriveStatus"""
+
+    seconds: float
 
 
 @dataclass(frozen=True)

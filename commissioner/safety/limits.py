@@ -19,6 +19,7 @@ from commissioner.safety.commands import (
     SetBias,
     SetDriveLimits,
     SetScale,
+    Supervise,
     TakeSnapshot,
     Wait,
     WriteParameters,
@@ -94,6 +95,13 @@ def _judge_wait(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusal
     if facts.energised:
         return Refusal("waiting would starve the watchdog", command.seconds, "no wait while energised")
     return _within("wait", command.seconds, 0.0, 60.0)
+
+
+def _judge_supervise(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusal | None:
+    assert isinstance(command, Supervise)
+    if not facts.energised:
+        return Refusal("nothing is energised", command.seconds, "supervise an energised motor")
+    return _within("time without samples", command.seconds, 0.0, bounds.axis_time_s)
 
 
 def _judge_watchdog(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusal | None:
@@ -184,6 +192,7 @@ _JUDGES = {
     SetDriveLimits: _judge_drive_limits,
     LoadExcitation: _judge_excitation,
     Enable: _judge_enable,
+    Supervise: _judge_supervise,
     SetScale: _judge_scale,
     SetBias: _judge_bias,
     WriteParameters: _judge_write,

@@ -25,6 +25,8 @@ phase that carries the whole axis current leaves only (g - 1) / (2 g + 1) of a g
 SIGMAS = 6.0
 SCALE, SCALE_FLOOR = 0.1, 0.004
 """How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""
+UNSEEN = 3
+"""A third current that is the others' negative sum has the offsets of both, and the drive's own has that of its sensor."""
 MOVES, LEAST_SHARE = 0.1, 0.1
 """A phase stands still that shows one and the same number while the voltage moves by this share of itself; a phase whose
 share of the axis current is smaller than the second is not asked."""
@@ -69,7 +71,8 @@ class SensorWatch:
         if place < 0:
             return None
         shown = float(np.max(np.abs(_three(phases)[:, place])))
-        if abs(shown - claimed) <= SCALE * max(shown, claimed) + SCALE_FLOOR * self.current_limit_a:
+        floor_a = SCALE_FLOOR * self.current_limit_a * (1 if len(phases) == 3 else UNSEEN)
+        if abs(shown - claimed) <= SCALE * max(shown, claimed) + floor_a:
             return None
         return _distrusted(
             "the current samples and the drive's own current magnitude differ", shown, f"{claimed:.4g} A"

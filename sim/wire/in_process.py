@@ -12,17 +12,23 @@ from sim.drive.states import Answer
 from sim.physics import layout as at
 from sim.scenario import Scenario
 from sim.truth import answer_key
+from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options
 
 ILLEGAL_FUNCTION, ILLEGAL_VALUE = 1, 3
 
 
 class Station:
-    """One drive and its motor. Time is motor time: requests and `pass_time` move it, nothing else does."""
+    """One drive and its motor. Time is motor time: requests and `pass_time` move it, nothing else does.
 
-    def __init__(self, scenario: Scenario, seed: int, faults: tuple[str, ...] = ()) -> None:
-        self.scenario, self.seed = scenario, seed
-        self.drive = Drive(scenario, Options(seed=seed, faults=faults), keeps_motor_time=True)
+    With a `pace` a request takes what its bytes, the slave's turn-around and the answer's bytes take, and a window holds
+    the samples that there are by then; without one a window waits until it is full."""
+
+    def __init__(self, scenario: Scenario, seed: int, faults: tuple[str, ...] = (), pace: Pace = Pace()) -> None:  # noqa: B008
+        self.scenario, self.seed, self.pace = scenario, seed, pace
+        self.drive = Drive(
+            scenario, Options(seed=seed, faults=faults), keeps_motor_time=True, is_paced=not pace.is_free
+        )
         self.highest_flux_wb = 0.0
         """Peak stator flux that really was, so far."""
 
@@ -41,7 +47,12 @@ class Station:
 
     def answer(self, request: bytes) -> bytes:
         """A response PDU, or an exception's."""
+        pace = self.pace
+        if not pace.is_free:
+            self.pass_time(pace.silence_s + pace.frame_s(len(request)) + max(pace.silence_s, pace.turnaround_s))
         response = self._answer(request)
+        if not pace.is_free:
+            self.pass_time(pace.frame_s(len(response)))
         self.highest_flux_wb = max(self.highest_flux_wb, float(self.drive.firmware.x[at.X_PEAK_S]))
         return response
 

@@ -17,6 +17,7 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer
 from pymodbus.server.requesthandler import ServerRequestHandler
 
 from sim.wire.faults import SERVER, WIRE, Fault, deliver
+from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options, sim_device
 
 FUNCTIONS = (3, 6, 16, 23)
@@ -32,13 +33,24 @@ class Handler(ServerRequestHandler):
         self.held = b""
         self.is_deaf = False
         self.undecoded = b""
+        self.heard_until = self.said_until = 0.0
 
     def data_received(self, data: bytes) -> None:
+        """On a paced line once the bytes have been on the wire and the slave has turned round."""
+        pace = self.line.pace
+        if pace.is_free:
+            self.hear(data)
+            return
+        self.heard_until = max(self.loop.time(), self.heard_until) + pace.bytes_s(len(data))
+        silence_s = 2.0 * pace.silence_s if self.said_until < self.loop.time() else pace.silence_s
+        self.loop.call_at(self.heard_until + max(silence_s, pace.turnaround_s), self.hear, data)
+
+    def hear(self, data: bytes) -> None:
         if self.is_deaf:
             return
         wait = self.line.drive.stalled_until - time.monotonic()
         if wait > 0.0:
-            self.loop.call_later(wait, self.data_received, data)
+            self.loop.call_later(wait, self.hear, data)
             return
         super().data_received(data)
 
@@ -122,6 +134,14 @@ class Handler(ServerRequestHandler):
         return lambda body: body + _crc_bytes(body)
 
     def _put(self, data: bytes) -> None:
+        pace = self.line.pace
+        if pace.is_free:
+            self._write(data)
+            return
+        self.said_until = max(self.loop.time(), self.said_until) + pace.bytes_s(len(data))
+        self.loop.call_at(self.said_until, self._write, data)
+
+    def _write(self, data: bytes) -> None:
         if self.transport and not self.transport.is_closing():
             self.transport.write(data)
 
@@ -139,8 +159,8 @@ def _crc_bytes(body: bytes) -> bytes:
 class Line:
     """One way in: a TCP or TLS port, a serial device, or a pty of our own."""
 
-    def __init__(self, drive: Drive, kind: str, make: Callable[..., Any]) -> None:
-        self.drive, self.kind, self.make = drive, kind, make
+    def __init__(self, drive: Drive, kind: str, make: Callable[..., Any], pace: Pace = Pace()) -> None:  # noqa: B008
+        self.drive, self.kind, self.make, self.pace = drive, kind, make, pace
         self.is_rtu = kind == "rtu"
         self.address = ""
         self.server: Any = None
@@ -256,6 +276,7 @@ def lines_of(drive: Drive, options: Options) -> list[Line]:
                     baudrate=options.baud,
                     parity=options.parity,
                 ),
+                options.pace,
             )
         )
     return lines

@@ -21,6 +21,7 @@ from sim.drive.memory import Memory
 from sim.drive.states import Answer
 from sim.scenario import Scenario
 from sim.wire.faults import Plan, parse
+from sim.wire.pace import Pace
 from sim.wire.state_log import StateLog
 
 STEP_ENERGISED_S = 0.001
@@ -42,6 +43,8 @@ class Options:
     rtu: str = ""
     baud: int = 115200
     parity: str = "N"
+    pace: Pace = Pace()  # noqa: RUF009
+    """Of serial lines: a pseudo terminal passes bytes at once, unless it is told how long they take."""
 
 
 def ready_url(kind: str, address: str, options: Options) -> str:
@@ -55,8 +58,12 @@ def ready_url(kind: str, address: str, options: Options) -> str:
 class Drive:
     """The firmware with its pace and its faults; answers register requests."""
 
-    def __init__(self, scenario: Scenario, options: Options, *, keeps_motor_time: bool = False) -> None:
-        """`keeps_motor_time`: the watchdog lives in motor time at `max` too, for a client without a wall clock."""
+    def __init__(
+        self, scenario: Scenario, options: Options, *, keeps_motor_time: bool = False, is_paced: bool = False
+    ) -> None:
+        """`keeps_motor_time`: the watchdog lives in motor time at `max` too, for a client without a wall clock. `is_paced`:
+        whoever carries the requests lets their time pass, none passes here."""
+        self.is_paced = is_paced
         self.plan = Plan([parse(text) for text in (*scenario.faults, *options.faults)])
         self.speed = options.speed
         self.map: DriveMap = load_map(shift=scenario.map_shift or self.plan.map_shift)
@@ -90,6 +97,8 @@ class Drive:
 
     def pass_time(self) -> None:
         """Motor time a request takes when it is not a window."""
+        if self.is_paced:
+            return
         if self.speed:
             self.keep_pace()
         else:
@@ -97,6 +106,8 @@ class Drive:
 
     def fill_window(self, count: int) -> None:
         """Motor time up to the last sample of the window asked for (at max), or up to now."""
+        if self.is_paced:
+            return
         if self.speed:
             self.keep_pace()
             return

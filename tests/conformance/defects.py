@@ -608,6 +608,20 @@ WINDOW = (
         "ring->has_ended",
         "the-last-window-says-that-it-is",
     ),
+    _defect(
+        "as many samples whatever is asked for",
+        RING,
+        "(registers - CM_WINDOW_HEADER) / channels : 0",
+        "CM_WINDOW_DATA / channels : 0",
+        "a-shorter-read-is-a-whole-window",
+    ),
+    _defect(
+        "samples end with their session",
+        RING,
+        "uint32_t produced = ring->produced;",
+        "if (ring->has_ended) memset(ring->sample, 0, sizeof ring->sample);\n    uint32_t produced = ring->produced;",
+        "samples-outlive-their-session",
+    ),
     _defect("ended never", RING, "ring->has_ended && ready <= count", "0", "the-last-window-says-that-it-is"),
     _defect("one session number for all", STATES, "    drive->session++;", "", "every-session-has-its-own-number"),
     _defect(

@@ -8,7 +8,6 @@ import stat
 import subprocess
 import time
 
-import numpy as np
 import pytest
 
 from commissioner.recordings.table import read_table, to_standstill
@@ -169,24 +168,6 @@ def test_the_archive_lists_and_shows_the_run(job):
     shown = call("runs", "show", "last", "--runs", str(job["runs"]))
     assert shown.code == 0
     assert "commissioned" in shown.stdout
-
-
-def test_the_same_seed_gives_the_same_samples(job, tmp_path):
-    with SimProcess("--scenario", "default", "--tcp", "0", "--seed", "1") as sim:
-        again = commission(sim.url, tmp_path, "--axes", "0")
-    assert again.code == 0
-    first, second = (first_axis(runs) for runs in (job["runs"], tmp_path))
-    count = min(first.shape[1], second.shape[1])
-    assert count > 20_000
-    assert np.array_equal(first[:, :count], second[:, :count])
-
-
-def first_axis(runs):
-    """Command and currents of the first axis, (4, n)."""
-    (path,) = runs.glob("*/recording.parquet")
-    seen = to_standstill(read_table(path))
-    is_first = np.cumsum(np.diff(seen.axis_deg, prepend=seen.axis_deg[0]) != 0) == 0
-    return np.array([seen.voltage_axis_v, seen.current_u_a, seen.current_v_a, seen.current_w_a])[:, is_first]
 
 
 # --- over a serial line ----------------------------------------------------------------------------------------------

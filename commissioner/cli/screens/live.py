@@ -61,6 +61,8 @@ class LiveView:
                     f"    so far: R_s {r_s:.4g} Ω, R_R {r_r:.4g} Ω, L_σ {1e3 * l_s:.4g} mH, L_M {1e3 * l_m:.4g} mH, "
                     f"a leg loses {record.leg_error_v:.3g} V"
                 )
+            case told.LinkPlanned():
+                self._line(f"    [yellow]slow link:[/] {escape(record.plan)}")
             case told.ExcitationChosen():
                 volts = sum(amplitude for amplitude, _, _ in record.tones)
                 tones = ", ".join(f"{frequency:.4g}" for _, frequency, _ in record.tones)

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from commissioner.cli.screens.screen import err, out, quantity, table
+from commissioner.cli.screens.screen import err, out, quantity, table, text
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.trend.trend import Verdict
@@ -35,6 +35,30 @@ def show_refused(seen: Refused, document: Mapping[str, Any]) -> None:
             f"({f.voltage_unbalance:.2%} negative sequence), {abs(f.current_a) / 2**0.5:.4g} A ({f.current_unbalance:.2%}), "
             f"{f.power_w:.4g} W, {f.reactive_var:.4g} var"
         )
+
+
+def show_partial(document: Mapping[str, Any]) -> None:
+    """What could be had of partial data, what modulates the current, and what is withheld with its reason."""
+    _states(document, out)
+    rows = []
+    for label, key, scale, unit in (
+        ("mean speed", "mean_speed_rad_per_s", 9.549296585513721, "1/min"),
+        ("mean torque", "mean_torque_nm", 1.0, "N m"),
+    ):
+        if document[key] is not None:
+            rows.append((label, quantity(document[key]["value"] * scale, document[key]["std"] * scale, unit)))
+    rows += [(name.replace("_", " "), f"{value:.5g}") for name, value in document["indicators"].items()]
+    rows += [("modulates the current", f"{line['frequency_hz']:.4f} Hz") for line in document["periods"]]
+    out.print(table("A partial answer", ("", ""), rows))
+    withheld: dict[str, list[str]] = {}
+    for name, why in document["withheld"].items():
+        withheld.setdefault(why, []).append(name.replace("_", " "))
+    for why, names in withheld.items():
+        out.print(f"[yellow]withheld[/] {', '.join(names)}: {text(why)}")
+    for finding in document["audit"]["findings"]:
+        out.print(f"[dim]{finding['kind']}[/] {text(finding['what'])}")
+    if document["trend"] is not None:
+        out.print(f"{document['trend']['sentence']}: {', '.join(document['trend']['alarms']) or 'no alarm'}")
 
 
 def _states(document: Mapping[str, Any], where: Console) -> None:

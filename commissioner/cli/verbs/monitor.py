@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from commissioner.cli.screens.monitoring import show, show_refused
+from commissioner.cli.screens.monitoring import show, show_partial, show_refused
 from commissioner.cli.screens.screen import busy, emit
-from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored
+from commissioner.operations.recordings.monitor import MonitorRequest, NotMonitored, PartlyMonitored
 from commissioner.operations.recordings.monitor import monitor as carry_out
 
 
@@ -14,6 +14,8 @@ def monitor(request: MonitorRequest, *, as_json: bool) -> None:
         done = carry_out(request)
     if as_json:
         emit(done.document)
+    elif isinstance(done, PartlyMonitored):
+        show_partial(done.document)
     elif isinstance(done, NotMonitored):
         show_refused(done.seen, done.document)
         raise done.error

@@ -11,6 +11,7 @@ from rich.markup import escape
 from commissioner.cli.screens import screen
 from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
+from commissioner.cli.signals import let_end
 from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, check_request, commission
 from commissioner.run.commission import Origin
@@ -27,8 +28,10 @@ def run(request: CommissionRequest, *, yes: bool, as_json: bool, dead_man: bool 
     screen.require_yes(yes, as_json=as_json)
     if not yes:
         _ask(request)
-    with LiveView(screen.err if as_json else screen.out) as view:
-        done = commission(request, view)
+    with OperatorStop() as stop:
+        with LiveView(screen.err if as_json else screen.out) as view:
+            done = commission(request, view, Origin(stop=stop))
+        let_end()
     show_and_exit(done, as_json=as_json)
 
 
@@ -40,7 +43,9 @@ def hold_and_commission(request: CommissionRequest) -> None:
     held = DeadMan(sys.stdin.fileno(), stop)
     held.start()
     facts = held.wait_for_begin()
-    done = commission(request, origin=Origin(facts, _say_folder, stop))
+    with stop:
+        done = commission(request, origin=Origin(facts, _say_folder, stop))
+        let_end()
     show_and_exit(done, as_json=True)
 
 

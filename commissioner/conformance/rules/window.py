@@ -206,6 +206,32 @@ def the_last_window_says_that_it_is(drive: Drive) -> Steps[None]:
 
 
 @rule
+def a_shorter_read_is_a_whole_window(drive: Drive) -> Steps[None]:
+    """Fewer registers asked for bring fewer samples under a header and a check sum of their own: short answers over slow links."""
+    yield from _running(drive)
+    yield from drive.stream(60)
+    yield from drive.stop()
+    whole: RawWindow = yield from drive.window(0)
+    for samples in (1, 5, 20):
+        short: RawWindow = yield from drive.window(0, drive.layout.header_words + 4 * samples)
+        if not short.has_right_check_sum or short.count != samples or short.first != whole.first:
+            raise Broken(f"{samples} samples' registers asked for: {short.count} samples from {short.first} claimed")
+        if not np.array_equal(short.data, whole.data[:samples]):
+            raise Broken(f"the first {samples} samples differ from those of the whole window")
+
+
+@rule
+def samples_outlive_their_session(drive: Drive) -> Steps[None]:
+    """What the ring keeps of a session can be read after its end until the next enable: a slow link downloads it then."""
+    yield from _running(drive)
+    live = joined((yield from drive.stream(200)))
+    yield from drive.stop()
+    kept = joined((yield from drive.stream(len(live))))
+    if not np.array_equal(kept[: len(live)], live[: len(kept)]) or len(kept) < len(live):
+        raise Broken(f"{len(live)} samples were read while the test ran, {len(kept)} of them are kept after its end")
+
+
+@rule
 def write_and_read_apart_give_the_same_window(drive: Drive) -> Steps[None]:
     """Index by function 16 and window by function 3 give what function 23 gives in one transaction."""
     if not drive.profile.link.has_read_write_multiple:

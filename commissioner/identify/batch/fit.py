@@ -148,7 +148,7 @@ def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterat
         sum_of_squares=at.squares,
         samples=problem.samples,
         free_parameters=int(free.size),
-        residuals=tuple(at.residuals),
+        residuals=tuple(s.measured(r) for s, r in zip(problem.segments, at.residuals, strict=True)),
         stator_flux_wb=tuple(at.flux),
         own=own,
         iterations=iterations,

@@ -61,7 +61,7 @@ class Problem:
         near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO
         self.passes_zero = [self._passes_zero(s.current_a, near) for s in segments]
         self.weights = [np.ones_like(s.voltage_v) if s.weight is None else s.weight for s in segments]
-        self.noise_a2 = float(np.median([np.var(np.diff(s.current_a, 2)) for s in segments])) / 6.0
+        self.noise_a2 = float(np.median([np.var(np.diff(s.measured(s.current_a), 2)) for s in segments])) / 6.0
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
         self.columns = [np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)]
         self.total = shared + OWN * count

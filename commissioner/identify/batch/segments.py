@@ -21,7 +21,7 @@ PRICE = 4.0
 @dataclass(frozen=True)
 class Segment:
     """One uninterrupted stretch: voltage along the axis held over each period, current along it at the period's
-    start."""
+    start. `weight`: 0 where the current was not measured, 1 elsewhere; None: all was."""
 
     voltage_v: Signal
     current_a: Signal
@@ -29,6 +29,10 @@ class Segment:
     starts_at_rest: bool
     kind: str = "multitone"
     weight: Signal | None = None
+
+    def measured(self, signal: Signal) -> Signal:
+        """The signal where the current was measured."""
+        return signal if self.weight is None else signal[self.weight > 0.0]
 
 
 @dataclass(frozen=True)

@@ -167,7 +167,9 @@ def segments(stretches: Sequence[Stretch]) -> list[Segment]:
     """Between segments the cage still carries what the current left behind, and iron may be remanent before the first:
     no segment is taken to start at rest."""
     return [
-        Segment(writable(s.voltage_v), writable(s.current_a), s.axis_deg, starts_at_rest=False, kind=s.kind)
+        Segment(
+            writable(s.voltage_v), writable(s.current_a), s.axis_deg, starts_at_rest=False, kind=s.kind, weight=s.weight
+        )
         for s in stretches
     ]
 

@@ -69,6 +69,7 @@ def _shifted(stretch: Stretch, n: int) -> Stretch:
         voltage_v=stretch.voltage_v[v : v + count],
         current_a=stretch.current_a[i : i + count],
         cross_a=stretch.cross_a[i : i + count],
+        is_measured=None if stretch.is_measured is None else stretch.is_measured[i : i + count],
         link_ratio=None if stretch.link_ratio is None else stretch.link_ratio[v : v + count],
         starts_at_rest=stretch.starts_at_rest and n >= 0,
     )

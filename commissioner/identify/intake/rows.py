@@ -50,7 +50,8 @@ def require_finite(recording: StandstillRecording) -> None:
 def require_even_steps(recording: StandstillRecording) -> None:
     """Steps inside a segment are whole multiples of the named period, most of them one."""
     inside = np.diff(np.asarray(recording.segment)) == 0
-    steps = np.diff(recording.time_s)[inside] / recording.sample_period_s
+    in_row = 1 if recording.averaged is None else recording.averaged[:-1][inside]
+    steps = np.diff(recording.time_s)[inside] / (recording.sample_period_s * in_row)
     if steps.size == 0:
         raise refused("no segment holds two samples", steps.size, "consecutive samples", "number the segments")
     if recording.sample_period_s > LONGEST_PERIOD_S:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from commissioner.errors import DataRefused
+from commissioner.identify.intake.averaged import between_rows, measured, running_mean_v
 from commissioner.motor.space_vector import axis_current_a, orthogonal_current_a
 from commissioner.records import Signal, StandstillRecording
 
@@ -22,7 +24,8 @@ left behind."""
 class Stretch:
     """Consecutive samples of one segment on one axis without a hole. `kind`: staircase | multitone | biased | zero.
 
-    `link_ratio` is the DC link's voltage over its median, where it was recorded sample by sample.
+    `link_ratio` is the DC link's voltage over its median, where it was recorded sample by sample. `is_measured`: where rows are
+    means, the control periods that hold one; currents of the others only lie between. None: all were measured.
     """
 
     segment: int
@@ -35,6 +38,17 @@ class Stretch:
     lost_before: int
     start_s: float
     link_ratio: Signal | None = None
+    is_measured: NDArray[np.bool_] | None = None
+
+    @property
+    def seen_a(self) -> Signal:
+        """The current, NaN where it was not measured."""
+        return self.current_a if self.is_measured is None else np.where(self.is_measured, self.current_a, np.nan)
+
+    @property
+    def weight(self) -> Signal | None:
+        """1 where the current was measured; None where all was."""
+        return None if self.is_measured is None else self.is_measured.astype(np.float64)
 
     @property
     def is_excited(self) -> bool:
@@ -60,35 +74,40 @@ def cut(recording: StandstillRecording) -> list[Stretch]:
             )
     steps = np.diff(recording.time_s)
     new_segment = np.diff(segment) != 0
-    hole = steps > 1.5 * recording.sample_period_s
+    in_row = np.ones(segment.size, dtype=np.int64) if recording.averaged is None else recording.averaged
+    period_s = recording.sample_period_s * in_row[:-1]
+    hole = steps > 1.5 * period_s
     starts = [0, *(np.flatnonzero(new_segment | hole) + 1)]
     ends = [*starts[1:], segment.size]
     out: list[Stretch] = []
     for a, b in zip(starts, ends, strict=True):
         begins = a == 0 or bool(new_segment[a - 1])
-        lost = 0 if begins else round(float(steps[a - 1]) / recording.sample_period_s) - 1
+        lost = 0 if begins else round(float(steps[a - 1]) / float(period_s[a - 1])) - 1
         rested = begins and (a == 0 or float(steps[a - 1]) > REST_S)
-        out.append(_stretch(recording, a, int(b), rested, lost))
+        out.append(_stretch(recording, a, int(b), rested, lost, int(in_row[a])))
     return out
 
 
-def _stretch(recording: StandstillRecording, a: int, b: int, rested: bool, lost: int) -> Stretch:
+def _stretch(recording: StandstillRecording, a: int, b: int, rested: bool, lost: int, n: int) -> Stretch:
     axis = float(recording.axis_deg[a])
     w = None if recording.current_w_a is None else recording.current_w_a[a:b]
     phases = recording.current_u_a[a:b], recording.current_v_a[a:b], w
     voltage = np.ascontiguousarray(recording.voltage_axis_v[a:b])
     current = axis_current_a(*phases, axis)
+    cross = orthogonal_current_a(*phases, axis)
+    is_mean = n > 1 and b - a > 1
     return Stretch(
         segment=int(recording.segment[a]),
         axis_deg=axis,
-        voltage_v=voltage,
-        current_a=current,
-        cross_a=orthogonal_current_a(*phases, axis),
+        voltage_v=running_mean_v(voltage, n) if is_mean else voltage,
+        current_a=between_rows(current, n) if is_mean else current,
+        cross_a=between_rows(cross, n) if is_mean else cross,
         kind=_kind(voltage, recording.voltage_axis_v),
         starts_at_rest=rested and _is_still(current),
         lost_before=lost,
         start_s=float(recording.time_s[a]),
-        link_ratio=_link_ratio(recording.dc_link_v, a, b),
+        link_ratio=_link_ratio(recording.dc_link_v, a, b) if n == 1 else None,
+        is_measured=measured(b - a, n) if is_mean else None,
     )
 
 

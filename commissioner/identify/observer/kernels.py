@@ -284,7 +284,7 @@ def advance(
     `theta_in` (5,) is theta and the current offset. `upper` (7, 7) and `diagonal` (7,) factor the covariance
     (Bierman's UD); `gamma` (4, 4) is the gain of the Lyapunov law. `lost_v` tabulates the inverter's voltage error
     along the axis over current 0 ... lost_span, `extra_a` the magnetizing current beyond the linear one over stator
-    flux 0 ... extra_span; size 1 = none.
+    flux 0 ... extra_span; size 1 = none. A current that is NaN was not measured: the observer runs on without it.
     """
     f1, f2 = f[0], f[1]
     g1, g2 = 1.0 - f1, 1.0 - f2
@@ -326,7 +326,8 @@ def advance(
         e = y[k] - offset - extra - yl
 
         # Noise level.
-        if law != FROZEN:
+        is_seen = not np.isnan(e)
+        if law != FROZEN and is_seen:
             c0 += beta * (e * e - c0)
             c1 += beta * (e * e_last - c1)
             e_last = e
@@ -347,9 +348,13 @@ def advance(
             if law == REVIEW:
                 for j in range(first, PARAMETERS):
                     e -= psi[j] * deviation[j]
-            step = e / weigh(psi, first, r, upper, diagonal, ff, v, k_gain)
+            step = 0.0
+            if is_seen:
+                step = e / weigh(psi, first, r, upper, diagonal, ff, v, k_gain)
             n1, n2 = t1 + k_gain[3] * step, t2 + k_gain[4] * step
-            if law == REVIEW or has_stable_real_poles(n1, n2, f1, f2):
+            if not is_seen:
+                pass
+            elif law == REVIEW or has_stable_real_poles(n1, n2, f1, f2):
                 if law == REVIEW:
                     for j in range(first, PARAMETERS):
                         deviation[j] += k_gain[j] * step
@@ -365,7 +370,7 @@ def advance(
                 update_factors(first, r, ff, v, upper, diagonal, k_gain)
             else:
                 rejected += 1.0
-        elif law == LYAPUNOV:
+        elif law == LYAPUNOV and is_seen:
             err = e - dead_zone if e > dead_zone else (e + dead_zone if e < -dead_zone else 0.0)
             if err != 0.0:
                 for i in range(4):

@@ -62,7 +62,7 @@ def observe(
         at_rest = stretch.starts_at_rest
         for a in range(0, stretch.voltage_v.size, BLOCK if law == "lyapunov" else stretch.voltage_v.size):
             part = slice(a, a + BLOCK if law == "lyapunov" else None)
-            block = observer.advance(stretch.voltage_v[part], stretch.current_a[part], lost, begins_at_rest=at_rest)
+            block = observer.advance(stretch.voltage_v[part], stretch.seen_a[part], lost, begins_at_rest=at_rest)
             average.add(block)
             lost, at_rest = 0, False
     if law == "fast":
@@ -95,6 +95,7 @@ def excited_part(stretch: Stretch, period_s: float) -> Stretch:
         voltage_v=stretch.voltage_v[first:],
         current_a=stretch.current_a[first:],
         cross_a=stretch.cross_a[first:],
+        is_measured=None if stretch.is_measured is None else stretch.is_measured[first:],
         starts_at_rest=False,
         start_s=stretch.start_s + first * period_s,
     )
@@ -106,6 +107,7 @@ def _settled_residuals(pieces: Sequence[StoredBlock], predicted: Sequence[Signal
     for piece, current in zip(pieces, predicted, strict=True):
         unsettled = settle if piece.restarts else unsettled
         residual = (piece.current_a - current)[unsettled:]
+        residual = residual[np.isfinite(residual)]
         unsettled = max(0, unsettled - current.size)
         if residual.size:
             yield residual

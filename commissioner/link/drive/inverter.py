@@ -205,8 +205,8 @@ class Inverter:
         """What `enable` announces: all of the signal that is loaded."""
         return Intent(Action.ENERGISE, {"control_word": ENABLE, **self._signal})
 
-    def fetch(self, cursor: StreamCursor) -> Window:
-        """The next samples, and the watchdog fed, in one transaction. `block` is None where none is ready yet.
+    def fetch(self, cursor: StreamCursor, most: int | None = None) -> Window:
+        """The next samples, `most` of them where that is given, and the watchdog fed, in one transaction. `block` is None where none is ready yet.
 
         Asked again, once, with a new heartbeat, where the answer was lost or was not its own: the window is
         idempotent. Raises ReplyTimeout or ReplyMismatch after that.
@@ -214,7 +214,7 @@ class Inverter:
         failure: ReplyTimeout | ReplyMismatch
         for _ in range(FETCH_ATTEMPTS):
             try:
-                return self._fetch_once(cursor)
+                return self._fetch_once(cursor, most)
             except (ReplyTimeout, ReplyMismatch) as error:
                 failure = error
         raise failure
@@ -287,6 +287,10 @@ class Inverter:
         unit_ms = 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
         return unit_ms * self._items.read_number(watchdog.register)
 
+    def read_kept_samples(self) -> int:
+        """How many samples its memory keeps of a session; 0 where its file has no register for it."""
+        return int(self._items.read_number("ring_capacity")) if "ring_capacity" in self.profile.items else 0
+
     def restore(self, snapshot: ParameterSnapshot, expected_present: Mapping[str, float] | None = None) -> WriteReport:
         """The snapshot's values in use and stored again. Refused where the drive does not hold `expected_present`."""
         self.profile.require("restore")
@@ -333,6 +337,7 @@ class Inverter:
             voltage_scale_v=number(scales["voltage_scale_v"]),
             current_scale_a=number(scales["current_scale_a"]),
             dc_link_scale_v=number(scales["dc_link_scale_v"]),
+            averaged=decimation,
         )
 
     def _go(self, command: int, wanted: DriveState) -> None:
@@ -362,13 +367,14 @@ class Inverter:
                 )
             self.sleep(POLL_S)
 
-    def _fetch_once(self, cursor: StreamCursor) -> Window:
+    def _fetch_once(self, cursor: StreamCursor, most: int | None) -> Window:
         self._heartbeat = (self._heartbeat + 1) & 0xFFFF
         layout = cursor.stream.layout
         request = encode_request(self._heartbeat, cursor.next_index)
         address = self.profile.items["heartbeat"].address
-        words = self.port.exchange(address, request, layout.address, layout.words, proves_itself=True)
-        decoded = decode_window(words, cursor)
+        asked = layout.words if most is None else cursor.stream.registers_for(most)
+        words = self.port.exchange(address, request, layout.address, asked, proves_itself=True)
+        decoded = decode_window(words, cursor, asked)
         if isinstance(decoded, WindowRefusal):
             self.port.doubt()
             raise ReplyMismatch(

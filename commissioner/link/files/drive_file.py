@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from pydantic import ValidationError
@@ -50,6 +50,21 @@ def load_profile(name_or_path: str | Path) -> DriveProfile:
     """The drive named in `config/drives`, or in a file. UsageError: no such drive; ConfigurationError: bad file."""
     path = _locate(str(name_or_path))
     return build(read_toml(path), str(path))
+
+
+def reference(profile: DriveProfile) -> str:
+    """By what an archive names the drive file: its name where it comes with this program, which says nothing of the computer
+    it was installed on; else its path."""
+    path = Path(profile.file)
+    return path.stem if path.parent == DRIVES_FOLDER else profile.file
+
+
+def archived_profile(kept: str) -> DriveProfile:
+    """The drive file that an archive names. Older ones kept the path of a file that came with the program, on the computer
+    that made them: where it is not there, the one of that name that comes with this one."""
+    path = PurePath(kept.replace("\\", "/"))
+    is_packaged = path.parent.parts[-2:] == DRIVES_FOLDER.parts[-2:] and path.stem in known_drives()
+    return load_profile(path.stem if is_packaged and not Path(kept).is_file() else kept)
 
 
 def build(document: Mapping[str, Any], file: str) -> DriveProfile:

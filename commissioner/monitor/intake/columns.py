@@ -88,7 +88,8 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]
                 (
                     f"computed_{kind}",
                     "note",
-                    f"third {kind} computed from two: not used as a sensor",
+                    f"third {kind} computed from two: not used as a sensor. Which of the three was computed cannot be told from the sum: the "
+                    "gain of a sensor stands in it as well",
                     3,
                     2,
                     f"record all three {kind}s",

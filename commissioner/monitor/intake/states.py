@@ -29,12 +29,18 @@ SETTLED = 0.08
 """Of the level that follows, within which a start's current has come down."""
 START_CURRENT = 2.0
 """Of the rated current, from which on a recording that begins with it begins in a start."""
+LEAST_OFF_S = 0.02
+"""At the head of a recording that begins in a start."""
+LOST_S, MOST_LOST = 0.02, 20
+"""A shorter gap is left to the audit; more of them are a clock, not losses."""
+STANDING = 0.02
+"""Of the rated frequency: a slower vector is direct current."""
 LEAST_STEADY_S = 0.4
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """`state`: off | start | ramp | load step | steady | coast-down | residual; from `start_s` to `end_s` of the recording's
+    """`state`: off | start | ramp | load step | steady | coast-down; from `start_s` to `end_s` of the recording's
     time, with the mean current (rms) and supply frequency."""
 
     state: str
@@ -57,8 +63,23 @@ class _Levels:
     hop_s: float
 
 
-def states(recording: RunningRecording, plate: Nameplate) -> tuple[Stretch, ...]:
-    """The stretches in their order; one steady stretch where nothing else is seen."""
+def states(recording: RunningRecording, plate: Nameplate | None) -> tuple[Stretch, ...]:
+    """The stretches in their order; one steady stretch where nothing else is seen. Without a plate levels are against the
+    recording's own."""
+    plate = plate or _plate_like(recording)
+    parts = _whole_parts(recording)
+    if len(parts) < 2:
+        return _of_one(recording, plate)
+    out: list[Stretch] = []
+    for k, part in enumerate(parts):
+        if k:
+            lost = (float(recording.time_s[parts[k - 1].stop - 1]), float(recording.time_s[part.start]))
+            out.append(Stretch("lost", *lost, 0.0, 0.0))
+        out += _of_one(_cut(recording, part), plate)
+    return tuple(out)
+
+
+def _of_one(recording: RunningRecording, plate: Nameplate) -> tuple[Stretch, ...]:
     levels = _levels(recording, plate)
     whole = (Stretch("steady", float(recording.time_s[0]), float(recording.time_s[-1]), 0.0, plate.rated_frequency_hz),)
     if levels is None or levels.time_s.size < 8:
@@ -66,7 +87,41 @@ def states(recording: RunningRecording, plate: Nameplate) -> tuple[Stretch, ...]
     names = _named(levels, plate)
     if set(names) <= {"steady"}:
         return whole
-    return tuple(_joined(levels, names, recording))
+    return tuple(_sharpened(_joined(levels, names, recording), recording, plate))
+
+
+def _whole_parts(recording: RunningRecording) -> list[slice]:
+    """Index ranges between losses: a gap in time, or rows without a number, of `LOST_S` and more."""
+    t = recording.time_s
+    seen = [x for x in (*recording.currents_a, *recording.voltages_v) if np.isfinite(x).any()]
+    good = np.flatnonzero(np.all([np.isfinite(x) for x in (*seen, t)], axis=0))
+    if good.size < 2 or not np.all(np.diff(t[good]) > 0.0):
+        return [slice(0, t.size)]
+    cuts = np.flatnonzero(np.diff(t[good]) > LOST_S)
+    if cuts.size == 0 or cuts.size > MOST_LOST:
+        return [slice(0, t.size)]
+    edges = [0, *(int(c) + 1 for c in cuts), good.size]
+    return [slice(int(good[a]), int(good[b - 1]) + 1) for a, b in itertools.pairwise(edges)]
+
+
+def _plate_like(recording: RunningRecording) -> Nameplate:
+    """A plate of the recording's own levels where it is energised: states are told by ratios."""
+    completed, _ = complete(recording)
+    i = np.abs(space_vector(*(np.nan_to_num(x) for x in completed.currents_a)))
+    v = np.abs(space_vector(*(np.nan_to_num(x) for x in completed.voltages_v)))
+    level = float(np.median(i[i > 0.2 * np.quantile(i, 0.9)])) if i.size and np.any(i) else 1.0
+    volts = float(np.median(v[v > 0.2 * np.quantile(v, 0.9)])) if v.size and np.any(v) else 1.0
+    line = volts * (1.0 if recording.voltages_are_line_to_line else np.sqrt(3.0)) / np.sqrt(2.0)
+    return Nameplate(1.0, line, 50.0, level / np.sqrt(2.0), 1450.0, 0.8, 2, "star")
+
+
+def _cut(recording: RunningRecording, keep: slice | np.ndarray) -> RunningRecording:
+    i, v = ([x[keep] for x in group] for group in (recording.currents_a, recording.voltages_v))
+    speed = recording.speed_rad_per_s
+    return replace(
+        recording, time_s=recording.time_s[keep], currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2]),
+        speed_rad_per_s=None if speed is None else speed[keep],
+    )  # fmt: skip
 
 
 def _levels(recording: RunningRecording, plate: Nameplate) -> _Levels | None:
@@ -81,7 +136,9 @@ def _levels(recording: RunningRecording, plate: Nameplate) -> _Levels | None:
     v = space_vector(*(np.nan_to_num(x) for x in completed.voltages_v))
     starts = np.arange(0, time.size - n + 1, hop)
     power_i, power_v = (np.concatenate([[0.0], np.cumsum(np.abs(x) ** 2)]) for x in (i, v))
-    turning = np.concatenate([[0.0], np.cumsum(v[1:] * np.conj(v[:-1]))])
+    has_volts = bool(np.any(v))
+    turner = v if has_volts else i
+    turning = np.concatenate([[0.0], np.cumsum(turner[1:] * np.conj(turner[:-1]))])
     turn = turning[starts + n - 1] - turning[starts]
     scale = 1.0 / np.sqrt(3.0) if recording.voltages_are_line_to_line else 1.0
     return _Levels(
@@ -106,7 +163,12 @@ def _named(levels: _Levels, plate: Nameplate) -> list[str]:
             names[k] = "coast-down" if has_run else ("residual" if has_voltage else "off")
         else:
             has_run = True
-    _name_ramps(levels, idle, names)
+    standing = ~idle & (levels.frequency_hz < STANDING * plate.rated_frequency_hz)
+    for k in np.flatnonzero(standing).tolist():
+        names[k] = "standstill"
+    if standing.all():
+        return names
+    _name_ramps(levels, idle | standing, names)
     for begin, end in _runs([n != "steady" for n in names]):
         _name_within(levels, begin, end, names, plate.rated_current_a)
     return names
@@ -201,16 +263,31 @@ def _joined(levels: _Levels, names: list[str], recording: RunningRecording) -> l
     return out
 
 
+def _sharpened(stretches: list[Stretch], recording: RunningRecording, plate: Nameplate) -> list[Stretch]:
+    """Switching on and off at the sample where the current comes or goes; windows see it to half their length."""
+    completed, _ = complete(recording)
+    flows = np.abs(space_vector(*(np.nan_to_num(x) for x in completed.currents_a)))
+    flows = flows > OFF_CURRENT * np.sqrt(2.0) * plate.rated_current_a
+    t, reach = recording.time_s, WINDOW_PERIODS / plate.rated_frequency_hz
+    out = list(stretches)
+    for k, s in enumerate(out):
+        before = out[k - 1] if k else None
+        if s.state in ("start", "ramp", "steady") and (before is None or before.state in ("off", "residual")):
+            near = np.flatnonzero(flows & (t >= s.start_s - reach) & (t <= s.start_s + reach))
+            if near.size and before is not None and before.start_s < t[near[0]] < s.end_s:
+                out[k - 1], out[k] = replace(before, end_s=float(t[near[0]])), replace(s, start_s=float(t[near[0]]))
+            elif near.size and before is None and t[near[0]] - s.start_s > LEAST_OFF_S:
+                at = float(t[near[0]])
+                return [Stretch("off", s.start_s, at, 0.0, 0.0), replace(s, start_s=at), *out[1:]]
+        elif s.state == "coast-down" and before is not None:
+            near = np.flatnonzero(flows & (t >= s.start_s - reach) & (t <= s.start_s + reach))
+            if near.size and before.start_s < t[near[-1]] < s.end_s:
+                out[k - 1], out[k] = replace(before, end_s=float(t[near[-1]])), replace(s, start_s=float(t[near[-1]]))
+    return [replace(s, current_a=0.0, frequency_hz=0.0) if s.state == "off" else s for s in out]
+
+
 def cut_out(recording: RunningRecording, stretch: Stretch, margin_s: float) -> RunningRecording:
     """The samples of one stretch, without `margin_s` at either end."""
     t = recording.time_s
     keep = (t >= stretch.start_s + margin_s) & (t <= stretch.end_s - margin_s)
-    i, v = ([x[keep] for x in group] for group in (recording.currents_a, recording.voltages_v))
-    speed = recording.speed_rad_per_s
-    return replace(
-        recording,
-        time_s=t[keep],
-        currents_a=(i[0], i[1], i[2]),
-        voltages_v=(v[0], v[1], v[2]),
-        speed_rad_per_s=None if speed is None else speed[keep],
-    )
+    return _cut(recording, keep)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
@@ -20,6 +21,7 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
+from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.motor.plate_match import contradiction, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
@@ -31,6 +33,7 @@ from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
 from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.records import StandstillRecording
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
 VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
@@ -98,6 +101,10 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     require_one_motor(recordings)
     recordings, copies = without_copies(recordings)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
+    is_computed = all(any(n.code == COMPUTED for n in r.notes) for r in recordings)
+    if is_computed and (seen.verdict.value == "unexplained" or len(seen.causes) > 1):
+        seen, said = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
+        remarks = [*said, *remarks]
     document = as_document(seen, None)
     decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
     remarks = [*decided, *remarks]
@@ -107,6 +114,25 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     if request.out is not None:
         _write_recordings(request.out, seen, document, tables)
     return Diagnosed(document, request.out, seen)
+
+
+def _of_another_pair(
+    recordings: Sequence[StandstillRecording], seen: Diagnosis, excluded: tuple[str, ...], observe: Observe, go_on: GoOn
+) -> tuple[Diagnosis, list[str]]:
+    """The diagnosis with the computed current in another column, where that explains the data by fewer causes."""
+    choices = [other_pairs(r) for r in recordings]
+    best, said = seen, []
+    fewest = len(seen.causes) if seen.verdict.value == "explained" else len(CATALOGUE)
+    for k, (name, _) in enumerate(choices[0]):
+        other = analyse([c[k][1] for c in choices], excluded=excluded, report=observe, go_on=go_on)
+        if other.verdict.value == "explained" and len(other.causes) < fewest:
+            pair = {"u": ("v", "w"), "v": ("w", "u")}[name]
+            best, fewest = other, len(other.causes)
+            said = [
+                f"Explained by the fewest causes where current {name} is the computed one: phases u and v of this diagnosis are {pair[0]} "
+                f"and {pair[1]} of the recording, axes are counted from there."
+            ]
+    return best, said
 
 
 def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:

@@ -7,18 +7,31 @@ from pathlib import Path
 
 from commissioner.errors import DataRefused
 from commissioner.monitor.chain import Observation, Refused, Wishes
-from commissioner.monitor.contract import MonitoringDocument, RefusedMonitoring, State
-from commissioner.monitor.result import as_document, entry_of, refused_document, with_reference
+from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
+from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.states import states
+from commissioner.monitor.partial import Partial, of_currents, refused_audit, without_plate
+from commissioner.monitor.result import (
+    as_document,
+    entry_of,
+    entry_of_part,
+    partial_document,
+    refused_document,
+    verdict_document,
+    with_reference,
+)
 from commissioner.monitor.trend.indicators import pulses, trendable
 from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
-from commissioner.operations.recordings.stretches import in_its_states
+from commissioner.operations.recordings.stretches import in_its_states, longest_steady, plain_state, said_by_terminals
 from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
-from commissioner.recordings.importers import read_running
-from commissioner.recordings.plate import plate_of, start_from
+from commissioner.recordings.importers import contract_table, has_currents_only, require_running
+from commissioner.recordings.plate import has_no_plate, plate_of, start_from
 from commissioner.recordings.reading.mapping import read_mapping
+from commissioner.recordings.table import Table, to_currents, to_running
+from commissioner.records import RunningRecording
 
 
 @dataclass(frozen=True)
@@ -56,15 +69,31 @@ class NotMonitored:
     error: DataRefused
 
 
-def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | NotMonitored:
-    """One recording, watched, compared and, where asked for, learned and written out."""
-    recording = read_running(request.file, read_mapping(request.mapping) if request.mapping else None)
+@dataclass(frozen=True)
+class PartlyMonitored:
+    """What the data carry of an answer; every number that is withheld has its reason in `document`."""
+
+    document: PartialMonitoring
+
+
+def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | PartlyMonitored | NotMonitored:
+    """One recording, watched, compared and, where asked for, learned and written out. Partial data give a partial answer."""
+    table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None)
+    if has_currents_only(table):
+        return _of_currents(table, request, observe)
+    require_running(table)
+    recording = to_running(table)
+    if request.motor is None and has_no_plate(recording.metadata):
+        return _without_plate(recording, request)
     plate = plate_of(recording.metadata, str(request.file), request.motor)
     start = start_from(request.start) if request.start else None
     observe(Began("looking for speed and load"))
     wishes = Wishes(request.load_hz, request.inertia_kg_m2, start, trust=trust_from(request.trust))
     seen, recording, stretches = in_its_states(recording, plate, wishes)
     if isinstance(seen, Refused):
+        part = said_by_terminals(seen, stretches)
+        if part is not None:
+            return PartlyMonitored(partial_document(part, stretches, seen.audited))
         return _refused(seen, request.file, stretches)
     made = pulses(seen)
     indicators = trendable(seen, made)
@@ -83,6 +112,46 @@ def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | N
         page = page_of(seen, made, indicators, verdict, history, document, request.file.name)
         document["files"] = write_results(request.out, seen, page)
     return Monitored(document, seen, verdict)
+
+
+def _of_currents(table: Table, request: MonitorRequest, observe: Observe) -> Monitored | PartlyMonitored | NotMonitored:
+    recording = to_currents(table)
+    observe(Began("looking for speed and load in the currents"))
+    if request.motor is None and has_no_plate(recording.metadata):
+        return _without_plate(recording, request)
+    plate = plate_of(recording.metadata, str(request.file), request.motor)
+    start = start_from(request.start) if request.start else None
+    stretches = states(recording, plate)
+    part, used = longest_steady(recording, stretches)
+    seen = of_currents(part, plate, Wishes(request.load_hz, None, start))
+    return _partly(seen, recording, [plain_state(s, used=s is used) for s in stretches], request)
+
+
+def _without_plate(recording: RunningRecording, request: MonitorRequest) -> PartlyMonitored | NotMonitored:
+    """ConfigurationError, as for any missing plate, where nothing can be said without one."""
+    stretches = states(recording, None)
+    part, used = longest_steady(recording, stretches)
+    seen = without_plate(part)
+    if isinstance(seen, Finding):
+        plate_of(recording.metadata, str(request.file), None)
+    return _partly(seen, recording, [plain_state(s, used=s is used) for s in stretches], request)
+
+
+def _partly(
+    seen: Partial | Finding, recording: RunningRecording, stretches: list[State], request: MonitorRequest
+) -> PartlyMonitored | NotMonitored:
+    if isinstance(seen, Finding):
+        audited = refused_audit(recording, seen)
+        return _refused(Refused(audited, seen, audited.findings), request.file, stretches)
+    document = partial_document(seen, stretches, refused_audit(recording, None))
+    if request.baseline is not None:
+        entry = entry_of_part(seen, str(request.file))
+        if entry is None:
+            document["withheld"]["trend"] = "a trend needs the speed at least, to compare like with like"
+        else:
+            verdict, _ = update(request.baseline, entry, request.learn)
+            document["trend"] = verdict_document(verdict)
+    return PartlyMonitored(document)
 
 
 def _refused(seen: Refused, file: Path, stretches: list[State]) -> NotMonitored:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
-from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.states import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
+from commissioner.monitor.partial import Partial, of_terminals, refused_audit
+from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
 
+SHORT = frozenset({"too_short", "too_few_periods"})
+"""Refusals of a stretch that is steady, but short."""
 MARGIN_S = 0.06
 """At either end of a steady stretch: the window that finds it reaches so far over its edge."""
 
@@ -29,8 +31,8 @@ def in_its_states(
     if carrier is not None:
         recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
     stretches = states(recording, plate)
-    if len(stretches) == 1:
-        return observe(recording, plate, wishes), recording, [_state(stretches[0], used=True)]
+    if {s.state for s in stretches} <= {"steady", "lost"}:
+        return observe(recording, plate, wishes), recording, [_state(s, used=s.state == "steady") for s in stretches]
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
         said = ", ".join(f"{s.state} {s.start_s:.3g} ... {s.end_s:.3g} s" for s in stretches)
@@ -70,6 +72,46 @@ def _add_own(
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
 
 
+def plain_state(stretch: Stretch, *, used: bool) -> State:
+    """A stretch as the document has it."""
+    return _state(stretch, used=used)
+
+
+def longest_steady(
+    recording: RunningRecording, stretches: tuple[Stretch, ...]
+) -> tuple[RunningRecording, Stretch | None]:
+    """The longest steady stretch of a recording of several states, else all of it."""
+    steady = [s for s in stretches if s.state == "steady"]
+    longest = max(steady, key=lambda s: s.duration_s, default=None)
+    if longest is None or len(stretches) == 1:
+        return recording, longest
+    return cut_out(recording, longest, MARGIN_S if longest.duration_s > 3.0 * MARGIN_S else 0.0), longest
+
+
+def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
+    """Of a recording of several states whose steady ones are too short for the chain: what the terminals say of the longest."""
+    told = [s for s in stretches if s["state"] == "steady" and "mean_torque_nm" in s]
+    if seen.reason.code not in SHORT or len(stretches) < 2 or not told:
+        return None
+    best = max(told, key=lambda s: s["end_s"] - s["start_s"])
+    for state in stretches:
+        state["used"] = state is best
+    speed, torque = best["mean_speed_rad_per_s"], best["mean_torque_nm"]
+    why = f"{seen.reason.what}; at least {seen.reason.limit}".replace("at least at least", "at least")
+    withheld = dict.fromkeys(("parameters", "periods", "waveforms", "trend"), why)
+    unused = ", ".join(sorted({s["state"] for s in stretches if s["state"] not in ("steady", "off")}))
+    if unused:
+        withheld["from other states"] = (
+            f"{unused}: `identify` and `diagnose` use a start, a ramp or a load step, this verb does not"
+        )
+    f = seen.audited.fundamental
+    indicators = {} if f is None else of_terminals(f)
+    return Partial(
+        Quantity(speed["value"], speed["std"] or 0.0), Quantity(torque["value"], torque["std"] or 0.0), best["frequency_hz"],
+        (), indicators, withheld,
+    )  # fmt: skip
+
+
 def _state(stretch: Stretch, *, used: bool) -> State:
     return {
         "state": stretch.state, "start_s": stretch.start_s, "end_s": stretch.end_s, "current_a": stretch.current_a,
@@ -86,7 +128,5 @@ def _listed(stretches: tuple[Stretch, ...]) -> str:
 
 
 def _not_watched(recording: RunningRecording, finding: Finding) -> Refused:
-    empty = np.zeros(0, dtype=np.complex128)
-    notes = tuple(Finding(n.code, "note", n.what) for n in recording.notes)
-    audited = Audited(0, 0.0, recording.sample_period_s, empty, empty, None, None, (*notes, finding), {})
+    audited = refused_audit(recording, finding)
     return Refused(audited, finding, audited.findings)

@@ -9,7 +9,7 @@ from commissioner.identify.excite.bias import CUT_ABOVE, BiasGuard, plan_bias
 from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import Excitation, ExcitationLimits
 from commissioner.procedure.energised.multitone import UnderTest
-from commissioner.procedure.energised.session import SinceCommand, along_axis, next_block, period_s
+from commissioner.procedure.energised.session import SinceCommand, along_axis, next_block, tone_period_s
 from commissioner.procedure.findings import BiasChosen, GuardActed
 from commissioner.procedure.steps import Findings, Job
 from commissioner.safety.commands import Command, SetBias, SetScale, Tell
@@ -28,7 +28,7 @@ def under_bias(
     levels = findings.staircases[-1].levels
     plan = None
     if machine is not None and findings.is_measured:
-        plan = plan_bias(machine, excitation, limits, levels, period_s(findings))
+        plan = plan_bias(machine, excitation, limits, levels, tone_period_s(findings))
     if machine is None or plan is None:
         yield Tell(BiasChosen(axis_deg, 0.0, 0.0, 0.0, 0.0, 0.0))
         return
@@ -38,7 +38,7 @@ def under_bias(
         )
     )  # fmt: skip
     guard = BiasGuard(
-        machine, test.limit_wb, job.link_latency_s, excitation, plan.scale, plan.voltage_v, period_s(findings),
+        machine, test.limit_wb, job.link_latency_s, excitation, plan.scale, plan.voltage_v, tone_period_s(findings),
         findings.inverter, axis_deg, test.rotor_flux_wb,
     )  # fmt: skip
     yield SetScale(plan.scale)

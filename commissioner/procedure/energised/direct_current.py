@@ -12,11 +12,11 @@ from commissioner.errors import Aborted, DriveFault
 from commissioner.identify.excite.current_flux import CurrentFlux
 from commissioner.motor.circuit import InverseGamma
 from commissioner.procedure.energised.session import (
-    BIAS_RAMP_PER_S,
     OFFSET_S,
     SinceCommand,
     along_axis,
     duration_s,
+    load,
     measure_offset,
     next_block,
     period_s,
@@ -24,10 +24,12 @@ from commissioner.procedure.energised.session import (
 )
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock, Signal
-from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetBias, SetDriveLimits
+from commissioner.safety.commands import Command, Disarm, Enable, SetBias, SetDriveLimits
 
 STEER_S, IN_EFFECT_S = 0.02, 0.015
 """Time between two voltages of the climb or of a push, where nothing is late; how long each is in effect at the least."""
+LONGEST_STEER_S = 0.1
+"""Over a slow link a voltage of the climb is for the time that the one before took; for no more than this."""
 AGAINST = 0.5
 """Of the current aimed at: this much against the voltage is no noise but a sensor of the wrong sign."""
 
@@ -55,8 +57,7 @@ class DirectCurrent:
         """The drive's own ceilings, then energised at zero volts: what the sensors show there is offset."""
         job = self.job
         yield limits
-        ramp_v_per_s = BIAS_RAMP_PER_S * job.test_voltage_v
-        yield LoadExcitation(self.axis_deg, (), ramp_v_per_s, job.scale_ramp_per_s, job.axis_time_s)
+        yield load(job, self.findings, self.axis_deg, ())
         yield Enable(self._step)
         self.findings.segment += 1
         self.offset_a = yield from measure_offset(self.findings, self._step, self.axis_deg)
@@ -87,6 +88,11 @@ class DirectCurrent:
                 remedy="check sign and order of the current sensors",
             )  # fmt: skip
         return passed_s, seen_a
+
+    def climbing_s(self, last_step_s: float) -> float:
+        """The time that the next voltage of a climb is for."""
+        is_slow = self.findings.link.is_reduced
+        return min(max(last_step_s, STEER_S), LONGEST_STEER_S) if is_slow else STEER_S
 
     def current(self, block: SampleBlock) -> Signal:
         return along_axis(block) - self.offset_a

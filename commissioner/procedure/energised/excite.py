@@ -15,23 +15,24 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from commissioner.motor.plate_match import PlateMismatch, mismatch, plate_match
 from commissioner.procedure.assembly import assemble
+from commissioner.procedure.energised.captured import captured
 from commissioner.procedure.energised.ceilings import aimed_current_a, for_tones
 from commissioner.procedure.energised.closing_bias import SECONDS as BIAS_SECONDS
 from commissioner.procedure.energised.closing_bias import under_bias
 from commissioner.procedure.energised.multitone import UnderTest, plate_machine, warm_up
 from commissioner.procedure.energised.session import (
-    BIAS_RAMP_PER_S,
     OFFSET_S,
+    load,
     measure_offset,
     next_block,
-    period_s,
     ramp_down,
+    tone_period_s,
 )
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
 from commissioner.procedure.states import Event
 from commissioner.procedure.steps import Findings, Job, Step, reject
 from commissioner.procedure.verdict import Objection
-from commissioner.safety.commands import Command, Disarm, Enable, LoadExcitation, SetScale, Tell
+from commissioner.safety.commands import Command, Disarm, Enable, SetScale, Tell
 
 __all__ = ["excite", "warm_up"]
 
@@ -48,13 +49,17 @@ FIRST_LOOK = 0.3
 """Share of a test's time spent, the first time, on an excitation chosen from the plate alone."""
 
 
+BLIND_LOOK = 1.0
+"""The same where its samples are downloaded afterwards: its amplitude is what any motor can take, and is never raised."""
+
+
 def excite(job: Job, findings: Findings) -> Step:
     """The multitone test of one axis; the first axis begins with a look chosen from the plate alone."""
     axis_deg = job.plan.tests_deg[findings.tests_done]
     seconds = job.plan.excitation.seconds * job.stretch
     is_first = findings.tests_done == 0
     if is_first:
-        look_s = FIRST_LOOK * seconds
+        look_s = (BLIND_LOOK if findings.link.captured else FIRST_LOOK) * seconds
         yield from _test(job, findings, axis_deg, _design(job, findings, look_s), look_s, look_s, is_look=True)
         yield from _look(job, findings)
         mismatch = _mismatch(job, findings)
@@ -63,7 +68,7 @@ def excite(job: Job, findings: Findings) -> Step:
     ramp_s = 1.0 / job.scale_ramp_per_s
     left_s = AXIS_SECONDS * job.stretch - findings.axis_s - OFFSET_S - ramp_s
     bias_s = BIAS_SECONDS * job.stretch
-    if left_s - (bias_s + ramp_s) >= SHORTEST * seconds:
+    if not findings.link.captured and left_s - (bias_s + ramp_s) >= SHORTEST * seconds:
         left_s -= bias_s + ramp_s
     else:
         bias_s = 0.0
@@ -88,7 +93,7 @@ def _design(job: Job, findings: Findings, seconds: float) -> DesignedExcitation:
         current_a=aimed_current_a(job, findings),
         voltage_v=job.test_voltage_v,
     )
-    return excitation.design(machine, limits, period_s(findings), findings.inverter, seconds)
+    return excitation.design(machine, limits, tone_period_s(findings), findings.inverter, seconds)
 
 
 def _look(job: Job, findings: Findings) -> Generator[Command, Any, None]:
@@ -154,8 +159,11 @@ def _test(
         )
     )  # fmt: skip
     under_test = UnderTest(job, findings, axis_deg, chosen, seconds)
+    if findings.link.captured:
+        yield from captured(job, findings, STEP, axis_deg, tones, under_test, seconds, is_look=is_look)
+        return
     yield for_tones(job, findings)
-    yield LoadExcitation(axis_deg, tones, BIAS_RAMP_PER_S * job.test_voltage_v, job.scale_ramp_per_s, job.axis_time_s)
+    yield load(job, findings, axis_deg, tones)
     yield Enable(STEP)
     findings.segment += 1
     offset_a = yield from measure_offset(findings, STEP, axis_deg)

@@ -13,6 +13,7 @@ from commissioner.identify.batch.model import ModelChoice
 from commissioner.identify.batch.segments import Segment
 from commissioner.identify.excite.flux_guard import FluxAdvice, FluxGuard, FluxReading
 from commissioner.identify.excite.tones import DesignedExcitation, Excitation, ExcitationLimits, Tone, design
+from commissioner.identify.intake.averaged import on_its_period
 from commissioner.identify.inverter.compensation import Compensation
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
@@ -22,7 +23,7 @@ from commissioner.identify.observer.observer import BlockEstimate, ParallelObser
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.procedure.energised.ceilings import aimed_current_a, tripping_current_a
-from commissioner.procedure.energised.session import along_axis, duration_s, period_s
+from commissioner.procedure.energised.session import along_axis, duration_s, tone_period_s
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock
@@ -44,7 +45,7 @@ class UnderTest:
     def __init__(
         self, job: Job, findings: Findings, axis_deg: float, chosen: DesignedExcitation, seconds: float
     ) -> None:
-        sample_s, resistance_ohm = period_s(findings), findings.resistance_ohm(job)
+        sample_s, resistance_ohm = tone_period_s(findings), findings.resistance_ohm(job)
         self._job, self._findings, self._axis_deg, self._seconds = job, findings, axis_deg, seconds
         start = findings.estimate or plate_machine(job, findings)
         log_std = KNOWN_LOG_STD if findings.is_measured else PRIOR_LOG_STD
@@ -73,6 +74,11 @@ class UnderTest:
         self._estimate: BlockEstimate | None = None
         self.limit_wb = findings.flux_limit_wb = self._guard.limit_wb
 
+    @property
+    def blind_scale(self) -> float:
+        """The amplitude of a test that nobody steers: of a motor measured before at its worst, else of any whatever."""
+        return self.scale if self._findings.is_measured else self._guard.safe_scale
+
     def begin(self, offset_a: float) -> None:
         """The current sensors' offset along the axis, measured before the first amplitude."""
         self.offset_a = offset_a
@@ -83,13 +89,14 @@ class UnderTest:
             self._guard.began_s = block.first_index * block.sample_period_s
         current = along_axis(block) - self.offset_a
         self._is_awake |= float(np.max(np.abs(current))) >= self._wakes_a
-        self._estimate = self._observer.advance(block.voltage_axis_v, current, block.lost_before, adapts=self._is_awake)
+        voltage_v = on_its_period(block.voltage_axis_v, block.averaged)
+        self._estimate = self._observer.advance(voltage_v, current, block.lost_before, adapts=self._is_awake)
         taken_s = duration_s(block)
         self.time_s += taken_s
         step = self._job.scale_ramp_per_s * taken_s
         self._present_scale += float(np.clip(self.scale - self._present_scale, -step, step))
         reading = self._guard.advance(
-            block.voltage_axis_v, current, self._estimate, self._present_scale, block.lost_before, block.age_s
+            voltage_v, current, self._estimate, self._present_scale, block.lost_before, block.age_s
         )
         self._lost += block.lost_before
         self.peak_fraction = max(self.peak_fraction, self._measured_fraction(reading))

@@ -10,14 +10,32 @@ import numpy as np
 
 from commissioner.errors import Aborted
 from commissioner.motor.space_vector import axis_current_a
-from commissioner.procedure.steps import Findings
+from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock, Signal
-from commissioner.safety.commands import Command, Fetch
+from commissioner.safety.commands import Command, Fetch, LoadExcitation
 
 BIAS_RAMP_PER_S = 4.0
 """The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
+
+
+def tone_period_s(findings: Findings) -> float:
+    """Of a sample of a test with tones."""
+    assert findings.identity is not None
+    return findings.identity.control_period_s * findings.link.of_tones
+
+
+def load(
+    job: Job, findings: Findings, axis_deg: float, tones: tuple[tuple[float, float, float], ...]
+) -> LoadExcitation:
+    """A session's signal; its samples are what the link can carry."""
+    bias_ramp_v_per_s = BIAS_RAMP_PER_S * job.test_voltage_v
+    link = findings.link
+    averaged = link.of_tones if tones else link.averaged
+    return LoadExcitation(
+        axis_deg, tones, bias_ramp_v_per_s, job.scale_ramp_per_s, job.axis_time_s, link.channels, averaged
+    )
 
 
 def next_block(findings: Findings, step: str, axis_deg: float) -> Generator[Command, Any, SampleBlock]:
@@ -77,5 +95,6 @@ def along_axis(block: SampleBlock) -> Signal:
 
 
 def period_s(findings: Findings) -> float:
+    """Of a sample, which is a mean over some control periods on a slow link."""
     assert findings.identity is not None
-    return findings.identity.control_period_s
+    return findings.identity.control_period_s * findings.link.averaged

@@ -39,6 +39,8 @@ FIRST_SHARE = 0.2
 """The first current, of the top that the plate's most inductive motor could take."""
 TOP, KNOWN_TOP = 0.9, 0.95
 """Flux of the top DC level, of the limit, and once all of the machine is known."""
+SLOWLY_STEERED = 0.8
+"""Of that top, on an unknown motor over a link on which steering takes tenths of a second: flux reached 1.00 of its limit without."""
 TOP_ROOM = 1.15
 """Current that the drive ends a staircase at, of its top."""
 SECONDS = 5.0
@@ -130,6 +132,8 @@ class _Stair(DirectCurrent):
         slow, fast = poles_per_s(machine)
         self._slow_s, self._fast_s = -1.0 / slow, -1.0 / fast
         self._top_a = (FIRST_SHARE if is_first else 1.0) * self._plan.top_current_a
+        if findings.link.captured and not is_first:
+            self._top_a *= SLOWLY_STEERED
         if self._known is not None:
             inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
             self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
@@ -168,9 +172,10 @@ class _Stair(DirectCurrent):
         carries = FIRST_CARRIES if self._is_first else CARRIES
         seen = self.findings.first_current
         voltage_v, wanted_a = max(steady[-1], seen.voltage_v[1] if seen else 0.0), share * self._top_a
+        step_s = STEER_S
         while reached[-1] < wanted_a and voltage_v < job.test_voltage_v:
             rate = slow if seen or reached[-1] > carries * self._top_a else max(slow, job.test_voltage_v / IDLE_S)
-            voltage_v = min(voltage_v + rate * STEER_S, job.test_voltage_v)
+            voltage_v = min(voltage_v + rate * self.climbing_s(step_s), job.test_voltage_v)
             step_s, seen_a = yield from self.steer(voltage_v, self._top_a)
             self._note_climb(voltage_v, seen_a, (seen_a - reached[-1]) / step_s)
             reached.append(max(reached[-1], seen_a))

@@ -95,7 +95,10 @@ def _configuration(text: str, path: Path) -> _Configuration:
         analogue, status = (int(cell.rstrip("AaDd")) for cell in counts[1:3])
         if not 0 < analogue <= MAX_COLUMNS or not 0 <= status <= 16 * MAX_COLUMNS:
             raise ValueError(f"{analogue} analogue and {status} status channels")
-        found = tuple(_channel(next(lines)) for _ in range(analogue))
+        rows = [
+            next(lines) for _ in range(analogue)
+        ]  # a list: in a generator the end of the lines would be no StopIteration
+        found = tuple(map(_channel, rows))
         for _ in range(status):
             next(lines)
         next(lines)  # line frequency

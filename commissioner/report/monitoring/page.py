@@ -10,6 +10,7 @@ from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import History, Verdict
+from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
 
@@ -41,6 +42,7 @@ def page_of(
         tone=tone,
         facts=_facts(seen, verdict),
         sections=[
+            *_states(document),
             _shaft(seen),
             _proof(seen, document),
             _spectrum(seen),
@@ -81,6 +83,26 @@ def _facts(seen: Observation, verdict: Verdict | None) -> list[tuple[str, str]]:
             else []
         ),
         *([("against its past", "no past given (--baseline FILE --learn)")] if verdict is None else []),
+    ]
+
+
+def _states(document: Mapping[str, Any]) -> list[Section]:
+    """The band of states, where there is more than one."""
+    stretches = document.get("states", [])
+    if len(stretches) < 2:
+        return []
+    rows = [(s["state"], f"{s['start_s']:.3g} ... {s['end_s']:.3g} s", "yes" if s["used"] else "no") for s in stretches]
+    return [
+        Section(
+            "What the motor did",
+            [
+                picture(
+                    band.strip(stretches),
+                    "The states of the recording, by its terminals. The answer is of the stretch that was used.",
+                ),
+                Table(("state", "from, to", "used"), rows),
+            ],
+        )
     ]
 
 

@@ -92,5 +92,6 @@ class RunDocument(TypedDict):
     stator_resistance_20degc_ohm: NotRequired[Measured | None]
     gaps: NotRequired[Gaps]
     winding_temperature_degc: NotRequired[float | None]
+    link: NotRequired[dict[str, Any]]
     longer_test: NotRequired[dict[str, Any]]
     plate_match: NotRequired[PlateMatchDocument]

@@ -77,6 +77,9 @@ def _more(findings: Findings, remarks: Sequence[str]) -> dict[str, Any]:
     longer, match = findings.longer_test, findings.plate_match
     more: dict[str, Any] = {"winding_temperature_degc": findings.winding_degc, "longer_test": longer}
     said = list(remarks)
+    if findings.link.is_reduced and findings.identity is not None:
+        more["link"] = asdict(findings.link)
+        said.insert(0, f"slow link: {findings.link.sentence(findings.identity.control_period_s)}")
     if longer is not None:
         said.append(longer.sentence)
     if match is not None:

@@ -22,8 +22,8 @@ from commissioner.records import SampleBlock
 MARK = b"BLK1"
 _FRAME = struct.Struct("<4sII")  # mark, payload bytes, CRC-32 of the payload
 _HEADER = struct.Struct("<IIIIIdddB")  # segment, session, first index, count, lost before, period, axis, DC link, flags
-_AGE = struct.Struct("<d")  # behind the signals, where the flags say so
-_CLIPPED, _HAS_W, _HAS_AGE = 1, 2, 4
+_AGE, _AVERAGED = struct.Struct("<d"), struct.Struct("<H")  # behind the signals, where the flags say so
+_CLIPPED, _HAS_W, _HAS_AGE, _IS_AVERAGED = 1, 2, 4, 8
 LARGEST_BLOCK = 1 << 20
 """Payload bytes; the largest window of a drive makes 4 kB."""
 
@@ -142,6 +142,8 @@ def _payload(data: bytes, at: int) -> bytes | None:
 
 def _encode(block: SampleBlock, segment: int) -> bytes:
     flags = _HAS_AGE | (_CLIPPED if block.clipped else 0) | (_HAS_W if block.current_w_a is not None else 0)
+    flags |= _IS_AVERAGED if block.averaged > 1 else 0
+    tail = _AGE.pack(block.age_s) + (_AVERAGED.pack(block.averaged) if block.averaged > 1 else b"")
     header = _HEADER.pack(
         segment, block.session, block.first_index, block.count, block.lost_before, block.sample_period_s,
         block.axis_deg, block.dc_link_v, flags,
@@ -149,7 +151,7 @@ def _encode(block: SampleBlock, segment: int) -> bytes:
     signals = [block.voltage_axis_v, block.current_u_a, block.current_v_a]
     if block.current_w_a is not None:
         signals.append(block.current_w_a)
-    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals) + _AGE.pack(block.age_s)
+    return header + b"".join(signal.astype("<f8").tobytes() for signal in signals) + tail
 
 
 def _decode(payload: bytes) -> Placed:
@@ -158,8 +160,9 @@ def _decode(payload: bytes) -> Placed:
     segment, session, first, count, lost, period, axis, link, flags = _HEADER.unpack_from(payload)
     channels = 4 if flags & _HAS_W else 3
     signals_end = _HEADER.size + 8 * channels * count
-    has_age = bool(flags & _HAS_AGE)
-    if len(payload) != signals_end + _AGE.size * has_age:
+    has_age, is_averaged = bool(flags & _HAS_AGE), bool(flags & _IS_AVERAGED)
+    averaged_at = signals_end + _AGE.size * has_age
+    if len(payload) != averaged_at + _AVERAGED.size * is_averaged:
         raise _no_block(len(payload), f"{channels} signals of {count} samples")
     numbers = np.frombuffer(payload, "<f8", channels * count, _HEADER.size)
     signals = numbers.reshape(channels, count).astype(np.float64)
@@ -168,6 +171,7 @@ def _decode(payload: bytes) -> Placed:
         current_u_a=signals[1], current_v_a=signals[2], current_w_a=signals[3] if flags & _HAS_W else None,
         dc_link_v=link, lost_before=lost, clipped=bool(flags & _CLIPPED),
         age_s=_AGE.unpack_from(payload, signals_end)[0] if has_age else 0.0,
+        averaged=_AVERAGED.unpack_from(payload, averaged_at)[0] if is_averaged else 1,
     )  # fmt: skip
 
 

@@ -149,7 +149,7 @@ def write_recording(folder: Path, metadata: Mapping[str, float | str]) -> Path |
     if recording is None:
         return None
     target = folder / "recording.parquet"
-    write_table(target, columns(recording), metadata)
+    write_table(target, columns(recording), recording.metadata)
     return target
 
 

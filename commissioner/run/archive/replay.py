@@ -12,11 +12,12 @@ from typing import Any
 
 from commissioner.encoding import plain
 from commissioner.errors import CommissionerError, DataRefused
-from commissioner.link.files.drive_file import load_profile
+from commissioner.link.files.drive_file import archived_profile
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import DriveLimits, StreamPace
+from commissioner.procedure.checks import DriveLimits
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.link_plan import StreamPace
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.report.run.summary import summarise
@@ -66,7 +67,7 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     if not any(line["kind"] in _DECISIONS for line in journal):
         raise damaged(folder, "journal.jsonl", "no decision behind the job")
     archived = [_decision(line["kind"], line["record"]) for line in journal if _is_compared(line)]
-    announcer = Announcer(load_profile(read_saved(folder, "request.json", "profile")["profile"]))
+    announcer = Announcer(archived_profile(str(read_saved(folder, "request.json", "profile")["profile"])))
     kinds = {line["kind"] for line in journal}
     is_by_itself = "run_ended" in kinds and "error" not in kinds and not salvage
     if is_by_itself:
@@ -152,7 +153,7 @@ def read_job(folder: Path, journal: list[dict[str, Any]]) -> Job:
 
 _DECISIONS = frozenset(
     {
-        "state_entered", "drive_identified", "checks_judged", "first_current_seen", "staircase_fitted", "first_look",
+        "state_entered", "drive_identified", "checks_judged", "link_planned", "first_current_seen", "staircase_fitted", "first_look",
         "excitation_chosen",
         "bias_chosen", "estimate_updated", "guard_acted", "axis_finished", "verdict_reached", "step_progress",
     }
@@ -306,6 +307,7 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "Identify": lambda record: DriveIdentity(**record),
     "ReadNameplate": dict,
     "ReadStatus": _status,
+    "Supervise": _status,
     "TakeSnapshot": _snapshot,
     "WriteParameters": lambda rows: tuple(WrittenParameter(**row) for row in rows),
 }

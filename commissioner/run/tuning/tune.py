@@ -33,10 +33,14 @@ from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
 from commissioner.run.job import names_of, open_drive
+from commissioner.run.stopping.operator_stop import OperatorStop, StopAsked
+from commissioner.run.stopping.stop_file import stopped_by_file
 from commissioner.run.tuning.earlier import earlier_values
 
 OpenPort = Callable[[], Any]
 PAUSE_POLL_S = 0.5
+TELL_S = 2.0
+"""Between two records of a tuning that goes on: a journal that is silent for long is taken for one whose process has gone."""
 LAST_LEFT = "what its last tuning left, if it found anything: this file knows no way to write"
 POWER_UP_S = 120.0
 """So long a drive may take to answer again after it was switched off and on."""
@@ -104,10 +108,10 @@ def tune(
     with DriveLock.take(parse_url(order.url), order.profile, ACT) as lock:
         facts = {"repeat": wanted.repeat, "pause_s": wanted.pause_s, "hardwired_stop": wanted.hardwired_stop}
         folder = order.open_folder(runs, lock, tune=facts)
-        with closing(folder):
-            run = _Run(
-                wanted, folder, found, operator, present, clock or Clock(), earlier_values(runs, order.nameplate)
-            )
+        asked, time_taken = OperatorStop(), clock or Clock()
+        with closing(folder), stopped_by_file(folder.path, asked):
+            attended = _Attended(operator, asked, folder, time_taken.now)
+            run = _Run(wanted, folder, found, attended, present, time_taken, earlier_values(runs, order.nameplate))
             ended = run.carry_out(opened, lock)
             result = _save(order, folder, found, ended)
     return Commissioned(ended, folder.path, result)
@@ -131,6 +135,27 @@ class KeptSet:
 
     values: Mapping[str, float]
     is_stored: bool
+
+
+class _Attended:
+    """The person at the drive, and whoever stops the run from elsewhere on this computer; meanwhile the journal says that it goes on."""
+
+    def __init__(self, operator: Operator, stop: OperatorStop, folder: RunFolder, now: Callable[[], float]) -> None:
+        self._operator, self._stop, self._folder, self._now = operator, stop, folder, now
+        self._told_s = now()
+        self._wish: StopAsked | None = None
+
+    def does(self, text: str) -> bool:
+        return self._operator.does(text)
+
+    def wants_stop(self) -> str:
+        if self._now() - self._told_s >= TELL_S:
+            self._told_s = self._now()
+            self._folder.journal("tuning_goes_on", {})
+        if self._wish is None and self._stop.wish is not None:
+            self._wish = self._stop.wish
+            self._folder.journal("stop_asked", self._wish, durable=True)
+        return self._operator.wants_stop() or self._stop.asked
 
 
 class _Run:

@@ -111,11 +111,17 @@ def _of_run(run: LiveRun, t: Texts) -> _Said:
     state = run.feed.state
     if state.output == "unknown":
         return _take_as_live(t.gettext("The drive does not confirm that its output is off. Isolate its supply"), t)
+    if state.output == "on" and state.phase == "tuning":
+        small = t.gettext("The drive tunes itself at standstill, started from the command line")
+        return _Said("live", t.gettext("MOTOR ENERGISED"), small, t.gettext("Esc or Space"))
     if state.output == "on":
         return _Said("live", t.gettext("MOTOR ENERGISED"), _test_line(run, t), t.gettext("Esc or Space"))
     if run.stop_asked_by:
         return _stopping(run, t)
     soon = t.gettext("ends the run: Esc or Space")
+    if state.phase == "tuning":
+        small = t.gettext("Output off between two tunings of its own. Stay clear")
+        return _Said("live", t.gettext("ENERGISED AGAIN SOON"), small, soon)
     if state.phase == "measuring":
         return _Said(
             "live",
@@ -184,7 +190,7 @@ def _take_as_live(small: str, t: Texts) -> _Said:
 
 # --- no run holds the drive ---------------------------------------------------------------------------------------
 def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen, t: Texts) -> _Said:
-    nothing = t.gettext("nothing energised")
+    nothing = t.gettext("nothing energised from here")
     if drive is None or not drive.url:
         if run is not None:
             return _Said(
@@ -197,7 +203,7 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
             "off",
             t.gettext("Nothing energised from here"),
             t.gettext("No drive chosen"),
-            t.gettext("nothing energised from here"),
+            nothing,
         )
     if parts.desk.is_starting(drive.id):
         return _Said(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import shlex
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -256,7 +257,26 @@ async def checks(request: Request, drive: str, motor: str) -> Response:
     document = parts.checks.get(f"{known.id} {chosen.id}")
     if document is None:
         return go(f"/drives/{known.id}?motor={chosen.id}")
-    return render(request, CHECKS, Place(drive=known.id), drive=known, motor=chosen, document=document)
+    return render(
+        request,
+        CHECKS,
+        Place(drive=known.id),
+        drive=known,
+        motor=chosen,
+        document=document,
+        tuning=_tuning(known, chosen),
+    )
+
+
+def _tuning(drive: Drive, motor: Motor) -> dict[str, Any] | None:
+    """The drive's own standstill tuning, where its file knows one: what it does, and the call that lets it."""
+    from commissioner.link.files.drive_file import load_profile
+
+    tuning = load_profile(drive.profile).tuning
+    if tuning is None:
+        return None
+    call = ["commissioner", "tune", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source]
+    return {"form": tuning.form, "energises": tuning.energises, "proof": tuning.proof, "call": shlex.join(call)}
 
 
 @router.get("/drives/{drive}/energise")

@@ -132,8 +132,11 @@ def _entered(state: RunState, record: dict[str, Any]) -> None:
 
 def _intent(state: RunState, record: dict[str, Any]) -> None:
     state.has_touched = True
-    if record.get("action") == "energise":
+    action = record.get("action")
+    if action in ("energise", "tune"):
         state.output, state.output_utc, state.is_confirmed = "on", state.utc, True
+    if action == "tune":
+        state.phase = "tuning"
 
 
 def _disarmed(state: RunState, record: dict[str, Any]) -> None:
@@ -208,6 +211,11 @@ def _restored(state: RunState, _record: dict[str, Any]) -> None:
     state.is_restored = True
 
 
+def _tuned(state: RunState, _record: dict[str, Any]) -> None:
+    """One tuning of its own is over: the drive was seen at rest."""
+    state.output, state.output_utc, state.is_confirmed, state.output_word = "off", state.utc, True, "at rest"
+
+
 def _stopped(state: RunState, record: dict[str, Any]) -> None:
     state.stop = record | {"utc": state.utc}
 
@@ -218,5 +226,5 @@ _FOLDS = {
     "run_ended": _ended, "diagnosing": _diagnosing, "diagnosed": _diagnosed, "drive_identified": _identified,
     "checks_judged": _put("checks", "results"), "guard_acted": _put("guard"), "verdict_reached": _put("verdict"),
     "error": _put("error"), "link": _put("link"), "parameters_written": _put("written", "written"),
-    "snapshot_restored": _restored, "stop_asked": _stopped,
+    "snapshot_restored": _restored, "stop_asked": _stopped, "tuned_once": _tuned,
 }  # fmt: skip

@@ -1,31 +1,61 @@
-"""A handful of hostile runs in real time, judged by the simulator's truth; the whole campaign is `tests.campaigns.hostile`.
+"""A handful of hostile runs in motor time, judged by the simulator's truth; the whole campaign is `tests.campaigns.hostile`.
 
-Chosen to end early: what is wrong is found before or in the first session, or the link cannot carry a run at all.
+Chosen to end early: what is wrong is found before anything long is computed, or the link cannot carry a run at all. And proof
+that the campaign can fail.
 """
 
 import pytest
 
-from commissioner.procedure.energised.excite import warm_up
-from commissioner.settings import load_motor
+from commissioner.run import runner
 from tests.campaigns.hostile_run.one_run import run_one
-from tests.campaigns.hostile_run.troubles import FOR_EVER_S, Trouble
+from tests.campaigns.hostile_run.troubles import FOR_EVER_S, FOREIGN, LINKS, Link, Trouble
 
+BUSY_HOST = LINKS[2]
+SILENT_FLUX = 0.151
+"""Where the guards are at work."""
+FOREIGN_BIAS = [name for name, _ in FOREIGN].index("dc_bias_v")
 RUNS = {
     "currents doubled": (Trouble("currents_doubled", 0, 0.0, FOR_EVER_S, 1.0), "current"),
+    "one sensor reversed": (Trouble("sensor_reversed", 0, 0.0, FOR_EVER_S, 1.0, 1), "sensor"),
+    "one sensor silent in the climb": (Trouble("sensor_silent", 2, 0.4, FOR_EVER_S, 1.0, 0), "sensor"),
+    "all frozen in the climb": (Trouble("all_frozen", 2, 0.4, FOR_EVER_S, 1.0), "sensor"),
+    "a spell of late replies in the climb": (Trouble("spell", 2, 0.4, 2.5, 0.12), ""),
+    "the host stopped in the climb": (Trouble("host_stop", 2, 0.5, 0.0, 1.5), ""),
+    "every fifth reply lost": (Trouble("drop", 1, 0.2, FOR_EVER_S, 0.2), ""),
+    "another master's bias": (Trouble("second_master", 2, 0.5, 0.0, FOREIGN_BIAS), "another master"),
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _kernels():
-    warm_up(load_motor("motor_2kw2"))
 
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", RUNS)
 def test_a_hostile_run_passes_no_limit_and_writes_nothing(tmp_path, name):
     trouble, said = RUNS[name]
-    judged = run_one(31, "default", trouble, tmp_path)
+    judged = run_one(31, "default", trouble, tmp_path, BUSY_HOST)
     assert not judged.broken, judged
     assert judged.ended in ("rejected", "aborted", "faulted"), judged
     assert said in judged.reason
-    assert judged.flux < 0.9
+    assert judged.flux < 0.95
+
+
+def test_a_runner_without_its_guards_is_seen(tmp_path, monkeypatch):
+    """Nothing but the drive's own ceilings is left: the campaign must see what the guards were for."""
+    monkeypatch.setattr(runner, "stop_if", lambda _reason: None)
+    trouble = Trouble("sensor_silent", 2, 0.4, FOR_EVER_S, 1.0, 0)
+    judged = run_one(31, "default", trouble, tmp_path, BUSY_HOST)
+    assert "sensor" not in judged.reason
+    assert judged.flux > 1.2 * SILENT_FLUX
+
+
+def test_the_same_seed_is_the_same_run(tmp_path):
+    trouble = Trouble("jitter", 1, 0.3, FOR_EVER_S, 0.1)
+    runs = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        runs.append(run_one(5, "default", trouble, tmp_path / name, Link("line", 0.001, 0.002, 5e-4)))
+    first, second = runs
+    assert (first.ended, first.reason, first.flux, first.current) == (
+        second.ended,
+        second.reason,
+        second.flux,
+        second.current,
+    )

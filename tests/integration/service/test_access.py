@@ -22,7 +22,7 @@ from commissioner.service.access.sessions import Sessions
 from commissioner.service.access.throttle import Throttle
 from commissioner.service.application import create_app
 from commissioner.service.audit import Audit, verify
-from commissioner.service.configuration import ServiceFile, Settings, TlsTable, check_may_listen
+from commissioner.service.configuration import DriveTable, ServiceFile, Settings, TlsTable, check_may_listen
 
 PASSWORDS = {"vera": "watching 1234", "otto": "operating 1234", "ada": "administering 1234"}
 ROLES = {"vera": Role.VIEWER, "otto": Role.OPERATOR, "ada": Role.ADMINISTRATOR}
@@ -389,3 +389,24 @@ def test_an_unknown_name_takes_as_long_as_a_wrong_password(parts, accounts):
 
     seconds("ada")
     assert seconds("nobody") > 0.2 * seconds("ada")
+
+
+# --- what a drive offers --------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("profile", "tunes"), [("schneider_atv340", True), ("eaton_dc1", False)])
+def test_the_page_of_a_drive_without_a_test_mode_says_what_can_be_done(client, parts, profile, tunes):
+    table = DriveTable(id="pump", name="Pump", url="tcp://127.0.0.1:9?device=1", profile=profile)
+    parts.library.add_drive(table)
+    checks = [{"name": "no fault", "value": "none", "limit": "none", "has_passed": True, "remedy": ""}]
+    parts.checks["pump motor_2kw2"] = {
+        "outcome": "passed",
+        "checks": checks,
+        "limits": None,
+        "checked_utc": "2026-11-25T10:00:00",
+    }
+    for language in ("en", "de"):
+        client.cookies.set("language", language)
+        page = client.get("/drives/pump/checks?motor=motor_2kw2", headers={"accept": "text/html"})
+        call = "commissioner tune --drive &#39;tcp://127.0.0.1:9?device=1&#39; --profile schneider_atv340 --motor motor_2kw2"
+        assert page.status_code == 200 and (call in page.text) is tunes
+        assert {"en": "It has no test mode", "de": "Er hat keinen Prüfbetrieb"}[language] in page.text
+        assert "/energise" not in page.text

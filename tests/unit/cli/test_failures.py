@@ -4,12 +4,16 @@ import json
 import os
 import signal
 import subprocess
+import time
 
 import pytest
 import typer
 
+from commissioner.cli import failures
 from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.screens import screen
+from commissioner.cli.signals import let_end
 from commissioner.errors import DriveFault
 from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND
@@ -17,15 +21,20 @@ from tests.support.command_line import COMMAND
 ONE_RUN = "20260101-000000-simulated"
 
 
+@pytest.fixture(autouse=True)
+def signals_as_a_terminal_gives_them():
+    """And as they were before: who leaves is deaf to them."""
+    default = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in default.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def leave(capsys, *arguments, of=app):
     """(exit code, the document on stdout) of a call in this process."""
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with pytest.raises(SystemExit) as left:
-            run_to_exit(of, [*map(str, arguments), "--json"])
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+    with pytest.raises(SystemExit) as left:
+        run_to_exit(of, [*map(str, arguments), "--json"])
     return left.value.code or 0, json.loads(capsys.readouterr().out)
 
 
@@ -131,6 +140,55 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
     out, err = process.communicate(timeout=60)
     assert process.returncode == 4, err
     assert json.loads(out)["outcome"] == "aborted" and "Traceback" not in err
+
+
+def test_signals_until_the_process_has_ended_change_nothing(tmp_path):
+    """Ctrl-C again and again, while the first is answered and while the interpreter ends."""
+    os.mkfifo(tmp_path / "pipe")
+    script = COMMAND[-1].replace(
+        "main()",
+        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()",
+    )
+    call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    with (tmp_path / "pipe").open("w"):
+        sent = 0
+        while process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            sent += 1
+            time.sleep(0.0005)
+    out, err = process.communicate(timeout=60)
+    assert sent > 3
+    assert process.returncode == 4, err
+    assert json.loads(out)["outcome"] == "aborted" and "Traceback" not in err
+
+
+def test_a_signal_behind_the_end_of_a_run_is_not_answered(capsys):
+    made = typer.Typer()
+
+    @made.command()
+    def verb(as_json: bool = typer.Option(False, "--json")):
+        let_end()
+        signal.raise_signal(signal.SIGINT)
+        screen.emit({"outcome": "commissioned"})
+
+    assert leave(capsys, of=made) == (0, {"outcome": "commissioned"})
+
+
+def test_a_second_ctrl_c_while_the_first_is_answered_is_no_other_end(capsys, monkeypatch):
+    plain = failures._stopped
+
+    def interrupted():
+        monkeypatch.setattr(failures, "_stopped", plain)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(failures, "_stopped", interrupted)
+    code, document = leave(capsys, of=raising(KeyboardInterrupt()))
+    assert (code, document["outcome"]) == (4, "aborted")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,14 @@ import tomllib
 import pytest
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.link.files.drive_file import DRIVES_FOLDER, build, known_drives, load_profile
+from commissioner.link.files.drive_file import (
+    DRIVES_FOLDER,
+    archived_profile,
+    build,
+    known_drives,
+    load_profile,
+    reference,
+)
 
 SIMULATED = tomllib.loads((DRIVES_FOLDER / "simulated.toml").read_text("utf-8"))
 MISSING = object()
@@ -150,3 +157,23 @@ def test_danfoss_addresses_follow_the_vendors_formula():
     profile = load_profile("danfoss_fc302")
     parameters = {"stator_resistance": 130, "rated_voltage_v": 122, "dc_link_v": 1630, "pole_count": 139}
     assert {name: profile.item(name).address for name in parameters} == {n: 10 * p - 1 for n, p in parameters.items()}
+
+
+def test_an_archive_names_a_packaged_file_without_saying_where_it_was_installed(tmp_path):
+    assert reference(load_profile("simulated")) == "simulated"
+    own = tmp_path / "mine.toml"
+    own.write_bytes((DRIVES_FOLDER / "simulated.toml").read_bytes())
+    assert reference(load_profile(own)) == str(own)
+
+
+@pytest.mark.parametrize(
+    "kept", ["simulated", "/gone/config/drives/simulated.toml", r"C:\gone\config\drives\simulated.toml"]
+)
+def test_an_older_archive_that_names_a_path_of_its_own_computer_is_read(kept):
+    assert archived_profile(kept).identity == load_profile("simulated").identity
+
+
+@pytest.mark.parametrize("kept", ["/gone/config/drives/nobody.toml", "/gone/simulated.toml"])
+def test_another_file_that_is_gone_is_not_replaced(kept):
+    with pytest.raises(UsageError):
+        archived_profile(kept)

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from commissioner.motor.nameplate import Nameplate
-from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, StreamPace, judge_drive
+from commissioner.procedure.checks import SMALLEST_DRIVE, DriveLimits, judge_drive
+from commissioner.procedure.link_plan import LinkPlan, StreamPace, plan_link
 from commissioner.records import DriveIdentity, DriveStatus
 
 PLATE = Nameplate(2200.0, 400.0, 50.0, 5.0, 1436.0, 0.8, 2, "star")
@@ -94,3 +95,20 @@ def test_a_link_that_cannot_carry_the_samples_is_refused_with_the_figure_that_wo
     (pace,) = [result for result in results if result.name == "the link keeps up with the samples"]
     assert pace.has_passed is passes
     assert "5.8 ms" in pace.limit and f"{(125 * 22 + 430) / 5.8e-3:.0f} Bd" in pace.remedy
+
+
+@pytest.mark.parametrize(
+    ("round_trip_s", "channels", "averaged"),
+    [(0.0057, 4, 1), (0.0061, 3, 1), (0.0123, 3, 2), (0.0287, 3, 5), (0.043, 3, 7)],
+)
+def test_a_slow_link_is_planned_for_with_the_least_reduction_that_it_carries(round_trip_s, channels, averaged):
+    """39 samples of three channels fill a window; four fifths of the link's time are for windows."""
+    plan = plan_link(StreamPace(round_trip_s, 29, 125, 117, 100), 2e-4)
+    assert (len(plan.channels), plan.averaged) == (channels, averaged)
+    assert round_trip_s <= 39 * averaged * 2e-4
+
+
+def test_a_link_that_carries_no_plan_is_refused_and_an_unmeasured_one_is_not():
+    assert plan_link(StreamPace(0.2, 29, 125, 117, 100), 2e-4) is None
+    assert plan_link(StreamPace(0.03, 29, 125, 117, 2), 2e-4) is None
+    assert plan_link(None, 2e-4) == LinkPlan()

@@ -3,12 +3,22 @@
 import json
 import math
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, RequestRefused, UsageError
+from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.in_process import InProcessPort
+from commissioner.motor.nameplate import Nameplate
+from commissioner.procedure.course import Findings, course
+from commissioner.run.job import bounds, make_job, watch_limits
+from commissioner.run.runner import Runner
+from commissioner.run.stopping.operator_stop import OperatorStop
+from commissioner.settings import load_procedure
+from commissioner.study.commissioning import NoArchive
 from commissioner.study.rows import ENDED, TABLE, Rows
 from commissioner.study.simulators import simulator
 from commissioner.study.specification import cases_of, load_study
@@ -160,3 +170,48 @@ def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):
             "magnetizing_inductance_h",
         ):
             assert told[f"{name}_value"] == pytest.approx(told[f"{name}_true"], rel=0.02), name
+
+
+class Kept(NoArchive):
+    """Keeps samples and journal, and ends the run in a session: before anything long is computed."""
+
+    def __init__(self, stop, last_session):
+        self.blocks, self.lines, self._stop, self._last = [], [], stop, last_session
+
+    def journal(self, kind, record, *, durable=False):
+        self.lines.append((kind, json.dumps(plain(record), sort_keys=True)))
+
+    def append(self, block, segment):
+        self.blocks.append(block)
+        if segment == self._last and block.first_index * block.sample_period_s > 0.8:
+            self._stop.ask("", "enough seen")
+
+
+def started(seed, last_session):
+    """A run in motor time up to 0.8 s of that session: 0 first current, 1 staircase, 2 tones."""
+    drawn = simulator().draw("abb_2k2", seed, spread=0.1, effects=("none",), noise_a=None, faults=())
+    stop = OperatorStop()
+    kept = Kept(stop, last_session)
+    port = InProcessPort(drawn.station)
+    profile, plate, plan = load_profile("simulated"), Nameplate(**drawn.plate), load_procedure(None, axes_deg=None)
+    inverter = Inverter(
+        port, profile, lambda intent: kept.journal("about_to", intent), sleep=drawn.station.pass_time,
+        clock=lambda: drawn.station.now_s,
+    )  # fmt: skip
+    job = make_job(profile, plate, plan, port, write_back=True, now_s=inverter.now_s)
+    Runner(inverter, kept, bounds(job), watch_limits(job), lambda _record: None, stop).perform(course(job, Findings()))
+    return kept
+
+
+def test_the_same_seed_gives_the_same_commands_and_samples():
+    """In motor time, where nobody is late. Over a wire in real time the age of a sample is an input as well: guards hold back
+    where a host or a link was late, and such a run is another one."""
+    first, second, other = started(3, 2), started(3, 2), started(4, 0)
+    assert sum(block.count for block in first.blocks) > 20_000
+    assert first.lines == second.lines
+    assert len(first.blocks) == len(second.blocks)
+    for one, again in zip(first.blocks, second.blocks, strict=True):
+        assert one.first_index == again.first_index and one.age_s == again.age_s
+        assert np.array_equal(one.voltage_axis_v, again.voltage_axis_v)
+        assert np.array_equal(one.current_u_a, again.current_u_a)
+    assert not np.array_equal(first.blocks[0].current_u_a, other.blocks[0].current_u_a)

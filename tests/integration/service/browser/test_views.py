@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 
 from tests.support.browser import SIZES, SLOW_MS, technician
 
+pytestmark = pytest.mark.timeout(900)
+"""A guard against hanging: what is judged by time says so itself."""
 EVIL = '"><img src=x onerror="window.hit=1"><script>window.hit=1</script>{{7*7}}%s%(n)s'
 HIT = "() => window.hit !== undefined || document.querySelector('img[src=x]') !== null"
 
@@ -139,6 +141,7 @@ def test_a_file_that_is_dropped_is_answered_by_the_same_verb(service, browser):
     """`identify`, whose refusal has step, value, limit and remedy here as on the command line."""
     with technician(browser, service) as hand:
         hand.go("/")
+        expect(hand.page.locator("#drop[data-takes=files]")).to_be_visible()
         hand.page.evaluate(DROP, ["pump.csv", "time_s,current_u_a\n0,1\n1,2\n"])
         assert hand.page.evaluate("() => document.querySelector('#file').files[0].name") == "pump.csv"
         hand.button("Send the file")

@@ -5,4 +5,5 @@ const box = document.querySelector("#drop"), form = document.querySelector("#dro
 for (const kind of ["dragenter", "dragover"]) box.addEventListener(kind, (event) => { event.preventDefault(); box.classList.add("over"); });
 for (const kind of ["dragleave", "drop"]) box.addEventListener(kind, (event) => { event.preventDefault(); box.classList.remove("over"); });
 box.addEventListener("drop", (event) => { if (event.dataTransfer.files.length) input.files = event.dataTransfer.files; });
+box.dataset.takes = "files";
 form.addEventListener("submit", () => { form.querySelector("button").textContent = say("The file is being sent …"); });

@@ -1,0 +1,125 @@
+"""Partial data give partial answers: currents without voltages, no plate, short stretches; what is withheld has its reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commissioner.errors import ConfigurationError
+from commissioner.monitor.intake.states import states
+from commissioner.operations.recordings.monitor import MonitorRequest, PartlyMonitored, monitor
+from commissioner.recordings.imported import store, understand
+from commissioner.recordings.table import write_table
+from commissioner.records import RunningRecording
+
+DATA = Path(__file__).parents[2] / "data" / "intake"
+PLATE = {
+    "rated_power_w": 2250.0, "rated_voltage_v": 400.0, "rated_frequency_hz": 50.0, "rated_current_a": 4.86, "rated_speed_rpm": 1436.0,
+    "power_factor": 0.78, "pole_pairs": 2.0, "connection": "star",
+}  # fmt: skip
+SHAFT_HZ = 24.285
+
+
+def columns(seconds: float = 6.0, rate_hz: float = 2000.0, volts: bool = False, backwards: bool = False) -> dict:
+    """Currents of 50 Hz, modulated once a turn; noise 5 mA."""
+    t = np.arange(round(seconds * rate_hz)) / rate_hz
+    random = np.random.default_rng(5)
+    swing = 1 + 0.02 * np.cos(2 * np.pi * SHAFT_HZ * t) + 0.02j * np.cos(2 * np.pi * SHAFT_HZ * t - 0.7)
+    vector = 5.6 * swing * np.exp(1j * (2 * np.pi * 50 * t - 0.85))
+    sign = -1 if backwards else 1
+    out = {"time_s": t}
+    for k, p in enumerate("uvw"):
+        turn = np.exp(-2j * np.pi * sign * k / 3)
+        out[f"current_{p}_a"] = (vector * turn).real + 5e-3 * random.standard_normal(t.size)
+        if volts:
+            out[f"voltage_{p}_v"] = 326.6 * (np.exp(2j * np.pi * 50 * t) * turn).real
+    return out
+
+
+def watched(tmp_path: Path, made: dict, plate: dict, **wishes) -> PartlyMonitored:
+    path = tmp_path / "recording.csv"
+    write_table(path, made, plate)
+    done = monitor(MonitorRequest(path, **wishes))
+    assert isinstance(done, PartlyMonitored), done
+    return done
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_currents_alone_give_speed_periods_and_indicators(tmp_path: Path, backwards: bool) -> None:
+    document = watched(tmp_path, columns(backwards=backwards), PLATE).document
+    speed = document["mean_speed_rad_per_s"]
+    assert speed["value"] == pytest.approx(2 * np.pi * SHAFT_HZ, abs=4 * speed["std"] + 1e-3) and speed["std"] < 0.1
+    assert document["periods"][0]["frequency_hz"] == pytest.approx(SHAFT_HZ, abs=0.01)
+    assert document["indicators"]["current_rms_a"] == pytest.approx(5.6 / np.sqrt(2), rel=5e-3)
+    assert document["mean_torque_nm"] is None
+    assert {"mean_torque_nm", "parameters", "power_w", "power_factor"} <= set(document["withheld"])
+    assert all("voltages" in document["withheld"][n] for n in ("mean_torque_nm", "power_w"))
+
+
+def test_currents_alone_have_a_trend(tmp_path: Path) -> None:
+    baseline = tmp_path / "history.json"
+    for _ in range(3):
+        watched(tmp_path, columns(), PLATE, baseline=baseline, learn=True)
+    same = watched(tmp_path, columns(), PLATE, baseline=baseline).document
+    assert same["trend"]["state"] == "normal"
+    odd = columns()
+    for k, p in enumerate("uvw"):
+        odd[f"current_{p}_a"] += 0.3 * np.cos(2 * np.pi * 50 * odd["time_s"] + 2 * np.pi * k / 3)
+    assert "current_unbalance" in watched(tmp_path, odd, PLATE, baseline=baseline).document["trend"]["alarms"]
+
+
+def test_without_a_plate_the_terminals_are_told_and_no_speed(tmp_path: Path) -> None:
+    document = watched(tmp_path, columns(volts=True), {}).document
+    said = document["indicators"]
+    assert said["supply_frequency_hz"] == pytest.approx(50.0, abs=1e-3)
+    assert said["voltage_rms_v"] == pytest.approx(326.6 / np.sqrt(2), rel=1e-3)
+    assert said["power_factor"] == pytest.approx(np.cos(0.85), abs=0.01)
+    assert document["periods"][0]["frequency_hz"] == pytest.approx(SHAFT_HZ, abs=0.1)
+    assert document["mean_speed_rad_per_s"] is None and "nameplate" in document["withheld"]["mean_speed_rad_per_s"]
+
+
+def test_a_plate_given_in_part_is_still_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "recording.csv"
+    write_table(path, columns(volts=True), {"rated_power_w": 2250.0})
+    with pytest.raises(ConfigurationError):
+        monitor(MonitorRequest(path))
+
+
+@pytest.mark.parametrize(
+    ("file", "torque_nm", "speed", "unused"),
+    [("off_start_step_off.csv.gz", 5.0, 155.05, "load step"), ("ramp.csv.gz", 6.0, 154.61, "ramp")],
+)
+def test_steady_stretches_under_two_seconds_have_torque_and_speed(file, torque_nm, speed, unused) -> None:
+    done = monitor(MonitorRequest(DATA / file))
+    assert isinstance(done, PartlyMonitored)
+    document = done.document
+    for key, true in (("mean_torque_nm", torque_nm), ("mean_speed_rad_per_s", speed)):
+        assert document[key]["value"] == pytest.approx(true, abs=2 * document[key]["std"])
+    assert "too few load periods" in document["withheld"]["parameters"]
+    assert unused in document["withheld"]["from other states"]
+    assert [s["used"] for s in document["states"]].count(True) == 1
+
+
+def test_a_loss_in_the_middle_and_direct_current_are_states() -> None:
+    made = columns(3.0, volts=True)
+    keep = (made["time_s"] < 1.0) | (made["time_s"] > 1.5)
+    i = tuple(made[f"current_{p}_a"][keep] for p in "uvw")
+    v = tuple(made[f"voltage_{p}_v"][keep] for p in "uvw")
+    seen = states(RunningRecording(made["time_s"][keep], i, v, False, None, 5e-4), None)
+    assert [s.state for s in seen] == ["steady", "lost", "steady"]
+    assert (seen[1].start_s, seen[1].end_s) == pytest.approx((1.0, 1.5), abs=1e-3)
+    t = made["time_s"]
+    held = tuple(np.full(t.size, x) for x in (4.0, -2.0, -2.0))
+    still = states(RunningRecording(t, held, tuple(3.0 * x for x in held), False, None, 5e-4), None)
+    assert [s.state for s in still] == ["standstill"]
+
+
+def test_the_band_stands_under_the_picture_of_an_import(tmp_path: Path) -> None:
+    table, document = understand(DATA / "off_start_step_off.csv.gz")
+    names = [s["state"] for s in document["states"]]
+    assert names == ["off", "start", "steady", "load step", "steady", "coast-down"]
+    assert document["states"][0]["end_s"] == pytest.approx(0.2, abs=1e-3)
+    page = Path(store(table, document, tmp_path / "out.csv")["picture"]).read_text("utf-8")
+    assert "what state the motor was in" in page
