@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
+from commissioner.diagnose.cancelling import ask_for_time
 from commissioner.diagnose.intake.audit import excited_lines
 from commissioner.diagnose.intake.noise import Noise
-from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment, each_segment
+from commissioner.diagnose.intake.record import TO_PHASES, Named, Record, Segment, each_segment
 from commissioner.diagnose.plant.model import Layout, Model, impedance
 from commissioner.diagnose.plant.prediction import predict
 
@@ -121,13 +122,18 @@ def without_lines(record: Record) -> Record:
 
 def with_lines(record: Record, lines: Mapping[str, float]) -> Record:
     """The record with these lines as its last channels, in place of those it had."""
-    record = without_lines(record)
+    return without_lines(record).with_channels(*courses_of(record, lines))
+
+
+def courses_of(record: Record, lines: Mapping[str, float]) -> list[Named]:
+    """Cosine and sine of these lines and of their harmonics below the sampling's, at every sample."""
+    out = []
     for name, frequency in lines.items():
-        record = record.with_channels(*_line(record, name, frequency))
+        out.append(_line(record, name, frequency))
         for order in HARMONICS[name.partition("_")[0]]:
             if order * frequency * record.facts.sample_period_s < 0.45:
-                record = record.with_channels(*_line(record, f"{name}x{order}", order * frequency))
-    return record
+                out.append(_line(record, f"{name}x{order}", order * frequency))
+    return out
 
 
 @dataclass(frozen=True)
@@ -227,6 +233,7 @@ def _peaks(record: Record, signals: Sequence[Array], base: float) -> list[tuple[
 def _powers(signals: Sequence[Array], frequency: Array, period: float) -> Array:
     powers = np.zeros(frequency.shape[0])
     for signal in signals:
+        ask_for_time()
         window = np.hanning(signal.shape[1])
         powers += sum(np.abs(_zoom(row * window, frequency, period)) ** 2 for row in signal)
     return powers
@@ -244,8 +251,8 @@ def _zoom(signal: Array, frequency: Array, period: float) -> Array:
     return np.asarray(np.exp(-2j * np.pi * np.outer(frequency - centre, at)) @ slow)
 
 
-def _line(record: Record, name: str, frequency: float) -> tuple[tuple[str, ...], tuple[Array, ...]]:
-    return (f"{name}_cos", f"{name}_sin"), tuple(_cos_and_sin(s, frequency) for s in record.segments)
+def _line(record: Record, name: str, frequency: float) -> Named:
+    return (f"{name}_cos", f"{name}_sin"), [_cos_and_sin(s, frequency) for s in record.segments]
 
 
 def _cos_and_sin(segment: Segment, frequency: float) -> Array:

@@ -10,9 +10,9 @@ from scipy.interpolate import BSpline
 from scipy.linalg import expm
 from scipy.signal import lfilter, ss2tf
 
-from commissioner.diagnose.causes.mains_lines import found_lines, recorded_sag, with_lines, without_lines
+from commissioner.diagnose.causes.mains_lines import courses_of, found_lines, recorded_sag, without_lines
 from commissioner.diagnose.intake.noise import Noise
-from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment
+from commissioner.diagnose.intake.record import TO_PHASES, Named, Record, Segment
 from commissioner.diagnose.kernels.link import behind_diodes
 from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.diagnose.plant.prediction import predict
@@ -44,7 +44,6 @@ SPEED_KNOTS_S = {SPEED_SPLINE: (0.4, 40), FINE_SPEED_SPLINE: (0.1, 80)}
 """Spacing of a speed's cubic splines, and the most intervals of a segment. A shaft held by its load swings below about 1 Hz, which the
 
 wide ones follow to a per cent; the fine ones follow 2.5 Hz to a per cent."""
-Named = tuple[tuple[str, ...], list[Array]]
 
 
 def add_channels(record: Record, model: Model, layout: Layout, noise: Noise) -> tuple[Record, dict[str, float]]:
@@ -57,19 +56,19 @@ def add_channels(record: Record, model: Model, layout: Layout, noise: Noise) -> 
 
 def with_known(record: Record, rotor_current_a: Sequence[Array], lines: Mapping[str, float]) -> Record:
     """The known functions of time in their fixed order, for given rotor currents and line frequencies."""
-    record = _with(record, _phase_patterns(record))
-    record = _with(record, _heat(record, rotor_current_a))
-    record = _with(record, _sag(record))
-    return with_lines(_with(_with(record, _own(record)), _speed_splines(record, SPEED_SPLINE)), lines)
+    return record.with_channels(
+        _phase_patterns(record),
+        _heat(record, rotor_current_a),
+        _sag(record),
+        _own(record),
+        _speed_splines(record, SPEED_SPLINE),
+        *courses_of(record, lines),
+    )
 
 
 def with_fine_speed_splines(record: Record, lines: Mapping[str, float]) -> Record:
     """The record with splines for a faster speed as well, before its lines."""
-    return with_lines(_with(without_lines(record), _speed_splines(record, FINE_SPEED_SPLINE)), lines)
-
-
-def _with(record: Record, named: Named) -> Record:
-    return record.with_channels(named[0], tuple(np.ascontiguousarray(c) for c in named[1]))
+    return without_lines(record).with_channels(_speed_splines(record, FINE_SPEED_SPLINE), *courses_of(record, lines))
 
 
 def _own(record: Record) -> Named:

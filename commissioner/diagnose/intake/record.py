@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
@@ -17,6 +17,7 @@ from commissioner.diagnose.kernels.memory import replayed
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
+Named = tuple[Sequence[str], list[NDArray[np.float64]]]
 LEAST_SHARE = 1500
 THREADS = min(int(get_num_threads()), 4)
 """One segment each: more threads than cores would only hold more sensitivities in memory at once."""
@@ -153,11 +154,15 @@ class Record:
     def channel(self, name: str) -> int:
         return self.channel_names.index(name)
 
-    def with_channels(self, names: tuple[str, ...], channels: tuple[NDArray[np.float64], ...]) -> Record:
-        """The record with more known functions of time appended, one array (n_k, len(names)) per segment."""
-        if self.channels:
-            channels = tuple(np.hstack(pair) for pair in zip(self.channels, channels, strict=True))
-        return Record(self.segments, self.facts, self.channel_names + names, channels)
+    def with_channels(self, *named: Named) -> Record:
+        """The record with more known functions of time appended: names, and one array (n_k, len(names)) per segment, each.
+
+        Takes the lists over and empties them: channels are most of what a search holds, and none is to be there twice.
+        """
+        parts = [*([list(self.channels)] if self.channels else []), *(channels for _, channels in named)]
+        channels = tuple(np.hstack([part.pop(0) for part in parts]) for _ in self.segments)
+        names = (name for some, _ in named for name in some)
+        return Record(self.segments, self.facts, (*self.channel_names, *names), channels)
 
     def subset(self, keep: tuple[int, ...], samples: int | None = None) -> Record:
         """Only the segments at the positions `keep`, each cut `samples` after its first command."""

@@ -17,7 +17,7 @@ def with_link(setting, course):
     record = setting.record
     swings = [course(s, c) for s, c in zip(record.segments, record.channels, strict=True)]
     segments = tuple(replace(s, link_swing=x) for s, x in zip(record.segments, swings, strict=True))
-    record = replace(record, segments=segments).with_channels((RECORDED_LINK,), tuple(x[:, None] for x in swings))
+    record = replace(record, segments=segments).with_channels(((RECORDED_LINK,), [x[:, None] for x in swings]))
     return replace(setting, record=record)
 
 

@@ -1,4 +1,4 @@
-"""Damaged recordings of every format: `python -m tests.campaigns.importers --mutants 20000 --seed 1 [--format NAME]`.
+"""Damaged recordings of every format: `python -m tests.campaigns.intake.importers --mutants 20000 --seed 1 [--format NAME]`.
 
 Each mutant of a sound file - bits turned, bytes overwritten, cut off, taken out, doubled, numbers replaced by nonsense - is read as
 `identify` and `diagnose` read it. It is a table or one typed refusal: no other exception, no more than `MOST_S` CPU seconds, and no more
@@ -25,7 +25,7 @@ import numpy as np
 from commissioner.errors import CommissionerError
 from commissioner.recordings.importers import contract_table
 
-DATA = Path(__file__).parent.parent / "data" / "foreign_formats"
+DATA = Path(__file__).parents[2] / "data" / "foreign_formats"
 MOST_S, MOST_BYTES = 5.0, 1 << 30
 ROWS, PERIOD_S = 60, 1.25e-4
 NONSENSE = (
@@ -222,7 +222,7 @@ def bound_memory() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.campaigns.importers", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.campaigns.intake.importers", description=__doc__)
     parser.add_argument("--mutants", type=int, default=20000, help="of each format")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--format", action="append", dest="formats", choices=FORMATS)

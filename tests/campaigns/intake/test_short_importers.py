@@ -6,7 +6,7 @@ import pytest
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.importers import contract_table
-from tests.campaigns.importers import FORMATS, campaign, report, sound_files
+from tests.campaigns.intake.importers import FORMATS, campaign, report, sound_files
 
 MUTANTS, SEED = 300, 7
 
@@ -16,7 +16,7 @@ def test_damaged_recordings_are_tables_or_typed_refusals(form):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         outcomes = list(campaign([form], MUTANTS, SEED))
-    print(f"repeat: python -m tests.campaigns.importers --mutants {MUTANTS} --seed {SEED} --format {form}")
+    print(f"repeat: python -m tests.campaigns.intake.importers --mutants {MUTANTS} --seed {SEED} --format {form}")
     print(report(outcomes))
     assert not [outcome for outcome in outcomes if outcome.broken]
     assert len(outcomes) == MUTANTS
