@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from commissioner.recordings.units import IN_NAME
+from commissioner.recordings.units import IN_NAME, read_unit, unit_in
 
 PHASES = {
     "a": "u",
@@ -32,6 +32,8 @@ TRANSLATED = {
     "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
 }  # fmt: skip
 """Words of other languages, as the words below; what only joins names in Chinese as a space."""
+SAME_KIND = {"tension": "uv", "spannung": "u", "voltage": "uv", "strom": "i", "courant": "i", "current": "i"}
+"""Symbols that say the same again: `Tension U12`, `Strom I1`."""
 FILLING = frozenset(
     {
         "phase",
@@ -47,6 +49,14 @@ FILLING = frozenset(
         "terminal",
         "measured",
         "to",
+        "fase",
+        "phasen",
+        "actual",
+        "value",
+        "istwert",
+        "last",
+        "ave",
+        "instantaneous",
     }
 )
 CURRENT = r"i|is|il|iph|cur|curr|current|currents|strom|courant|amps"
@@ -76,6 +86,9 @@ CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|spee
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
+_PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
+"""Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
+_TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
 _STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
 """`isa`, `usb`; `ias`, `vbs`: stator quantities."""
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
@@ -85,8 +98,10 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     """The contract's column that a name means, or None. `with_s`: a bare `is` or `us` is phase S, for R and T are there too."""
     if CONTRACT.fullmatch(name):
         return name
-    last = name.rsplit(".", maxsplit=1)[-1]
+    last = _PARAMETER.sub("", name.rsplit(".", maxsplit=1)[-1])
     name = translated(name if last.isdigit() else last)
+    if not IN_NAME.sub("", name).strip() and (unit := read_unit(unit_in(name))) and unit.measures == "time":
+        return "time_s"
     return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
 
 
@@ -143,7 +158,7 @@ def is_per_minute(name: str) -> bool:
 def _meaning(bare: str, with_s: bool) -> str | None:
     words = [word.lower() for word in _WORD.findall(bare)]
     key = re.sub(r"[^a-z0-9]", "", bare.lower())
-    if key in TIME:
+    if key in TIME or _TIME_OF_RATE.fullmatch(key):
         return "time_s"
     if key in SPEED | SPEED_PER_MINUTE:
         return "speed_rad_per_s"
@@ -155,7 +170,9 @@ def _meaning(bare: str, with_s: bool) -> str | None:
     if kind and (len(words) > 1):
         rest = list(words)
         rest.remove(kind)
-        found = _column(kind, "".join(rest))
+        found = _column(kind, "".join(rest)) or _column(
+            kind, "".join(w for w in rest if w not in SAME_KIND.get(kind, ""))
+        )
         if found:
             return found
     short = _SHORT.fullmatch("".join(words) if words else key)

@@ -12,6 +12,8 @@ from commissioner.records import RunningRecording, Signal
 
 LEAST_RATE = 10.0
 """Samples per carrier period from which a mean over whole periods is the mean of the pulses: edges fall between samples."""
+LEAST_LOCKED, LOCKED = 16.0, 0.03
+"""Samples per carrier period where they fall on the same places of it in each (their number whole, to so much): no mean helps."""
 KNOWN_TO = 0.98
 """Of the rate: a carrier is found to a fraction of the supply's frequency."""
 LEAST_SAMPLES = 24
@@ -57,6 +59,19 @@ def means_over_carrier(recording: RunningRecording) -> tuple[RunningRecording, F
             "carrier period",
             f"{1e-3 / period:.4g} kHz", f"{LEAST_RATE * found.frequency_hz / 1e3:.3g} kHz",
             f"sample at {LEAST_RATE * found.frequency_hz / 1e3:.3g} kHz or faster, or filter the voltage before sampling",
+        )  # fmt: skip
+    if (
+        found.spread_hz <= 0.02 * found.frequency_hz
+        and abs(rate - round(rate)) < LOCKED
+        and rate < LEAST_LOCKED - LOCKED
+    ):
+        good = 1e-3 * found.frequency_hz
+        return recording, Finding(
+            "switched_voltage", "refused",
+            f"the samples are locked to the carrier of {good:.3g} kHz, {rate:.3g} a period at the same places: an edge between two of them "
+            "shifts every mean alike",
+            f"{1e-3 / period:.4g} kHz", f"{LEAST_LOCKED * good:.3g} kHz, or a rate that is no multiple of the carrier",
+            f"sample at {LEAST_LOCKED * good:.3g} kHz or faster, at {(round(rate) + 0.5) * good:.4g} kHz, or filter the voltage before sampling",
         )  # fmt: skip
     kind = "spread" if found.spread_hz > 0.02 * found.frequency_hz else "fixed"
     return _averaged(recording, found.window), Finding(

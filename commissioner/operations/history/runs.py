@@ -41,7 +41,7 @@ class WrittenTable:
 
 def write_runs(archive: Archive, wanted: Wanted, out: Path) -> WrittenTable:
     """The runs that are wanted as a table. UsageError: no date, no ending of a table."""
-    from commissioner.export.runs_table import write_table
+    from commissioner.operations.history.runs_table import write_table
 
     return WrittenTable(
         str(out), write_table((json.loads(row.document) for row in find_runs(archive, wanted).rows), out)

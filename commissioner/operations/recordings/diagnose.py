@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
@@ -100,7 +101,8 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     require_one_motor(recordings)
     recordings, copies = without_copies(recordings)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
-    if seen.verdict.value == "unexplained" and all(any(n.code == COMPUTED for n in r.notes) for r in recordings):
+    is_computed = all(any(n.code == COMPUTED for n in r.notes) for r in recordings)
+    if is_computed and (seen.verdict.value == "unexplained" or len(seen.causes) > 1):
         seen, said = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
         remarks = [*said, *remarks]
     document = as_document(seen, None)
@@ -117,18 +119,20 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
 def _of_another_pair(
     recordings: Sequence[StandstillRecording], seen: Diagnosis, excluded: tuple[str, ...], observe: Observe, go_on: GoOn
 ) -> tuple[Diagnosis, list[str]]:
-    """The diagnosis with the computed current in another column, where that one explains what this one does not."""
+    """The diagnosis with the computed current in another column, where that explains the data by fewer causes."""
     choices = [other_pairs(r) for r in recordings]
+    best, said = seen, []
+    fewest = len(seen.causes) if seen.verdict.value == "explained" else len(CATALOGUE)
     for k, (name, _) in enumerate(choices[0]):
         other = analyse([c[k][1] for c in choices], excluded=excluded, report=observe, go_on=go_on)
-        if other.verdict.value == "explained":
+        if other.verdict.value == "explained" and len(other.causes) < fewest:
             pair = {"u": ("v", "w"), "v": ("w", "u")}[name]
-            said = (
-                f"Explained only where current {name} is the computed one: phases u and v of this diagnosis are {pair[0]} and {pair[1]} "
-                "of the recording, axes are counted from there."
-            )
-            return other, [said]
-    return seen, []
+            best, fewest = other, len(other.causes)
+            said = [
+                f"Explained by the fewest causes where current {name} is the computed one: phases u and v of this diagnosis are {pair[0]} "
+                f"and {pair[1]} of the recording, axes are counted from there."
+            ]
+    return best, said
 
 
 def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:

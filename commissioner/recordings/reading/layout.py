@@ -17,6 +17,12 @@ SEPARATORS = (";", "\t", ",", " ")
 HEAD_ROWS = 3
 """Rows of numbers in a row, alike, that begin the data; fewer where the file ends."""
 
+LEAST_WITH_TEXT = 8
+"""Rows alike that begin with a text; fewer where the file ends."""
+LABELS = frozenset({"label", "labels", "tracename", "channelname", "channellabel", "signalname", "name", "source"})
+UNITS = frozenset({"verticalunits", "verticalunit", "vunit", "vunits", "yunit", "yunitlabel", "unit", "units"})
+"""Keys of rows in a preface that hold a name or a unit of every column."""
+
 Row = list[str]
 
 
@@ -80,7 +86,7 @@ def layout_of(text: str, source: str) -> Layout:
         for separator in SEPARATORS:
             rows = _rows(lines[k:], separator)
             skip = _beside(rows)
-            if _are_numbers([row[skip:] for row in rows]):
+            if _are_numbers([row[skip:] for row in rows]) and _go_on(rows[0], lines[k:], separator):
                 return _layout(lines, k, separator, skip, [row[skip:] for row in rows], source)
     raise DataRefused(
         f"{source}: no rows of numbers were found", step="read recording", value=lines[0].text[:60] if lines else "",
@@ -119,6 +125,14 @@ def _with_text(rows: Sequence[Row]) -> bool:
     return len(set(kinds)) == 1 and filled >= 3 and len(rows[0]) - numbers <= max(2, len(rows[0]) // 4)
 
 
+def _go_on(first: Row, lines: Sequence[_Line], separator: str) -> bool:
+    """Whether rows that begin with a text go on for longer than a preface's keys do (`Vertical Offset,0,0,0`)."""
+    if not first or is_numeric(first[0]):
+        return True
+    rows = [split(line.text, separator) for line in lines[:LEAST_WITH_TEXT] if line.text.strip()]
+    return len({tuple(is_numeric(c) for c in row) for row in rows}) == 1
+
+
 def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows: Sequence[Row], source: str) -> Layout:
     width = len(rows[0])
     if width > MAX_COLUMNS:
@@ -137,9 +151,39 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
             (beside.get("horizontal units", "s"), beside.get("vertical units", ""), *("",) * (width - 2)), tuple(preface), skip,
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
+    names, units, used = _by_keys(above, width, names, units, used)
     return Layout(
         separator, lines[first].start, names, units, tuple(above[: len(above) - used]), 0, is_split and separator == ","
     )
+
+
+def _by_keys(
+    above: Sequence[Row], width: int, names: tuple[str, ...], units: tuple[str, ...], used: int
+) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    """Names of channels that a row of labels has, and units of those without one; where the last row above is no row of names
+    (Yokogawa: date and time of every trace), the labels alone."""
+    labels, said = (_keyed(above, width, keys) for keys in (LABELS, UNITS))
+    last = [c for c in (above[-1] if above else []) if c]
+    if labels and len(last) > 2 and all(is_numeric(c) for c in last[1:]):
+        names, units, used = ("", *labels), ("",) * width, 0
+    elif labels and (not last or _key(last[0]) not in LABELS):
+        names = tuple(labels[k - 1] if k and labels[k - 1] else n for k, n in enumerate(names))
+    if said:
+        units = tuple(said[k - 1] if k and not u else u for k, u in enumerate(units))
+    return names, units, used
+
+
+def _keyed(above: Sequence[Row], width: int, keys: frozenset[str]) -> tuple[str, ...]:
+    """The cells behind the key of the last such row that has one for every column but the first."""
+    for row in reversed(above):
+        cells = [*row[1:], *[""] * (width - len(row))][: width - 1]
+        if row and _key(row[0]) in keys and len(row) >= width - 1 and any(cells) and not any(":" in c for c in cells):
+            return tuple(cells)
+    return ()
+
+
+def _key(cell: str) -> str:
+    return "".join(c for c in cell.lower() if c.isalnum())
 
 
 def _names(above: Sequence[Row], width: int) -> tuple[tuple[str, ...], tuple[str, ...], int, bool]:

@@ -13,7 +13,7 @@ from commissioner.errors import DataRefused
 from commissioner.recordings.names import is_per_minute, is_sheet, meaning_of, reversed_pair, sheet_meaning, uses_rst
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
-from commissioner.recordings.units import FOREIGN, read_unit, unit_in
+from commissioner.recordings.units import FOREIGN, IN_NAME, read_unit, unit_in
 from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
@@ -44,7 +44,8 @@ def recognise(
         name, unit = names[k], units[k] or unit_in(names[k])
         if not name:
             continue
-        meaning, factor = _meaning(name, unit, targets.get(name), with_s, source)
+        target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
+        meaning, factor = _meaning(name, unit, target, with_s, source)
         if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_meaning(name)):
             unit = unit or _power_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
@@ -52,7 +53,7 @@ def recognise(
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
         if meaning is None:
-            unnamed += [name] if CHANNEL.fullmatch(_bare(name)) else []
+            unnamed += [name] if CHANNEL.fullmatch(IN_NAME.sub("", name).strip()) else []
             columns.setdefault(name, values[k])
         else:
             with np.errstate(invalid="ignore", over="ignore"):

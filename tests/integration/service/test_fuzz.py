@@ -1,7 +1,10 @@
 """The API, fuzzed from its own description: no request breaks the service, each refusal is a problem, nothing moves."""
 
+from contextlib import nullcontext, suppress
+
 import schemathesis
 from hypothesis import HealthCheck, given, settings
+from hypothesis.errors import Unsatisfiable
 from schemathesis import GenerationMode
 
 EXAMPLES = 5
@@ -10,7 +13,7 @@ LEFT_OUT = r"/api/simulator$|/events$"
 """Starts another process each time, its one field being a choice; a stream that ends with its run."""
 
 
-def test_no_request_breaks_the_service_or_energises(service, finished):
+def test_no_request_breaks_the_service_or_energises(service):
     schema = schemathesis.openapi.from_url(f"{service.url}/openapi.json")
     seen: dict[int, int] = {}
 
@@ -38,7 +41,9 @@ def test_no_request_breaks_the_service_or_energises(service, finished):
                 suppress_health_check=list(HealthCheck),
                 database=None,
             )
-            bounded(given(case=result.ok().as_strategy(mode))(judge))()
+            nothing_to_violate = suppress(Unsatisfiable) if mode == GenerationMode.NEGATIVE else nullcontext()
+            with nothing_to_violate:
+                bounded(given(case=result.ok().as_strategy(mode))(judge))()
     assert sum(seen.values()) > 200 and seen[200] and seen[422] and seen[404]
     assert [line["event"] for line in service.truth()].count("energised") == energised
     assert service.client.get("/api/health").json()["status"] == "ok"

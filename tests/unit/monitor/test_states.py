@@ -75,6 +75,16 @@ def test_too_slow_a_recording_is_refused_with_the_rate_that_would_do():
     assert finding.stops and "40" in str(finding.limit)
 
 
+@pytest.mark.parametrize(("carrier", "rate"), [(4000, 40e3), (5000, 50e3), (4000, 48e3)])
+def test_samples_locked_to_the_carrier_are_refused_with_the_rates_that_would_do(carrier, rate):
+    _, finding = means_over_carrier(switched(carrier, rate))
+    assert finding.stops and "locked" in finding.what
+    assert f"{16 * carrier / 1e3:.3g} kHz" in finding.remedy
+    off = (round(rate / carrier) + 0.5) * carrier
+    _, other = means_over_carrier(switched(carrier, off))
+    assert other.code == "carrier_means"
+
+
 def test_sine_voltages_are_left_alone():
     recording = switched(4000, 20e3)
     sine = tuple(300 * np.cos(2 * np.pi * 40 * recording.time_s - k * 2 * np.pi / 3) for k in range(3))

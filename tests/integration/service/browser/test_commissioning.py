@@ -10,6 +10,8 @@ from playwright.sync_api import expect
 import commissioner.service.page
 from tests.support.browser import SLOW_MS, Technician, technician
 
+pytestmark = pytest.mark.timeout(900)
+"""A guard against hanging: what is judged by time says so itself."""
 CATALOGUE = Path(commissioner.service.page.__file__).parent / "catalogues" / "de.po"
 ZERO_VOLTS_S = 0.5
 

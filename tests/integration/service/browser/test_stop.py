@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 from tests.integration.service.conftest import PAGE_LOST_S
 from tests.support.browser import SLOW_MS, technician
 
+pytestmark = pytest.mark.timeout(900)
+"""A guard against hanging: what is judged by time says so itself."""
 ZERO_VOLTS_S = 0.5
 DEAF = "window.WebSocket = class { constructor() { this.readyState = 0; } addEventListener() {} send() {} };"
 """A browser whose WebSocket never opens: STOP goes by POST."""

@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 
 from tests.support.browser import SIZES, SLOW_MS, technician
 
+pytestmark = pytest.mark.timeout(900)
+"""A guard against hanging: what is judged by time says so itself."""
 EVIL = '"><img src=x onerror="window.hit=1"><script>window.hit=1</script>{{7*7}}%s%(n)s'
 HIT = "() => window.hit !== undefined || document.querySelector('img[src=x]') !== null"
 
