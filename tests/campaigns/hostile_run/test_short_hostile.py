@@ -8,7 +8,7 @@ import pytest
 
 from commissioner.run import runner
 from tests.campaigns.hostile_run.one_run import run_one
-from tests.campaigns.hostile_run.troubles import FOR_EVER_S, FOREIGN, LINKS, Link, Trouble
+from tests.campaigns.hostile_run.troubles import FOR_EVER_S, FOREIGN, LINKS, Trouble
 
 BUSY_HOST = LINKS[2]
 SILENT_FLUX = 0.151
@@ -18,7 +18,7 @@ RUNS = {
     "currents doubled": (Trouble("currents_doubled", 0, 0.0, FOR_EVER_S, 1.0), "current"),
     "one sensor reversed": (Trouble("sensor_reversed", 0, 0.0, FOR_EVER_S, 1.0, 1), "sensor"),
     "one sensor silent in the climb": (Trouble("sensor_silent", 2, 0.4, FOR_EVER_S, 1.0, 0), "sensor"),
-    "all frozen in the climb": (Trouble("all_frozen", 2, 0.4, FOR_EVER_S, 1.0), "sensor"),
+    "all frozen in the climb": (Trouble("all_frozen", 2, 0.4, FOR_EVER_S, 1.0), "current"),
     "a spell of late replies in the climb": (Trouble("spell", 2, 0.4, 2.5, 0.12), ""),
     "the host stopped in the climb": (Trouble("host_stop", 2, 0.5, 0.0, 1.5), ""),
     "every fifth reply lost": (Trouble("drop", 1, 0.2, FOR_EVER_S, 0.2), ""),
@@ -51,7 +51,7 @@ def test_the_same_seed_is_the_same_run(tmp_path):
     runs = []
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        runs.append(run_one(5, "default", trouble, tmp_path / name, Link("line", 0.001, 0.002, 5e-4)))
+        runs.append(run_one(5, "default", trouble, tmp_path / name, BUSY_HOST))
     first, second = runs
     assert (first.ended, first.reason, first.flux, first.current) == (
         second.ended,
