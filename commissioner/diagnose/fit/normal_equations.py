@@ -203,8 +203,10 @@ def _add_products(directions: Array, residual: Array, weight: float, total: Arra
 
 def _averaged(signal: Array, block: int) -> Array:
     """Sums of `block` neighbours over sqrt(block): the noise variance stays one sample's."""
-    n = signal.shape[-1] // block * block
-    summed: Array = signal[..., :n].reshape(*signal.shape[:-1], -1, block) @ np.full(block, 1.0 / np.sqrt(block))
+    blocks = signal.shape[-1] // block
+    summed: Array = signal[..., : blocks * block].reshape(*signal.shape[:-1], blocks, block) @ np.full(
+        block, 1.0 / np.sqrt(block)
+    )
     return summed
 
 
