@@ -151,6 +151,14 @@ class Technician:
             for v in found["violations"]
         ]
 
+    def fits(self) -> bool:
+        """No wider than its window and STOP in view, within a second of a change of size: what is drawn follows a frame later."""
+        for _ in range(20):
+            if self.overflow() <= 0 and self.stop_is_in_view():
+                return True
+            self.page.wait_for_timeout(50)
+        return False
+
     def overflow(self) -> int:
         """Pixels by which the page is wider than its window."""
         return int(self.page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth"))

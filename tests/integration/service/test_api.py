@@ -180,7 +180,8 @@ def test_a_recording_is_identified_and_one_that_is_none_is_refused(service, fini
         time.sleep(0.02)
     assert document["exit_code"] == 0, document
     assert document["result"]["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(3.7, rel=0.02)
+    kept = set((service.runs / ".service" / "recordings").iterdir())
     is_problem(
         service.client.post("/api/recordings", files={"files": ("run.exe", b"MZ")}, data={"verb": "identify"}), 415
     )
-    assert not [p for p in (service.runs / ".service" / "recordings").iterdir() if p.name != job["id"]]
+    assert set((service.runs / ".service" / "recordings").iterdir()) == kept

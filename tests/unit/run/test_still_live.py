@@ -159,10 +159,11 @@ def test_a_stop_during_the_write_back_lets_it_end_as_written(folder):
 
 def test_a_stream_without_samples_ends_within_the_watchdogs_time(folder):
     class Silent(Drive):
-        def fetch(self, cursor):
+        def fetch(self, cursor, most):
             return SimpleNamespace(cursor=cursor, block=None, has_ended=False)
 
-    stream = Stream(Silent(live_from=9), object(), time.monotonic(), sensors=None, watch=None)
+    every_sample = SimpleNamespace(stream=SimpleNamespace(averaged=1))
+    stream = Stream(Silent(live_from=9), every_sample, time.monotonic(), sensors=None, watch=None)
     began = time.monotonic()
     with pytest.raises(DriveFault, match="no samples"):
         stream.next_block(0.05)
