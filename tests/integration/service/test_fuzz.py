@@ -22,7 +22,7 @@ def test_no_request_breaks_the_service_or_energises(service):
         seen[answer.status_code] = seen.get(answer.status_code, 0) + 1
         assert answer.status_code < 500 or answer.status_code in (502, 503), f"{case.method} {case.path}: {answer.text}"
         if answer.status_code >= 400:
-            assert answer.headers["content-type"] == "application/problem+json", (
+            assert answer.headers["content-type"] == ["application/problem+json"], (
                 f"{case.method} {case.path}: {answer.text}"
             )
             problem = answer.json()

@@ -5,6 +5,8 @@ const $ = (selector) => document.querySelector(selector);
 const WINDOW_S = 2, FLUX_WINDOW_S = 8;
 const FACTOR = [1, 1, 1e3, 1e3], DIGITS = [3, 3, 3, 1], SYMBOL = ["R_s", "R_R", "L_σ", "L_M"];
 const WANTED = ["resistance_std_percent", "rotor_resistance_std_percent", "leakage_std_percent", "magnetizing_std_percent"];
+if ($("#livedata")) begin(); /* a run may have ended, and its page have changed, before this file was here */
+function begin() {
 const first = JSON.parse($("#livedata").textContent), acceptance = first.acceptance;
 let limits = { current: first.live.current.limit_a, flux: first.live.flux.limit_wb };
 let current = { t: [], low: [], high: [] }, flux = { t: [], y: [] }, history = [], newest = performance.now(), segment = null, isOn = first.live.output === "on";
@@ -164,3 +166,4 @@ on("band", (band) => {
 for (const button of document.querySelectorAll("[data-control]")) button.addEventListener("click", () => send({ control: button.dataset.control }));
 on("control", (control) => { if (control.asking && $("#asking")) $("#asking").textContent = `${control.asking} ${say("asks for control; without an answer it passes in %s", number(control.wait_s, 0, "s"))}`; });
 on("refused", (problem) => { if ($("#asking")) $("#asking").textContent = problem.title; });
+}
