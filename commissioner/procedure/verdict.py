@@ -63,14 +63,14 @@ Values = Mapping[str, Quantity]
 @dataclass(frozen=True)
 class Evidence:
     """What the verdict is reached from: combined values, each test's values, each test's batch fit beside them, and each
-    test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words; `lost_samples` of all tests;
+    test's values at the flux all of them reached. `unlike`: why the axes differ more than by chance, in words, and by how much, relative; `lost_samples` of all tests;
     `guard_acted`: the flux guard took the amplitude back."""
 
     combined: Values
     axes: tuple[tuple[float, Values], ...]
     batch: tuple[tuple[float, Values], ...] = ()
     at_one_flux: tuple[tuple[float, Values], ...] = ()
-    unlike: tuple[str, ...] = ()
+    unlike: tuple[tuple[str, float], ...] = ()
     lost_samples: int = 0
     guard_acted: bool = False
 
@@ -86,7 +86,7 @@ def evidence_of(identification: Identification) -> Evidence:
         axes=tuple((axis.axis_deg, _values(axis.parameters, s)) for axis, s in zip(axes, std, strict=True)),
         batch=tuple((axis.axis_deg, _values(b, s)) for axis, b, s in zip(axes, batch, std, strict=True)),
         at_one_flux=tuple((e.axis_deg, _values(e.parameters, s)) for e, s in zip(alike, std, strict=True)),
-        unlike=tuple(finding.cause.value for finding in identification.combined.findings),
+        unlike=tuple((f.cause.value, f.relative_size) for f in identification.combined.findings),
         lost_samples=identification.lost_samples,
     )
 
@@ -103,7 +103,7 @@ def decide(evidence: Evidence, plate: Nameplate, acceptance: Acceptance, *, writ
         *_disagreements(evidence, acceptance),
         *_uncertain(evidence.combined, acceptance),
         *_spread(evidence, acceptance),
-        *(_unusual(evidence) if acceptance.strict else ()),
+        *(_unusual(evidence, acceptance) if acceptance.strict else ()),
     )
     if objections:
         return Verdict(Decision.REJECT, objections)
@@ -187,11 +187,16 @@ def _spread(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
             )
 
 
-def _unusual(evidence: Evidence) -> Iterator[Objection]:
-    """What a good result may have beside it, unless it was asked to be strict."""
-    for cause in evidence.unlike:
+def _unusual(evidence: Evidence, acceptance: Acceptance) -> Iterator[Objection]:
+    """What a good result may have beside it, unless it was asked to be strict; axes may differ by what R_s may be uncertain."""
+    for cause, size in evidence.unlike:
+        if 100 * abs(size) <= acceptance.resistance_std_percent:
+            continue
         yield Objection(
-            f"strict: {cause}", "more than by chance", "axes alike", "mend the cause, or run without --strict"
+            f"strict: {cause}",
+            f"{100 * size:.2g} %",
+            f"{acceptance.resistance_std_percent:g} %",
+            "mend the cause, or run without --strict",
         )
     if evidence.lost_samples:
         yield Objection(

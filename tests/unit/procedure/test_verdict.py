@@ -78,7 +78,7 @@ def test_copper_loss_beyond_the_plates_losses_is_an_objection_of_its_own():
 
 
 @pytest.mark.parametrize(("unusual", "word"), [
-    ({"unlike": ("the current sensors' gains differ",)}, "gains differ"), ({"lost_samples": 3}, "lost"), ({"guard_acted": True}, "flux guard"),
+    ({"unlike": (("the current sensors' gains differ", -0.02),)}, "gains differ"), ({"lost_samples": 3}, "lost"), ({"guard_acted": True}, "flux guard"),
 ])  # fmt: skip
 def test_what_is_only_unusual_is_rejected_where_that_was_asked_for(unusual, word):
     evidence = replace(Evidence(VALUES, ((0.0, VALUES),)), **unusual)
