@@ -27,6 +27,12 @@ of the service against `sim --speed max` are not: the reader paces them, and the
 defects that a rule must catch: what comes late fails it all the more. `NOT_REALTIME` are the tests of these files that
 no clock judges."""
 NOT_REALTIME = (
+    "test_a_full_three_axis_run_at_115200_ends_commissioned",
+    "test_what_is_found_at_115200_is_true_within_three_of_its_errors",
+    "test_the_flux_stays_under_its_limit_at_115200_in_truth",
+    "test_the_recording_of_means_gives_the_runs_answer_offline",
+    "test_a_run_of_means_is_decided_again_bit_for_bit",
+    "test_a_run_at_19200_captures_downloads_and_is_true_within_three_of_its_errors",
     "test_the_firmwares_own_tests_pass_and_its_fuzzer_finds_nothing_with_the_sanitizers_on",
     "test_the_firmwares_item_table_is_the_drive_files",
     "test_every_rule_that_was_tried_shows_requests_replies_and_times",
