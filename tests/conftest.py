@@ -14,7 +14,9 @@ settings.load_profile("same")
 
 TESTS = Path(__file__).parent
 REALTIME = (
-    "campaigns",
+    "campaigns/test_short_campaigns.py",
+    "campaigns/hostile_run",
+    "campaigns/tunings",
     "conformance/test_conformance.py",
     "integration/service",
     "integration/link",
