@@ -123,6 +123,7 @@ class Technician:
         self.confirm()
         self.hold()
         expect(self.page).to_have_url(re.compile("/runs/"), timeout=SLOW_MS)
+        self.page.wait_for_load_state()
         return self.page.url.rsplit("/", 1)[1]
 
     def wait_energised(self) -> None:
