@@ -122,7 +122,7 @@ def load_procedure(
         supervision=Supervision(**model.supervision.model_dump()),
         limits=Limits(**model.limits.model_dump()),
         excitation=ExcitationPlan(**model.excitation.model_dump()),
-        acceptance=Acceptance(**(model.acceptance.model_dump() | ({"strict": True} if strict else {}))),
+        acceptance=Acceptance(**model.acceptance.model_dump() | {"strict": strict or model.acceptance.strict}),
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import UsageError
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.recordings.whole import whole_file
 
 TEXTS = (
@@ -17,9 +18,7 @@ TEXTS = (
 PLATE = (
     "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor", "pole_pairs",
 )  # fmt: skip
-PARAMETERS = (
-    "stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h", "rotor_time_constant_s",
-)  # fmt: skip
+QUANTITIES = (*PARAMETERS, "rotor_time_constant_s")
 ENDINGS = (".csv", ".parquet")
 
 
@@ -43,7 +42,7 @@ def _row(summary: Mapping[str, Any]) -> dict[str, str | float | None]:
     row["energised_s"] = _number(summary.get("energised_s"))
     plate, found = summary.get("motor") or {}, summary.get("parameters") or {}
     row |= {name: _number(plate.get(name)) for name in PLATE}
-    for name in PARAMETERS:
+    for name in QUANTITIES:
         quantity = found.get(name) or {}
         row |= {name: _number(quantity.get("value")), f"{name}_std": _number(quantity.get("std"))}
     row["at_stator_flux_wb"] = _number((found.get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb"))

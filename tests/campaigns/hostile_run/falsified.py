@@ -6,19 +6,10 @@ import struct
 from collections.abc import Sequence
 
 from tests.campaigns.hostile_run.troubles import Trouble
+from tests.support.scripted_port import crc16
 
 WINDOW, HEADER_WORDS, CRC_WORD, CHANNELS = 256, 8, 7, 4
 CLIP_COUNTS = 400
-
-
-def crc16(data: bytes) -> int:
-    """CRC-16/MODBUS."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
-    return crc
 
 
 def falsified(trouble: Trouble, words: Sequence[int], held: list[tuple[int, ...]]) -> list[int]:
