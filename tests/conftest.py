@@ -2,6 +2,8 @@
 under xdist only: which tests stay together on one, and that the costliest begin."""
 
 import json
+import os
+import tempfile
 from collections import defaultdict
 from pathlib import Path
 
@@ -11,6 +13,8 @@ from hypothesis import settings
 settings.register_profile("same", derandomize=True)
 settings.register_profile("fresh", derandomize=False, print_blob=True)
 settings.load_profile("same")
+os.environ["COMMISSIONER_LOCKS"] = tempfile.mkdtemp(prefix="commissioner-locks-")
+"""Of this process and the commands it starts: two workers may both speak to the same made-up address."""
 
 TESTS = Path(__file__).parent
 REALTIME = (
