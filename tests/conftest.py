@@ -13,7 +13,8 @@ from hypothesis import settings
 settings.register_profile("same", derandomize=True)
 settings.register_profile("fresh", derandomize=False, print_blob=True)
 settings.load_profile("same")
-os.environ["COMMISSIONER_LOCKS"] = tempfile.mkdtemp(prefix="commissioner-locks-")
+_LOCKS = tempfile.TemporaryDirectory(prefix="commissioner-locks-", ignore_cleanup_errors=True)
+os.environ["COMMISSIONER_LOCKS"] = _LOCKS.name
 """Of this process and the commands it starts: two workers may both speak to the same made-up address."""
 
 TESTS = Path(__file__).parent
