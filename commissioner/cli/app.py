@@ -266,6 +266,7 @@ def identify(
     profile: Annotated[str | None, typer.Option("--profile", help="Drive file, for --write-back.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
     procedure: Procedure = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the report with its pictures.")] = None,
     runs: Runs = RUNS,
     mapping: Map = None,
     trust: Trust = None,
@@ -276,7 +277,7 @@ def identify(
     from commissioner.cli.verbs.identify import identify_and_write
     from commissioner.operations.recordings.identify import IdentifyRequest
 
-    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust)
+    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust, out)
     if write_back:
         identify_and_write(request, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs, as_json=json)
     else:
