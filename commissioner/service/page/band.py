@@ -112,7 +112,7 @@ def _of_run(run: LiveRun, t: Texts) -> _Said:
     if state.output == "unknown":
         return _take_as_live(t.gettext("The drive does not confirm that its output is off. Isolate its supply"), t)
     if state.output == "on" and state.phase == "tuning":
-        small = t.gettext("The drive tunes itself at standstill, started from the command line")
+        small = t.gettext("The drive tunes itself at standstill")
         return _Said("live", t.gettext("MOTOR ENERGISED"), small, t.gettext("Esc or Space"))
     if state.output == "on":
         return _Said("live", t.gettext("MOTOR ENERGISED"), _test_line(run, t), t.gettext("Esc or Space"))

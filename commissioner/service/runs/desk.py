@@ -115,14 +115,12 @@ class Desk:
         return self._watches.setdefault(key, DriveWatch(drive.url, drive.profile))
 
     # --- starting -----------------------------------------------------------------------------------------------
-    async def start(
-        self, drive: Drive, motor: Motor, axes_deg: Sequence[float], *, write_back: bool, party: Party
-    ) -> LiveRun:
-        """A run as a child process. Refusal 409: somebody has the drive."""
+    async def start(self, drive: Drive, motor: Motor, verb: Sequence[str], party: Party) -> LiveRun:
+        """A run as a child process: `verb` and its own options; `commissioning`, `tuning`. Refusal 409: somebody has the drive."""
         self._check_free(drive)
         self.control(drive.id).take(party)
         watch = self.watch(drive)
-        child = await Child.start(self._arguments(drive, motor, axes_deg, write_back), self._log("run", drive.id))
+        child = await Child.start(self._arguments(drive, motor, verb), self._log("run", drive.id))
         self._pending[drive.id] = _Pending(party, child)
         try:
             await asyncio.to_thread(watch.pause)
@@ -145,13 +143,16 @@ class Desk:
             raise Refusal(409, f"{drive.name} is in use: {person}", step="start a run", value=holder.id if holder else "starting",
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
-    def _arguments(self, drive: Drive, motor: Motor, axes_deg: Sequence[float], write_back: bool) -> list[str]:
+    def commissioning(self, axes_deg: Sequence[float], *, write_back: bool) -> list[str]:
+        """The verb of an ordinary run."""
         chosen = axes_deg or self.settings.file.service.axes_deg
         axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
-        more += [] if self.settings.file.service.diagnosis else ["--no-diagnosis"]
+        return ["run", *axes, *more, *([] if self.settings.file.service.diagnosis else ["--no-diagnosis"])]
+
+    def _arguments(self, drive: Drive, motor: Motor, verb: Sequence[str]) -> list[str]:
         return [
-            "run", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, *axes, *more, "--runs",
+            *verb, "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, "--runs",
             str(self.settings.runs), "--dead-man", "--json",
         ]  # fmt: skip
 
@@ -185,7 +186,7 @@ class Desk:
         run.exit_code = waiting.result() if waiting else None
         run.is_over = True
         self._free_drive(run)
-        self._write_end(run)
+        await asyncio.to_thread(self._write_end, run)
         run.feed.close()
 
     def _has_gone(self, run: LiveRun, waiting: asyncio.Task[int] | None) -> bool:

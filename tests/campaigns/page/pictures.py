@@ -106,7 +106,8 @@ def shelves(album: Album, run: str) -> None:
     page.locator("#dropform button").click()
     page.wait_for_url("**/recordings/*")
     album.take("recording-works")
-    page.locator("#working").wait_for(state="detached", timeout=120_000)
+    page.locator("#working").wait_for(state="detached", timeout=SLOW_MS)
+    page.wait_for_timeout(800)
     album.take("recording")
     hand.go("/audit")
     album.take("audit")
@@ -127,7 +128,7 @@ def ends(album: Album) -> None:
     hand.service.wait_over(run, 200)
     page.wait_for_timeout(1500)
     album.take("stopped")
-    second = hand.service.start_run(axes_deg=[0, 60, 120])
+    second = hand.service.start_run(axes_deg=[0])
     hand.service.wait_over(second, 300)
     hand.go("/runs")
     album.take("archive")
@@ -157,13 +158,16 @@ def main() -> None:
     parser.add_argument("--language", default="en", choices=("en", "de"))
     parser.add_argument("--speed", default="1")
     parser.add_argument("--only", default="")
+    parser.add_argument("--axes", default="0, 60, 120")
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     parts: list[Callable[[Album], None]] = [work, ends]
     with (
         tempfile.TemporaryDirectory() as folder,
         chromium() as browser,
-        ServiceProcess(Path(folder) / "s", speed=asked.speed, diagnosis=True) as service,
+        ServiceProcess(
+            Path(folder) / "s", speed=asked.speed, diagnosis=True, settings=f"axes_deg = [{asked.axes}]"
+        ) as service,
         technician(browser, service, asked.language) as hand,
     ):
         album = Album(hand, asked.out, set(filter(None, asked.only.split(","))))
