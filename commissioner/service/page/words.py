@@ -19,7 +19,7 @@ SCRIPT_TEXTS = (
     "The run is being started …", "Type %s and confirm the points above.", "done, %s", "running", "waits", "highest", "limit",
     "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
-    "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
+    "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "%a, done", "%a, now", "last word %s ago",
     "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
     "Reading the drive …", "The file is being sent …", "no value",
 )  # fmt: skip

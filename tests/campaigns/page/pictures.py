@@ -10,8 +10,6 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from playwright.sync_api import expect
-
 from tests.support.browser import SIZES, SLOW_MS, Technician, chromium, technician
 from tests.support.service_process import ServiceProcess
 
@@ -71,12 +69,11 @@ def work(album: Album) -> None:
     hand.wait_energised()
     page.locator("[data-p='3']").filter(has_not_text="–").wait_for()
     album.take("live", whole=True)
-    expect(page.locator("#prog")).to_contain_text("2", timeout=SLOW_MS)
-    page.locator("[data-last='3']").filter(has_not_text="–").wait_for()
-    hand.wait_energised()
-    page.locator("[data-p='3']").filter(has_not_text="–").wait_for()
-    page.wait_for_timeout(1500)
-    album.take("live-second", whole=True)
+    second = page.locator("[data-last='3']").filter(has_not_text="–").or_(page.locator(".verdict"))
+    second.wait_for()  # on a busy host the run is over before its pictures are taken
+    if page.locator("#live").count():
+        page.wait_for_timeout(1500)
+        album.take("live-second", whole=True)
     hand.wait_result()
     album.take("result-early")
     run = page.url.rsplit("/", 1)[1]

@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from websockets.sync.client import connect
 
@@ -61,7 +62,7 @@ def one_stop(service: ServiceProcess, number: int, draw: random.Random) -> Stop:
     """A run, begun, stopped, judged by the simulator's log."""
     run, way, wanted_s = service.start_run(), WAYS[number % len(WAYS)], draw.uniform(0.0, MOTOR_TIME_S)
 
-    def is_there(document: dict) -> bool:
+    def is_there(document: dict[str, Any]) -> bool:
         live = document.get("live")
         return live is None or (bool(live["tests"]) and live["tests"][0]["energised_s"] >= wanted_s and wanted_s > 0.0)
 

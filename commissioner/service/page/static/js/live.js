@@ -104,8 +104,8 @@ function parameters(live) {
   };
   show(done, (k) => `[data-last="${k}"]`, (k) => `[data-lasterr="${k}"]`);
   show(test, (k) => `[data-p="${k}"]`, (k) => `[data-e="${k}"]`);
-  if (done) $("#lasthead").textContent = `${number(done.axis_deg, 0)}°`;
-  if (test) $("#nowhead").textContent = `${number(test.axis_deg, 0)}°`;
+  if (done) $("#lasthead").textContent = say("%a, done", `${number(done.axis_deg, 0)}°`);
+  if (test) $("#nowhead").textContent = say("%a, now", `${number(test.axis_deg, 0)}°`);
   if (!test?.parameters) return;
   const above = SYMBOL.filter((_, k) => (100 * test.std[k]) / test.parameters[k] > (acceptance[WANTED[k]] ?? 3));
   $("#settle").textContent = above.length ? say("Still above the wanted standard error: %s. Strip: ± 10 %.", above.join(", ")) : say("All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.");
