@@ -24,14 +24,14 @@ from commissioner.service.library import (
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
-from commissioner.service.page.texts import Texts, sentence, texts_of
+from commissioner.service.page.texts import UNIT_SIGNS, Texts, sentence, texts_of, typeset
 from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
 from commissioner.service.routes.library import start_simulator
 from commissioner.service.routes.runs import RunWish, start_run
-from commissioner.service.routes.write import Act, act, plan
+from commissioner.service.routes.write import Act, act, drive_of, plan
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.live import live_document
 from commissioner.service.simulator import SCENARIOS
@@ -150,7 +150,7 @@ def _motor_page(
 def say_plate(judged: dict[str, Any], t: Texts) -> dict[str, Any]:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
-        key: "" if field["ok"] else f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}"
+        key: "" if field["ok"] else typeset(f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}")
         for key, field in judged["fields"].items()
     }
     if judged["efficiency"] is None:
@@ -406,9 +406,18 @@ async def _act(request: Request, run: str, what: Act) -> Response:
         run=run,
         what=what,
         done=done.get("report") or done,
+        units=_units(drive_of(parts, run)),
         who_wrote=who.person,
         motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
     )
+
+
+def _units(drive: Drive | None) -> dict[str, str]:
+    """Of the drive's items, in the signs of a page."""
+    from commissioner.link.files.drive_file import load_profile
+
+    items = load_profile(drive.profile).items if drive is not None else {}
+    return {name: UNIT_SIGNS.get(item.unit, item.unit) for name, item in items.items()}
 
 
 def _place(parts: Parts, run: str) -> Place:

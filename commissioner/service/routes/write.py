@@ -56,14 +56,14 @@ async def restore(request: Request, run: str, agreement: Agreement, who: Operato
 async def plan(parts: Parts, run: str, what: Act) -> dict[str, Any]:
     """The table, read from the drive afresh."""
     entry = parts.archive.find(run)
-    drive = _drive_of(parts, run)
+    drive = drive_of(parts, run)
     return await _with_drive(parts, drive, [what, entry.run, *_address(drive), "--plan", *_runs(parts), "--json"])
 
 
 async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> dict[str, Any]:
     """Write what the table of `token` showed; the audit has it before and after."""
     entry = parts.archive.find(run)
-    drive = _drive_of(parts, run)
+    drive = drive_of(parts, run)
     await asyncio.to_thread(parts.audit.write, who.person, who.address, f"asked to {what}", run=run, table=token)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
     done = await _with_drive(parts, drive, arguments)
@@ -96,7 +96,7 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -
     return document
 
 
-def _drive_of(parts: Parts, run: str) -> Drive | None:
+def drive_of(parts: Parts, run: str) -> Drive | None:
     """The drive of this library that the run was made on; None for one that is not in it."""
     asked = parts.archive.request(run)
     name = (asked.get("origin") or {}).get("drive")

@@ -75,6 +75,9 @@ def test_a_whole_commissioning_by_clicks(service, browser, language):
             hand.button(press)
             expect(hand.page.locator("main")).to_contain_text(hand.words[seen], timeout=SLOW_MS)
             judge_view(hand, language, english)
+            if seen == "written":
+                kept = {"en": "Measured and written", "de": "Gemessen und geschrieben"}[language]
+                expect(hand.page.locator("#small")).to_contain_text(kept)
         for path in ("/", "/runs", "/audit", "/motors/motor_2kw2/trend", f"/runs/{run}/report", "/runs/none", "/login"):
             hand.go(path)
             judge_view(hand, language, english)
