@@ -10,15 +10,13 @@ from commissioner.link.drive.ordinary.tuning import Operator
 from commissioner.link.files.drive_file import load_profile
 from commissioner.operations.events import Observe, nobody
 from commissioner.registers.profile import DriveProfile
+from commissioner.registers.tuning import MOST_REPEATS, REPEATS
 from commissioner.run.commission import Commissioned, Origin
 from commissioner.run.tuning.tune import TunedOnce, TuneOrder, TuningBegan, order_of
 from commissioner.run.tuning.tune import tune as carry_out
 from commissioner.settings import load_motor, load_procedure
 
 __all__ = ["REPEATS", "TuneRequest", "TunedOnce", "TuningBegan", "check_request", "tune"]
-
-REPEATS = 3
-MOST_REPEATS = 20
 
 
 @dataclass(frozen=True)

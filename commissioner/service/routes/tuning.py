@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from commissioner.operations.tune import MOST_REPEATS, REPEATS
+from commissioner.registers.tuning import MOST_REPEATS, REPEATS
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.parts import Parts
