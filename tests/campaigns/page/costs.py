@@ -25,8 +25,8 @@ from pathlib import Path
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from tests.support.browser import chromium, technician
-from tests.support.service_process import ServiceProcess
+from tests.support.service.browser import chromium, technician
+from tests.support.service.service_process import ServiceProcess
 
 PAINTED = "() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? null"
 PIECES, TOGETHER = 8, 16

@@ -10,8 +10,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.support.browser import SIZES, SLOW_MS, Technician, chromium, technician
-from tests.support.service_process import ServiceProcess
+from tests.support.service.browser import SIZES, SLOW_MS, Technician, chromium, technician
+from tests.support.service.service_process import ServiceProcess
 
 
 class Album:

@@ -21,7 +21,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from tests.support.service_process import ServiceProcess
+from tests.support.service.service_process import ServiceProcess
 
 LONGEST_S = 0.5
 MOTOR_TIME_S = 11.0

@@ -14,7 +14,7 @@ from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
 from commissioner.service.access.accounts import Accounts, Role
 from tests.support.command_line import call
-from tests.support.service_process import ServiceProcess
+from tests.support.service.service_process import ServiceProcess
 
 OTTO, VERA = Account("otto", "operating 1234"), Account("vera", "watching 1234")
 

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser
 
-from tests.support.browser import chromium
-from tests.support.service_process import ServiceProcess
+from tests.support.service.browser import chromium
+from tests.support.service.service_process import ServiceProcess
 
 PAGE_LOST_S = 5.0
 

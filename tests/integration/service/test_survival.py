@@ -19,7 +19,7 @@ from commissioner.service.application import create_app
 from commissioner.service.configuration import Settings
 from commissioner.service.runs.desk import Desk, LiveRun
 from commissioner.service.runs.feed import Feed
-from tests.support.service_process import ServiceProcess
+from tests.support.service.service_process import ServiceProcess
 from tests.support.sim_process import SimProcess
 
 ZERO_VOLTS_S, WATCHDOG_S = 0.5, 0.5

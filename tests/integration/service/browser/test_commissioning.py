@@ -8,7 +8,7 @@ from babel.messages.pofile import read_po
 from playwright.sync_api import expect
 
 import commissioner.service.page
-from tests.support.browser import SLOW_MS, Technician, technician
+from tests.support.service.browser import SLOW_MS, Technician, technician
 
 pytestmark = pytest.mark.timeout(900)
 """A guard against hanging: what is judged by time says so itself."""

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.integration.service.conftest import PAGE_LOST_S
-from tests.support.browser import SLOW_MS, technician
+from tests.support.service.browser import SLOW_MS, technician
 
 pytestmark = pytest.mark.timeout(900)
 """A guard against hanging: what is judged by time says so itself."""
@@ -66,7 +66,7 @@ def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(
 
 def test_a_page_that_has_lost_the_service_says_what_it_cannot_do(browser, tmp_path):
     """The service is killed: zero volts by the dead man; the page points at the emergency stop."""
-    from tests.support.service_process import ServiceProcess
+    from tests.support.service.service_process import ServiceProcess
 
     with ServiceProcess(tmp_path) as service, technician(browser, service) as hand:
         service.start_simulator()

@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.support.browser import SLOW_MS, technician
-from tests.support.service_process import ServiceProcess
+from tests.support.service.browser import SLOW_MS, technician
+from tests.support.service.service_process import ServiceProcess
 from tests.support.vendor_process import Vendor
 
 pytestmark = pytest.mark.timeout(600)

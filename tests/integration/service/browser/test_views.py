@@ -7,7 +7,7 @@ import shutil
 import pytest
 from playwright.sync_api import expect
 
-from tests.support.browser import SIZES, SLOW_MS, technician
+from tests.support.service.browser import SIZES, SLOW_MS, technician
 
 pytestmark = pytest.mark.timeout(900)
 """A guard against hanging: what is judged by time says so itself."""

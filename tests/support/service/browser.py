@@ -16,10 +16,10 @@ from typing import Any
 
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
-from tests.support.service_process import ServiceProcess
+from tests.support.service.service_process import ServiceProcess
 
 CHROMIUM = "/usr/bin/chromium"
-AXE = Path(__file__).parent.parent / "data" / "axe_core" / "axe.min.js"
+AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
 SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
 SLOW_MS = 240_000
 """A simulated drive beside other work on the host."""

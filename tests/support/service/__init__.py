@@ -1,0 +1,1 @@
+"""The service as a process, and a technician at its page."""
