@@ -9,7 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.monitor.chain import Observation, Refused, Wishes
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
 from commissioner.monitor.intake.findings import Finding
-from commissioner.monitor.intake.states import states
+from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.partial import Partial, of_currents, refused_audit, without_plate
 from commissioner.monitor.result import (
     as_document,
