@@ -85,7 +85,7 @@ def identify_any(
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
-    tables = [contract_table(path, said) for path in request.files]
+    tables = [contract_table(path, said, request.motor) for path in request.files]
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     if not any(is_running(t) for t in tables):

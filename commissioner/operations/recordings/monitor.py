@@ -78,7 +78,7 @@ class PartlyMonitored:
 
 def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | PartlyMonitored | NotMonitored:
     """One recording, watched, compared and, where asked for, learned and written out. Partial data give a partial answer."""
-    table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None)
+    table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None, request.motor)
     if has_currents_only(table):
         return _of_currents(table, request, observe)
     require_running(table)
