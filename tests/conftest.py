@@ -68,6 +68,8 @@ NOT_YET_IN_CI = (
 they are."""
 TOGETHER = ("integration/service",)
 """Folders whose tests share a costly fixture of a whole session: one worker has them all."""
+NIGHT = TESTS.parent / ".ci" / "night.txt"
+"""Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
 """CPU seconds of the tests that take one or more, as `tests/support/suite/durations.py` writes them."""
 USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
@@ -76,8 +78,9 @@ USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    at_night = set(NIGHT.read_text("utf-8").split("\n"))
     for item in items:
-        if item.name.split("[")[0] in NOT_YET_IN_CI:
+        if item.name.split("[")[0] in NOT_YET_IN_CI or item.nodeid in at_night:
             item.add_marker(pytest.mark.campaign)
         is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
         if is_listed and item.name.split("[")[0] not in NOT_REALTIME:

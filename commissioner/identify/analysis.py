@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.errors import UsageError
+from commissioner.errors import DataRefused, UsageError
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import BatchFit, extended
 from commissioner.identify.batch.starts import periods_late
@@ -33,7 +33,15 @@ from commissioner.identify.estimate.axis import (
 from commissioner.identify.estimate.leg_family import one_inverter
 from commissioner.identify.estimate.leg_refit import with_known_law
 from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
-from commissioner.identify.intake.alignment import FARTHEST, TimeShift, more_periods, require_near, rows_off, shifted
+from commissioner.identify.intake.alignment import (
+    FARTHEST,
+    MOST_PERIODS,
+    TimeShift,
+    more_periods,
+    require_near,
+    rows_off,
+    shifted,
+)
 from commissioner.identify.intake.audit import Audit, audit
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.identify.intake.stretches import Stretch
@@ -126,7 +134,7 @@ def identify(
         done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
         return done or fit_axis(stretches, plate, period_s, start, inverter, None)
 
-    fit, late = _aligned(first, rows_off(periods_late(first, period_s, prior(plate))), one)
+    fit, late = _best_aligned(first, rows_off(periods_late(first, period_s, prior(plate))), one)
     fits = [fit]
     for stretches in others:
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
@@ -141,6 +149,22 @@ def identify(
     require_near(shift)
     temperature = winding_temperature_degc or _temperature(recording)
     return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
+
+
+def _best_aligned(
+    stretches: Sequence[Stretch], coarse: int, fit: Callable[[Sequence[Stretch]], AxisFit]
+) -> tuple[AxisFit, int]:
+    """`_aligned` from the coarse look; where that would be a refusal also from none, and what explains more counts: an
+    impedance that the inverter's loss has turned said 7 periods of sound tests of a 15-kW motor."""
+    found, refusal = [], None
+    for late in (coarse, 0) if abs(coarse) > MOST_PERIODS else (coarse,):
+        try:
+            found.append(_aligned(stretches, late, fit))
+        except DataRefused as error:
+            refusal = refusal or error
+    if refusal and not found:
+        raise refusal
+    return min(found, key=lambda one: one[0].batch.criterion())
 
 
 def _aligned(

@@ -29,6 +29,12 @@ def test_every_room_says_what_it_is(room):
     assert ast.get_docstring(ast.parse((room / "__init__.py").read_text("utf-8"))), room
 
 
+@pytest.mark.parametrize("test", (ROOT / ".ci" / "night.txt").read_text("utf-8").split())
+def test_what_the_night_runs_is_there(test):
+    file, name = test.split("::")
+    assert f"def {name.split('[')[0]}(" in (ROOT / file).read_text("utf-8")
+
+
 def test_top_level_holds_nothing_but_the_house():
     allowed = {
         "pyproject.toml",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tests.support.preloaded import PreloadedProcess
 
 COMMAND = [sys.executable, "-c", "from commissioner.cli.app import main; main()"]
 
@@ -27,28 +29,18 @@ class Answer:
 def call(*arguments: str, timeout_s: float = 150.0, cwd: Path | None = None) -> Answer:
     """Run to the end. A traceback on stderr is never right. A run's closing diagnosis is only made where it is asked for."""
     is_quick = arguments[:1] == ("run",) and "--diagnosis" not in arguments
-    done = subprocess.run(
-        [*COMMAND, *arguments, *(("--no-diagnosis",) if is_quick else ())],
-        capture_output=True,
-        text=True,
-        timeout=timeout_s,
-        cwd=cwd,
-        check=False,
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    return Answer(done.returncode, done.stdout, done.stderr)
+    done = PreloadedProcess("commissioner", [*arguments, *(("--no-diagnosis",) if is_quick else ())], cwd)
+    with closing(done):
+        answer = Answer(done.wait(timeout_s), done.stdout, done.stderr)
+    assert "Traceback" not in answer.stderr, answer.stderr
+    return answer
 
 
 def truth(scenario: str) -> Any:
     """The simulator's answer key."""
-    done = subprocess.run(
-        [sys.executable, "-m", "sim", "--scenario", scenario, "--truth"],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    return json.loads(done.stdout)
+    with closing(PreloadedProcess("sim", ["--scenario", scenario, "--truth"])) as done:
+        assert done.wait(60.0) == 0, done.stderr
+        return json.loads(done.stdout)
 
 
 def at_flux(key: Any, stator_flux_wb: float) -> dict[str, float]:

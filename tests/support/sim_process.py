@@ -7,14 +7,11 @@ with SimProcess("--tcp", "0") as sim:
 from __future__ import annotations
 
 import json
-import os
-import selectors
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 from types import TracebackType
+
+from tests.support.preloaded import PreloadedProcess
 
 START_S = 120.0
 """The first start on a fresh machine compiles the simulator's kernels."""
@@ -26,13 +23,15 @@ class SimProcess:
     def __init__(self, *arguments: str, speed: str = "max") -> None:
         self._folder = tempfile.TemporaryDirectory()
         self.log_file = Path(self._folder.name) / "state.jsonl"
-        self._command = [sys.executable, "-m", "sim", "--speed", speed, "--state-log", str(self.log_file), *arguments]
+        self._arguments = ["--speed", speed, "--state-log", str(self.log_file), *arguments]
 
     def __enter__(self) -> SimProcess:
-        self._process = subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL
-        )
-        kind, address = self._listening().split()[1:3]
+        self._process = PreloadedProcess("sim", self._arguments)
+        line = self._process.first_line(START_S)
+        if not line.startswith("listening "):
+            self._process.kill()
+            raise AssertionError(f"sim did not start: {line} {self._process.stderr}")
+        kind, address = line.split()[1:3]
         self.url = {
             "tcp": f"tcp://{address}",
             "tls": f"tls://{address}",
@@ -43,27 +42,9 @@ class SimProcess:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._process.kill()
-        self._process.communicate()
+        self._process.close()
         self._folder.cleanup()
 
     def log(self) -> list[dict[str, object]]:
         """The simulator's own record of states, writes and trips so far."""
         return [json.loads(line) for line in self.log_file.read_text().splitlines() if line.endswith("}")]
-
-    def _listening(self) -> str:
-        assert self._process.stdout is not None
-        line, end = b"", time.monotonic() + START_S
-        with selectors.DefaultSelector() as ready:
-            ready.register(self._process.stdout, selectors.EVENT_READ)
-            while not line.endswith(b"\n") and time.monotonic() < end:
-                if ready.select(0.2):
-                    piece = os.read(self._process.stdout.fileno(), 4096)
-                    if not piece:
-                        break
-                    line += piece
-        text = line.decode()
-        if not text.startswith("listening "):
-            self._process.kill()
-            raise AssertionError(f"sim did not start: {text} {self._process.communicate()[1].decode()}")
-        return text.splitlines()[0]

@@ -85,7 +85,12 @@ def fit_segments(
 
 
 def _step(problem: Problem, at: Evaluation, theta: Matrix, damping: float) -> Matrix:
-    free = np.flatnonzero(problem.free)
+    """Levenberg-Marquardt step of all that is free and not held by its bound: a step cut off there would be the wrong one for
+    the others, and the fit creep along the bound for hundreds of steps."""
+    low, high = _bounds(problem)
+    score = at.score[: theta.size]
+    is_held = ((theta <= low) & (score < 0.0)) | ((theta >= high) & (score > 0.0))
+    free = np.flatnonzero(problem.free & ~np.append(is_held, np.zeros(problem.total - theta.size, dtype=bool)))
     information = at.information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     normal = information / np.outer(scale, scale)
@@ -99,13 +104,19 @@ def _step(problem: Problem, at: Evaluation, theta: Matrix, damping: float) -> Ma
     return np.asarray(step * min(1.0, 0.5 / max(relative, 1e-300)))
 
 
+def _bounds(problem: Problem) -> tuple[Matrix, Matrix]:
+    """Between which the shared parameters lie."""
+    low, high = np.full(problem.model.size, -np.inf), np.full(problem.model.size, np.inf)
+    low[:CIRCUIT], high[:CIRCUIT] = problem.bounds
+    low[DELAY], high[DELAY] = -problem.period_s, 2.0 * problem.period_s
+    return low, high
+
+
 def _apply(problem: Problem, theta: Matrix, own: Matrix, step: Matrix) -> tuple[Matrix, Matrix]:
-    new_theta = theta + step[: problem.model.size]
-    new_theta[:CIRCUIT] = np.clip(new_theta[:CIRCUIT], *problem.bounds)
+    new_theta = np.clip(theta + step[: problem.model.size], *_bounds(problem))
     if problem.model.leg is not None:
         part = problem.model.leg_slice
         new_theta[part] = problem.model.leg.admissible(new_theta[part])
-    new_theta[DELAY] = float(np.clip(new_theta[DELAY], -problem.period_s, 2.0 * problem.period_s))
     new_own = own + step[problem.model.size :].reshape(own.shape)
     if not problem.model.with_drift:
         new_own[:, 0] = new_own[0, 0]

@@ -1,9 +1,6 @@
 """Runs to a service: only with an account that may, only what it lacks, whole or not at all."""
 
-import json
 import shutil
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import httpx
@@ -16,6 +13,7 @@ from commissioner.records import SampleBlock
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.verify import verify
 from commissioner.service.access.accounts import Accounts, Role
+from tests.support.command_line import call
 from tests.support.service_process import ServiceProcess
 
 OTTO, VERA = Account("otto", "operating 1234"), Account("vera", "watching 1234")
@@ -87,11 +85,10 @@ def test_a_run_arrives_bit_for_bit_and_a_second_push_sends_nothing(service, run)
 def test_the_command_line_reads_the_password_from_a_file(service, run, tmp_path):
     secret = tmp_path / "password"
     secret.write_text(OTTO.password + "\n", encoding="utf-8")
-    command = [sys.executable, "-m", "commissioner", "runs", "push", service.url, run.name, "--runs", str(run.parent), "--account", "otto",
-               "--password-file", str(secret), "--json"]  # fmt: skip
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert [one["what"] for one in json.loads(done.stdout)["runs"]] == ["copied"]
+    done = call("runs", "push", service.url, run.name, "--runs", str(run.parent), "--account", "otto",
+                "--password-file", str(secret), "--json")  # fmt: skip
+    assert done.code == 0, done.stdout + done.stderr
+    assert [one["what"] for one in done.json["runs"]] == ["copied"]
 
 
 @pytest.mark.parametrize(

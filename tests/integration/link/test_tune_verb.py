@@ -5,12 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import pytest
 
 from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.runs.feed import Feed
 from tests.support.command_line import call
+from tests.support.preloaded import PreloadedProcess
 
 
 class Vendor:
@@ -78,9 +80,9 @@ def test_what_cannot_be_is_one_clear_refusal_before_anything_is_sent(tmp_path):
 def test_stop_from_the_page_ends_a_tuning_that_the_command_line_began(tmp_path):
     """By the file in its folder; the service's fold over its journal says energised while the drive tunes itself."""
     with Vendor("schneider_atv340", "--tuning-s", "20") as drive:
-        command = [sys.executable, "-m", "commissioner", "tune", "--drive", drive.url, "--profile", "schneider_atv340", "--motor", "motor_2kw2",
-                   "--runs", str(tmp_path), "--pause", "0", "--yes", "--json", "--hardwired-stop"]  # fmt: skip
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        arguments = ["tune", "--drive", drive.url, "--profile", "schneider_atv340", "--motor", "motor_2kw2",
+                     "--runs", str(tmp_path), "--pause", "0", "--yes", "--json", "--hardwired-stop"]  # fmt: skip
+        with closing(PreloadedProcess("commissioner", arguments)) as process:
             end = time.monotonic() + 120
             while not (found := list(tmp_path.glob("*/journal.jsonl"))) or '"tune"' not in found[0].read_text("utf-8"):
                 assert time.monotonic() < end
@@ -90,11 +92,12 @@ def test_stop_from_the_page_ends_a_tuning_that_the_command_line_began(tmp_path):
                 pass
             assert (feed.state.output, feed.state.phase) == ("on", "tuning")
             ask_to_stop(found[0].parent, "otto", "seen on the page")
-            document = json.loads(process.communicate(timeout=60)[0])
+            code = process.wait(60.0)
+            document = json.loads(process.stdout)
         while feed.poll():
             pass
         feed.close()
-    assert process.returncode == 4
+    assert code == 4
     assert document["error"]["value"] == "seen on the page (otto)"
     assert document["tune"]["in_the_drive"] == "as before, read back"
     assert feed.state.is_over and feed.state.stop["person"] == "otto"

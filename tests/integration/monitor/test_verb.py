@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ import pytest
 
 from commissioner.recordings.table import write_table
 from sim.recordings.running import load_scenario, record
+from tests.support.command_line import call
 
 DATA = Path(__file__).parents[2] / "data"
 COLUMNS = ["time_s", "shaft_angle_rad", "speed_rad_per_s", "electromagnetic_torque_nm", "load_torque_nm"]
@@ -43,14 +42,8 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def command(*arguments: str) -> tuple[int, str, str]:
-    done = subprocess.run(
-        [sys.executable, "-c", "from commissioner.cli.app import main; main()", "monitor", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+    done = call("monitor", *arguments, timeout_s=240.0)
+    return done.code, done.stdout, done.stderr
 
 
 def test_json_waveforms_and_report(recordings: dict[str, Path], tmp_path: Path) -> None:

@@ -4,8 +4,6 @@ import contextlib
 import json
 import re
 import stat
-import subprocess
-import sys
 import time
 from concurrent.futures import CancelledError
 from pathlib import Path
@@ -23,6 +21,7 @@ from commissioner.service.access.throttle import Throttle
 from commissioner.service.application import create_app
 from commissioner.service.audit import Audit, verify
 from commissioner.service.configuration import DriveTable, ServiceFile, Settings, TlsTable, check_may_listen
+from tests.support.command_line import call
 
 PASSWORDS = {"vera": "watching 1234", "otto": "operating 1234", "ada": "administering 1234"}
 ROLES = {"vera": Role.VIEWER, "otto": Role.OPERATOR, "ada": Role.ADMINISTRATOR}
@@ -119,22 +118,9 @@ def test_another_host_needs_tls_and_accounts(tmp_path, host):
 
 
 def test_serve_refuses_another_host_before_it_listens(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "commissioner",
-        "serve",
-        "--host",
-        "0.0.0.0",
-        "--port",
-        "0",
-        "--runs",
-        str(tmp_path),
-        "--json",
-    ]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2
-    assert json.loads(done.stdout)["error"]["value"] == "0.0.0.0"
+    done = call("serve", "--host", "0.0.0.0", "--port", "0", "--runs", str(tmp_path), "--json")
+    assert done.code == 2
+    assert done.json["error"]["value"] == "0.0.0.0"
 
 
 # --- whose page ---------------------------------------------------------------------------------------------------

@@ -283,6 +283,13 @@ def test_a_voltage_column_a_row_late_is_found_and_said():
     assert abs(identification_document(told)["time_shift_periods"]["value"]) == pytest.approx(1.0, abs=0.01)
 
 
+def test_a_coarse_look_that_says_seven_periods_of_a_sound_test_is_no_refusal(monkeypatch):
+    monkeypatch.setattr("commissioner.identify.analysis.periods_late", lambda *_: 7.4)
+    found = identify(recording())
+    assert found.time_shift.periods == 0
+    assert found.parameters.as_tuple() == pytest.approx(TRUTH, rel=0.01)
+
+
 def test_an_axis_some_degrees_off_is_refused_and_a_few_are_told():
     assert "named axis" in str(refused(changed(axis_deg=np.full(recording().time_s.size, 20.0))))
     result = identify(changed(axis_deg=np.full(recording().time_s.size, 26.0)))
