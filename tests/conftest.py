@@ -56,16 +56,6 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-NOT_YET_IN_CI = (
-    "test_a_whole_commissioning_by_clicks",
-    "test_a_page_that_has_lost_the_service_says_what_it_cannot_do",
-    "test_two_drives_each_with_its_run_and_one_whose_process_is_killed",
-    "test_a_run_from_the_command_line_is_shown_and_can_be_stopped_from_the_page",
-    "test_a_killed_service_leaves_zero_volts_and_its_successor_explains_what_was",
-    "test_no_request_breaks_the_service_or_energises",
-)
-"""Of the service, not seen passing to their end on a quiet machine: run by `pytest -m campaign tests/integration/service` until
-they are."""
 TOGETHER = ("integration/service",)
 """Folders whose tests share a costly fixture of a whole session: one worker has them all."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
@@ -80,7 +70,7 @@ USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     at_night = set(NIGHT.read_text("utf-8").split("\n"))
     for item in items:
-        if item.name.split("[")[0] in NOT_YET_IN_CI or item.nodeid in at_night:
+        if item.nodeid in at_night:
             item.add_marker(pytest.mark.campaign)
         is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
         if is_listed and item.name.split("[")[0] not in NOT_REALTIME:

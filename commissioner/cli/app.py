@@ -235,6 +235,12 @@ def tune(
         bool, typer.Option("--power-cycle", help="Ask for the drive to be switched off and on, then read it again.")
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before energising.")] = False,
+    dead_man: Annotated[
+        bool,
+        typer.Option(
+            "--dead-man", help="Held by a service, as `run`; it answers what the person at the drive is asked."
+        ),
+    ] = False,
     procedure: Procedure = None,
     runs: Runs = RUNS,
     json: Json = False,
@@ -246,7 +252,7 @@ def tune(
     request = TuneRequest(
         drive, profile, motor, runs, repeat, pause, write_back, hardwired_stop, power_cycle, procedure
     )
-    verb(request, yes=yes, as_json=json)
+    verb(request, yes=yes, as_json=json, dead_man=dead_man)
 
 
 @app.command()
@@ -266,6 +272,7 @@ def identify(
     profile: Annotated[str | None, typer.Option("--profile", help="Drive file, for --write-back.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
     procedure: Procedure = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the report with its pictures.")] = None,
     runs: Runs = RUNS,
     mapping: Map = None,
     trust: Trust = None,
@@ -276,7 +283,7 @@ def identify(
     from commissioner.cli.verbs.identify import identify_and_write
     from commissioner.operations.recordings.identify import IdentifyRequest
 
-    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust)
+    request = IdentifyRequest(tuple(files), motor, estimator, mapping, trust, out)
     if write_back:
         identify_and_write(request, drive=drive, profile=profile, yes=yes, procedure=procedure, runs=runs, as_json=json)
     else:

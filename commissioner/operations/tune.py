@@ -10,15 +10,13 @@ from commissioner.link.drive.ordinary.tuning import Operator
 from commissioner.link.files.drive_file import load_profile
 from commissioner.operations.events import Observe, nobody
 from commissioner.registers.profile import DriveProfile
-from commissioner.run.commission import Commissioned
+from commissioner.registers.tuning import MOST_REPEATS, REPEATS
+from commissioner.run.commission import Commissioned, Origin
 from commissioner.run.tuning.tune import TunedOnce, TuneOrder, TuningBegan, order_of
 from commissioner.run.tuning.tune import tune as carry_out
 from commissioner.settings import load_motor, load_procedure
 
 __all__ = ["REPEATS", "TuneRequest", "TunedOnce", "TuningBegan", "check_request", "tune"]
-
-REPEATS = 3
-MOST_REPEATS = 20
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,11 @@ def check_request(request: TuneRequest) -> DriveProfile:
     return profile
 
 
-def tune(request: TuneRequest, operator: Operator, observe: Observe = nobody) -> Commissioned:
+def tune(
+    request: TuneRequest, operator: Operator, observe: Observe = nobody, origin: Origin | None = None
+) -> Commissioned:
     """Lets the drive energise the motor. Configuration errors are raised; from the first request on every end is a run."""
-    return carry_out(_order(request, load_profile(request.profile)), request.runs, operator, observe)
+    return carry_out(_order(request, load_profile(request.profile)), request.runs, operator, observe, origin=origin)
 
 
 def _order(request: TuneRequest, profile: DriveProfile) -> TuneOrder:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from commissioner.identify.excite.current_flux import CurrentFlux
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.records import SampleBlock, Signal, StandstillRecording
@@ -57,6 +56,8 @@ def highest_stator_flux_wb(blocks: Iterable[tuple[int, SampleBlock]], machine: I
 
     Each segment begins without voltage: what its sensors show then is offset.
     """
+    from commissioner.identify.excite.current_flux import CurrentFlux  # scipy: not for who only lists an archive
+
     highest, current, flux, offset_a = 0.0, None, None, 0.0
     for segment, block in blocks:
         if block.count == 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -37,3 +37,10 @@ def folder_to_write(path: Path) -> Path:
             remedy="choose another --out",
         ) from error
     return path
+
+
+def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    """Each text under its name, whole."""
+    for name, text in texts.items():
+        with whole_file(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")

@@ -14,6 +14,8 @@ from commissioner.errors import ConfigurationError
 from commissioner.registers.profile import DriveProfile, is_a_lead
 
 FACTS = ("standstill", "start", "finished", "failed", "stop")
+REPEATS, MOST_REPEATS = 3, 20
+"""How often a drive is let tune itself, where nobody says otherwise and at most."""
 NO_VALUES: Mapping[int, str] = MappingProxyType({})
 
 

@@ -17,10 +17,11 @@ from starlette.types import Scope
 from commissioner.service import problems
 from commissioner.service.access.gate import Gate
 from commissioner.service.page import views
-from commissioner.service.page.frame import prepare
+from commissioner.service.page.frame import prepare, prepare_causes
 from commissioner.service.parts import Parts
 from commissioner.service.routes import all_routers
 
+CAUSES_S = 5.0
 STATIC = Path(__file__).parent / "page" / "static"
 
 
@@ -30,7 +31,7 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     @contextlib.asynccontextmanager
     async def lifetime(_app: FastAPI) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(parts.desk.look_around()), asyncio.create_task(parts.warm.work())]
-        tasks.append(asyncio.create_task(asyncio.to_thread(prepare)))
+        tasks.append(asyncio.create_task(_prepare()))
         tell = asyncio.get_running_loop().call_later(0.0, ready)
         try:
             yield
@@ -63,6 +64,12 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     app.include_router(views.router, include_in_schema=False)
     app.mount("/static", _Static(directory=STATIC), name="static")
     return app
+
+
+async def _prepare() -> None:
+    await asyncio.to_thread(prepare)
+    await asyncio.sleep(CAUSES_S)
+    await asyncio.to_thread(prepare_causes)
 
 
 class _Static(StaticFiles):

@@ -68,7 +68,7 @@ class Archive:
                 step="archive",
                 value=run[:80],
                 limit="a run of this archive",
-                remedy="GET /api/runs lists them",
+                remedy="choose one from the list of runs",
             )
         return entry
 

@@ -129,7 +129,7 @@ class Recordings:
         ]
         arguments = [job.verb, *(files if job.verb != "monitor" else files[:1]), "--json"]
         arguments += ["--motor", motor] if motor else []
-        arguments += ["--out", str(out)] if job.verb != "identify" else []
+        arguments += ["--out", str(out)]
         try:
             async with self._one_at_a_time:
                 job.exit_code, job.document = await ask(arguments, job.folder / "said.txt", LONGEST_S)

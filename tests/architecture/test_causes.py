@@ -16,6 +16,7 @@ OTHER_MEANING = {
     ("monitor/intake/levels.py", "clipping"),
     ("report/run/appendix.py", "lost_samples"),
     ("report/run/certificate.py", "lost_samples"),
+    ("report/identification/page.py", "lost_samples"),
 }
 """Counts of an identification's own audit, and a level of the monitor's: no diagnosis has a part in them."""
 

@@ -55,7 +55,7 @@ class Technician:
         self.page, self.service, self.words = page, service, WORDS[language]
         self.complaints: list[str] = []
         page.on("console", self._hear)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("pageerror", lambda error: self.complaints.append(error.stack or str(error)))
         page.on(
             "request",
             lambda request: (

@@ -72,6 +72,10 @@ class ServiceProcess:
         for pid in self._simulators():
             os.kill(pid, signal.SIGKILL)
 
+    def page(self, path: str) -> str:
+        """A page as a browser gets it that was never here before; the scripts' client stays without a session."""
+        return httpx.get(self.url + path, headers={"accept": "text/html"}, timeout=90.0).text
+
     def start_simulator(self, scenario: str = "default") -> None:
         answer = self.client.post("/api/simulator", json={"scenario": scenario})
         assert answer.status_code == 201, answer.text
@@ -89,9 +93,9 @@ class ServiceProcess:
         return str(answer.json()["id"])
 
     def wait_for(self, run: str, reached: Any, timeout_s: float = 200.0) -> dict[str, Any]:
-        """The run's document as soon as `reached` says so of it."""
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end:
+        """The run's document as soon as `reached` says so of it; not waited for where the run has ended without."""
+        end, document = time.monotonic() + timeout_s, dict[str, Any]()
+        while time.monotonic() < end and document.get("outcome") is None:
             document = self.client.get(f"/api/runs/{run}").json()
             if reached(document):
                 return document

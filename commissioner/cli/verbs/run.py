@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from pathlib import Path
 
 from rich.markup import escape
 
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.ending import show_and_exit
+from commissioner.cli.screens.ending import say_folder, show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.cli.signals import let_end
 from commissioner.operations.check import CheckRequest, check
@@ -44,14 +42,9 @@ def hold_and_commission(request: CommissionRequest) -> None:
     held.start()
     facts = held.wait_for_begin()
     with stop:
-        done = commission(request, origin=Origin(facts, _say_folder, stop))
+        done = commission(request, origin=Origin(facts, say_folder, stop))
         let_end()
     show_and_exit(done, as_json=True)
-
-
-def _say_folder(folder: Path) -> None:
-    sys.stdout.write(json.dumps({"run": folder.name, "folder": str(folder)}) + "\n")
-    sys.stdout.flush()
 
 
 def _ask(request: CommissionRequest) -> None:

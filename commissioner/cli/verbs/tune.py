@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import typer
 
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.ending import EXIT_CODES
+from commissioner.cli.screens.ending import EXIT_CODES, say_folder
+from commissioner.cli.signals import let_end
 from commissioner.errors import UsageError
 from commissioner.operations.tune import TunedOnce, TuneRequest, TuningBegan, check_request
 from commissioner.operations.tune import tune as carry_out
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
+from commissioner.run.commission import Origin
+from commissioner.run.stopping.dead_man import DeadMan
 from commissioner.run.stopping.operator_stop import OperatorStop
 
 
@@ -32,8 +36,45 @@ class AtTheTerminal:
         return self._stop.asked
 
 
-def tune(request: TuneRequest, *, yes: bool, as_json: bool) -> None:
+class AtThePage:
+    """The person at the drive, asked on a service's page: the journal asks, the answer comes by the service's pipe."""
+
+    def __init__(self, held: DeadMan, stop: OperatorStop) -> None:
+        self._held, self._stop, self._asked = held, stop, 0
+
+    def does(self, text: str) -> bool:
+        """True where the person says yes. A stop meanwhile is a no; what is asked after one is answered all the same."""
+        self._asked += 1
+        before = self._stop.asked
+        while not self._held.is_gone and self._stop.asked == before:
+            if (is_done := self._held.answer(self._asked)) is not None:
+                return is_done
+        return False
+
+    def wants_stop(self) -> str:
+        return self._stop.asked
+
+
+def hold_and_tune(request: TuneRequest) -> None:
+    """A tune that a service holds by the pipe at our standard input, as `run --dead-man`."""
+    check_request(request)
+    stop = OperatorStop()
+    held = DeadMan(sys.stdin.fileno(), stop)
+    held.start()
+    facts = held.wait_for_begin()
+    with stop:
+        done = carry_out(request, AtThePage(held, stop), _quiet, Origin(facts, say_folder, stop))
+        let_end()
+    screen.emit({**done.result, "folder": str(done.folder)})
+    if code := EXIT_CODES[done.ended.outcome]:
+        raise SystemExit(code)
+
+
+def tune(request: TuneRequest, *, yes: bool, as_json: bool, dead_man: bool = False) -> None:
     """Asks, tunes, judges; exits with the code of the outcome."""
+    if dead_man:
+        hold_and_tune(request)
+        return
     profile = check_request(request)
     tuning = profile.tuning
     assert tuning is not None

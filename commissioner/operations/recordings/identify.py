@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.analysis import Identification
 from commissioner.identify.analysis import identify as analyse
@@ -30,6 +32,7 @@ from commissioner.operations.recordings.trust import (
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import to_standstill
+from commissioner.recordings.whole import folder_to_write, write_texts
 from commissioner.records import StandstillRecording
 from commissioner.settings import load_motor, load_procedure
 
@@ -40,13 +43,14 @@ PAUSE_S = 10.0
 @dataclass(frozen=True)
 class IdentifyRequest:
     """`motor` overrides the recordings' metadata; `estimator`: pao | lyapunov | nls; `mapping`: what their channels are.
-    `trust`: plate | data, where the two contradict each other."""
+    `trust`: plate | data, where the two contradict each other. `out`: a folder for `report.html` and `identification.json`."""
 
     files: tuple[Path, ...]
     motor: str | None = None
     estimator: str = "pao"
     mapping: Path | None = None
     trust: str | None = None
+    out: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -86,12 +90,14 @@ def identify_any(
 
     said = read_mapping(request.mapping) if request.mapping else None
     tables = [contract_table(path, said, request.motor) for path in request.files]
+    if request.out is not None:
+        folder_to_write(request.out)
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     if not any(is_running(t) for t in tables):
         return identify(request, observe)
     observe(Began("identifying"))
-    return IdentifiedRunning(identified(tables, request.motor), request.files)
+    return IdentifiedRunning(identified(tables, request.motor, request.out), request.files)
 
 
 def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
@@ -105,7 +111,20 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     found, decided = _with_the_plate(recording, plate, cast("Estimator", request.estimator), trust)
     document: IdentifiedDocument = {**identification_document(found), "flux_guard": _flux_reached(found), "written": []}
     document["remarks"] = [*decided, *document["remarks"]]
+    if request.out is not None:
+        _write(request, found, document)
     return Identified(document, found, plate, request.files)
+
+
+def _write(request: IdentifyRequest, found: Identification, document: IdentifiedDocument) -> None:
+    from commissioner.report.identification.page import identification_page
+
+    assert request.out is not None
+    text = identification_page(found, document, ", ".join(path.name for path in request.files))
+    write_texts(
+        folder_to_write(request.out),
+        {"report.html": text, "identification.json": json.dumps(plain(document), indent=2)},
+    )
 
 
 def _with_the_plate(

@@ -16,7 +16,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.operations.events import GoOn, Observe
 from commissioner.recordings.plate import plate_of
 from commissioner.recordings.table import Table, read_table, to_running, write_table
-from commissioner.recordings.whole import whole_file
+from commissioner.recordings.whole import write_texts
 from commissioner.records import RunningRecording
 from commissioner.running.diagnosis import Diagnosis
 from commissioner.running.search import Step
@@ -84,19 +84,27 @@ def diagnosed(
             texts["model.json"] = json.dumps(plain(model_document(seen.found, seen.record)), indent=1)
         texts["report.html"] = render(page_of(seen, document, ", ".join(Path(t.source).name for t in tables)))
         texts["diagnosis.json"] = json.dumps(plain(document), indent=2)
-        for name, text in texts.items():
-            with whole_file(out / name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
+        write_texts(out, texts)
     return document, seen
 
 
-def identified(tables: Sequence[Table], motor: str | None) -> dict[str, Any]:
-    """The document of an identification from a start, load steps or several steady loads. DataRefused where they cannot carry it."""
+def identified(tables: Sequence[Table], motor: str | None, out: Path | None = None) -> dict[str, Any]:
+    """The document of an identification from a start, load steps or several steady loads. DataRefused where they cannot carry it.
+
+    `out`: a folder for its report.
+    """
     from commissioner.running.identification import as_document, identify
 
     recordings, plate = readable(tables, motor, "identify")
-    document = as_document(identify(recordings, plate))
-    return cast("dict[str, Any]", plain(document))
+    found = identify(recordings, plate)
+    document = cast("dict[str, Any]", plain(as_document(found)))
+    if out is not None:
+        from commissioner.report.page import render
+        from commissioner.report.running.identified import page_of
+
+        text = render(page_of(found, document, ", ".join(Path(t.source).name for t in tables)))
+        write_texts(out, {"report.html": text, "identification.json": json.dumps(document, indent=2)})
+    return document
 
 
 def is_running_model(document: Mapping[str, Any]) -> bool:

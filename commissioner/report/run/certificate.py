@@ -41,7 +41,7 @@ def certificate(subject: Subject) -> Markup:
         parts.append(marks.table(_COLUMNS, _rows(subject)))
         parts.append(
             marks.side_by_side(
-                marks.section("What the values hold for", marks.facts(_conditions(subject))),
+                marks.section("What the values hold for", marks.facts(conditions(subject))),
                 marks.section("What to do next", marks.actions(_next(subject))),
             )
         )
@@ -70,13 +70,13 @@ def _said(subject: Subject) -> tuple[str, str]:
             f"Each value is surer than it must be{agree}, and no limit was reached. Nothing was written into the drive.",
         )
     if subject.is_good and not subject.parameters:
-        return "Commissioned", f"{_sentence(str(subject.result['reason']))} {_kept(subject) if subject.written else ''}"
+        return "Commissioned", f"{sentence(str(subject.result['reason']))} {_kept(subject) if subject.written else ''}"
     if subject.is_good:
         return (
             f"Commissioned: {_counted(len(subject.written))} values accepted, written and read back",
             f"Each value is surer than it must be{agree}, and no limit was reached. {_kept(subject)}",
         )
-    reason = _sentence(str(subject.result["reason"]))
+    reason = sentence(str(subject.result["reason"]))
     if subject.outcome == "rejected":
         return "Not good enough: nothing written", f"{reason} The drive is as it was found."
     title = {"aborted": "Aborted", "faulted": "Broken off by a fault"}.get(
@@ -99,7 +99,7 @@ def _remedies(subject: Subject) -> Iterator[Text]:
     for remedy in (error.get("remedy"), *(o["remedy"] for o in subject.result.get("objections") or ())):
         if remedy and remedy not in seen:
             seen.add(remedy)
-            yield marks.coded(_sentence(str(remedy)))
+            yield marks.coded(sentence(str(remedy)))
     if subject.written:
         yield marks.coded(f"Put the old values back: `commissioner restore {subject.run}`")
     yield "Go through the checks again, then measure again." if seen else "Measure again."
@@ -115,14 +115,14 @@ def _why(subject: Subject) -> Markup:
             Column("What makes it better"),
         )
         rows: list[tuple[Text, ...]] = [
-            (_worded(str(o["what"])), _bold(o["value"]), _shown(o["limit"]), marks.coded(_sentence(str(o["remedy"]))))
+            (_worded(str(o["what"])), _bold(o["value"]), _shown(o["limit"]), marks.coded(sentence(str(o["remedy"]))))
             for o in objections
         ]
         return marks.section("Why", marks.table(columns, rows), kind="why")
     columns = (Column("Step"), Column("Seen", right=True), Column("Limit", right=True), Column("What happened"))
     row = (
         str(error.get("step") or "—"), _bold(error.get("value")), _shown(error.get("limit")),
-        _sentence(str(error.get("what") or subject.result["reason"])),
+        sentence(str(error.get("what") or subject.result["reason"])),
     )  # fmt: skip
     return marks.section("Why", marks.table(columns, [row]), kind="why")
 
@@ -283,7 +283,8 @@ def _held(quantity: Quantity, row: Record | None, half: float, subject: Subject)
     )
 
 
-def _conditions(subject: Subject) -> Iterator[tuple[Text, Text]]:
+def conditions(subject: Subject) -> Iterator[tuple[Text, Text]]:
+    """What the values hold for: flux, temperature, circuit, and what an interval does not say."""
     result = subject.result
     flux, rated = result["holds_for_stator_flux_wb"], result["rated_flux_wb"]["stator_peak"]
     yield (
@@ -346,9 +347,9 @@ def _next(subject: Subject) -> Iterator[Text]:
     longer = subject.findings.longer_test
     if longer is not None:
         yield (
-            _sentence(longer.sentence.replace("standard errors", "intervals"))
+            sentence(longer.sentence.replace("standard errors", "intervals"))
             if "nothing" in longer.sentence
-            else _sentence(longer.sentence)
+            else sentence(longer.sentence)
         )
 
 
@@ -453,7 +454,8 @@ def _bold(value: object) -> Markup:
     return Markup("<b>{}</b>").format(_shown(value))
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
+    """Begun with a capital, ended with a mark."""
     text = text.strip()
     return f"{text[:1].upper()}{text[1:]}" + ("" if text.endswith((".", "!", "?")) else ".")
 

@@ -32,19 +32,19 @@ def evidence(subject: Subject) -> Markup:
     parts = [
         Markup("<h2>The evidence</h2>"),
         _limits_kept(subject),
-        _against_simulation(subject),
+        against_simulation(subject),
         _while_measuring(subject),
-        Markup('<div class="p3">{}{}{}</div>').format(_tests_apart(subject), _leg_loss(subject), _iron(subject)),
+        Markup('<div class="p3">{}{}{}</div>').format(tests_apart(subject), leg_loss(subject), iron(subject)),
     ]
     return Markup("\n").join(parts)
 
 
 def _limits_kept(subject: Subject) -> Markup:
     tests, trip, flux_limit = subject.tests[:MOST_TESTS], subject.trip_current_a, subject.guard.get("limit_wb")
-    currents = _panels_over_time(
+    currents = panels_over_time(
         tests, "current_a", trip, f"limit {digits(trip, 3)} A" if trip else "", "Current along the axis"
     )
-    fluxes = _panels_over_time(
+    fluxes = panels_over_time(
         tests, "stator_flux_wb", flux_limit, f"limit {digits(flux_limit, 3)} Wb" if flux_limit else "", "Stator flux"
     )
     titles = [f"Test {test.number}, axis {test.axis_deg:g}°" for test in tests]
@@ -65,7 +65,7 @@ def _limits_kept(subject: Subject) -> Markup:
     )
 
 
-def _panels_over_time(tests: Sequence[Test], what: str, limit: float | None, named: str, label: str) -> list[Markup]:
+def panels_over_time(tests: Sequence[Test], what: str, limit: float | None, named: str, label: str) -> list[Markup]:
     """One panel a test, all with one scale, the limit named in the first."""
     series = [test.joined(what) for test in tests]
     largest = max((float(np.max(np.abs(value))) for _, value in series if value.size), default=1.0)
@@ -85,7 +85,8 @@ def _panels_over_time(tests: Sequence[Test], what: str, limit: float | None, nam
     return drawn
 
 
-def _against_simulation(subject: Subject) -> Markup:
+def against_simulation(subject: Subject) -> Markup:
+    """A stretch of the last test, measured on simulated, and what each test's residual is over time."""
     test = subject.tests[-1]
     fitted = [s for s in test.sessions if s.residual_a is not None]
     if not fitted:
@@ -227,7 +228,8 @@ def _convergence(subject: Subject, tests: Sequence[Sequence[Record]], index: int
     return panel.drawn()
 
 
-def _tests_apart(subject: Subject) -> Markup:
+def tests_apart(subject: Subject) -> Markup:
+    """Each test's values against the combined ones, with their intervals."""
     found = subject.findings.identification
     if found is None or not subject.parameters:
         return Markup("")
@@ -276,7 +278,8 @@ def _shares(
     return shares, bands
 
 
-def _leg_loss(subject: Subject) -> Markup:
+def leg_loss(subject: Subject) -> Markup:
+    """The voltage that one leg of the inverter loses over its current."""
     inverter = subject.result.get("inverter") or {}
     current, voltage, loss = inverter.get("leg_current_a"), inverter.get("leg_voltage_v"), inverter.get("leg_error_v")
     if not (current and voltage):
@@ -308,7 +311,8 @@ def _leg_loss(subject: Subject) -> Markup:
     return marks.figure("Inverter’s voltage loss", panel.drawn(), caption)
 
 
-def _iron(subject: Subject) -> Markup:
+def iron(subject: Subject) -> Markup:
+    """The magnetizing inductance over flux."""
     curve = subject.result.get("magnetizing_curve") or ()
     if not curve:
         return marks.figure("Magnetizing inductance", Markup(""), "Taken as straight: the samples do not bend it.")

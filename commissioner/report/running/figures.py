@@ -18,7 +18,8 @@ SHOWN_S = 0.16
 BAND_S = 0.02
 
 
-def _panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
+def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
+    """Axes in the pages' style, `(rows, columns)`."""
     import matplotlib as mpl
     from matplotlib.figure import Figure as Canvas
 
@@ -30,13 +31,13 @@ def _panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
 
 def over_each_other(found: Found) -> Figure:
     """Phase u: the first periods and the last ones, measured, plain simulation, extended one; below, what each leaves."""
-    figure, panels = _panels(2, 2, 5.2)
+    figure, drawn = panels(2, 2, 5.2)
     window = found.problem.record.windows[0]
     plain, extended = (simulate(found.problem, m)[0][0][:, 0] for m in (found.nominal.machine, found.fit.machine))
     count = round(SHOWN_S / found.problem.period)
     for column, part in enumerate((slice(0, count), slice(window.count - count // 2, window.count))):
         t = window.time_s[part]
-        top, below = panels[0, column], panels[1, column]
+        top, below = drawn[0, column], drawn[1, column]
         top.plot(t, window.current[part, 0], color=MUTED, linewidth=2.2, label="measured")
         top.plot(t, plain[part], color=ORANGE, linewidth=0.9, linestyle="--", label="plain simulation")
         top.plot(t, extended[part], color=BLUE, linewidth=0.9, label="with the named causes")
@@ -44,16 +45,16 @@ def over_each_other(found: Found) -> Figure:
         below.plot(t, window.current[part, 0] - plain[part], color=ORANGE, linewidth=0.9)
         below.plot(t, window.current[part, 0] - extended[part], color=BLUE, linewidth=0.9)
         below.set_xlabel("time / s")
-    panels[0, 0].set_ylabel("current alpha / A")
-    panels[1, 0].set_ylabel("measured - simulated / A")
-    panels[0, 0].legend(ncols=3, loc="upper right", fontsize=7)
+    drawn[0, 0].set_ylabel("current alpha / A")
+    drawn[1, 0].set_ylabel("measured - simulated / A")
+    drawn[0, 0].legend(ncols=3, loc="upper right", fontsize=7)
     return figure
 
 
 def over_time(found: Found) -> Figure:
     """Residual over noise in blocks of 20 ms, before and after; states shaded, the held-out part marked."""
-    figure, panels = _panels(1, 1, 3.0)
-    panel = panels[0, 0]
+    figure, drawn = panels(1, 1, 3.0)
+    panel = drawn[0, 0]
     window, until = found.problem.record.windows[0], found.problem.until[0]
     block = max(round(BAND_S / found.problem.period), 4)
     for machine, colour, label in (
@@ -86,8 +87,8 @@ def over_time(found: Found) -> Figure:
 
 def over_frequency(found: Found) -> Figure:
     """Spectrum of the whitened residual vector, negative sequence left, before and after."""
-    figure, panels = _panels(1, 1, 3.0)
-    panel = panels[0, 0]
+    figure, drawn = panels(1, 1, 3.0)
+    panel = drawn[0, 0]
     for machine, colour, label in (
         (found.nominal.machine, ORANGE, "plain simulation"),
         (found.fit.machine, BLUE, "with the named causes"),

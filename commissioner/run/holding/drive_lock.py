@@ -24,7 +24,7 @@ from commissioner.link.wire.url import DriveUrl
 from commissioner.records import DriveIdentity
 from commissioner.registers.profile import DriveProfile
 from commissioner.run.archive.documents import read_document
-from commissioner.run.archive.origin import this_process
+from commissioner.run.archive.origin import machine_part, this_process
 from commissioner.run.holding.endpoint import endpoint
 
 LOCKS = "COMMISSIONER_LOCKS"
@@ -37,7 +37,7 @@ POLL_S = 0.05
 
 @dataclass(frozen=True)
 class Holder:
-    """Who holds a drive: for `doing`, since when. `token`: what stands in the drive's own claim."""
+    """Who holds a drive: for `doing`, since when. `token`: what stands in the drive's own claim; see `is_of_here`."""
 
     person: str
     host: str
@@ -68,9 +68,7 @@ class DriveLock:
         """The lock on the drive at the URL. DriveInUse names who holds it; somebody who only looks is waited for."""
         origin = this_process()
         since = dt.datetime.now(dt.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-        holder = Holder(
-            origin.person, origin.host, origin.process, doing, "", since, str(url), secrets.randbelow(0xFFFFFFFE) + 1
-        )
+        holder = Holder(origin.person, origin.host, origin.process, doing, "", since, str(url), _new_token())
         return cls(holder, endpoint(url, profile.link.device_id))
 
     def name_run(self, run: str) -> None:
@@ -136,11 +134,34 @@ def find_holder(token: int) -> tuple[Holder | None, bool]:
     return None, False
 
 
+def is_of_here(token: int) -> bool:
+    """Whether a claim was put on its drive by a process that shares our locks. What became of that one its lock says, and
+    where its record was overwritten by whoever took the lock after it, it is gone."""
+    return token >> 8 == _here()
+
+
+def _here() -> int:
+    """24 bits that tell this computer, with this folder of locks, from others."""
+    marks = f"{machine_part()} {locks_folder()}"
+    return int.from_bytes(hashlib.sha256(marks.encode()).digest()[:3], "big")
+
+
+def _new_token() -> int:
+    """32 bits, neither none (no claim) nor all of them (no value)."""
+    return _here() << 8 | secrets.randbelow(0xFE) + 1
+
+
 def holder_of(url: DriveUrl, profile: DriveProfile) -> Holder | None:
     """Who of this computer acts on the drive now; None where nobody does, or somebody only looks at it."""
     record = _record(endpoint(url, profile.link.device_id))
     held = _holder(record)
     return held if held is not None and held.doing != LOOK and _is_held(record) else None
+
+
+def runs_holding() -> frozenset[str]:
+    """The runs whose process has its drive now, whoever of this computer started them: a lock, unlike a record, dies with it."""
+    records = ((path, _holder(path)) for path in locks_folder().glob("*.json"))
+    return frozenset(held.run for path, held in records if held is not None and held.run and _is_held(path))
 
 
 def in_use(held: Holder | None, drive: str) -> DriveInUse:

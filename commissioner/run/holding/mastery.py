@@ -7,7 +7,7 @@ from contextlib import suppress
 from commissioner.errors import CommissionerError, DriveInUse
 from commissioner.link.drive.inverter import Inverter
 from commissioner.records import DriveIdentity
-from commissioner.run.holding.drive_lock import DriveLock, find_holder, in_use
+from commissioner.run.holding.drive_lock import DriveLock, find_holder, in_use, is_of_here
 
 
 class Mastery:
@@ -37,13 +37,13 @@ class Mastery:
         if claimed is None or claimed.token == self._lock.holder.token:
             return False
         local, is_alive = find_holder(claimed.token)
-        if local is None:
+        if local is None and not is_of_here(claimed.token):
             raise DriveInUse(
                 f"the drive is in use: {claimed.name or 'a master without a name'}, on another computer",
                 step="take the drive", value=f"claim 0x{claimed.token:08X} of {claimed.name!r}", limit="one master for one drive",
                 remedy=f"wait until that run has ended; without a sign of life its claim ends in {claimed.left_s} s",
             )  # fmt: skip
-        if is_alive:
+        if local is not None and is_alive:
             raise in_use(local, self._lock.holder.drive)
         return True
 

@@ -1,11 +1,13 @@
 """The pipe by which a service holds a run: while words come the run goes on; silence or its end means zero volts.
 
-One line each, UTF-8: `begin {"person": ..., ...}` once, `beat` twice a second, `stop {"person": ..., "reason": ...}`.
+One line each, UTF-8: `begin {"person": ..., ...}` once, `beat` twice a second, `stop {"person": ..., "reason": ...}`,
+`answer {"number": ..., "done": ...}` to a question that the run's journal asks.
 """
 
 from __future__ import annotations
 
 import os
+import queue
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -29,6 +31,9 @@ class DeadMan:
         self._heard = clock()
         self._begun = threading.Event()
         self._origin: Mapping[str, Any] = {}
+        self._answers: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
+        self.is_gone = False
+        """The service went away or fell silent: nobody answers any more."""
 
     def start(self) -> None:
         """Two threads: one reads, so that a word acts at once; one counts the silence."""
@@ -46,6 +51,14 @@ class DeadMan:
                 )  # fmt: skip
         return self._origin
 
+    def answer(self, number: int) -> bool | None:
+        """What was answered to question `number`, waited for a tick; None: nothing yet. Answers to others are dropped."""
+        try:
+            answered, is_done = self._answers.get(timeout=TICK_S)
+        except queue.Empty:
+            return None
+        return is_done if answered == number else None
+
     def _read(self) -> None:
         rest = b""
         # not sys.stdin: its lock, held by a thread that waits, would break the interpreter's end
@@ -53,6 +66,7 @@ class DeadMan:
             *lines, rest = (rest + piece).split(b"\n")
             for line in lines:
                 self._take(line.decode("utf-8", "replace").strip())
+        self.is_gone = True
         self._stop.ask(SERVICE, "the service that started this run is gone")
 
     def _take(self, line: str) -> None:
@@ -61,6 +75,8 @@ class DeadMan:
         said = read_document(rest)
         if word == "stop":
             self._stop.ask(str(said.get("person", "")), str(said.get("reason", "")) or "STOP")
+        elif word == "answer":
+            self._answers.put((int(said.get("number") or 0), said.get("done") is True))
         elif word == "begin":
             self._origin = said
             self._begun.set()
@@ -76,6 +92,7 @@ class DeadMan:
             silent_s += min(now - before, 2.0 * TICK_S)
             before = now
             if silent_s > SILENCE_S:
+                self.is_gone = True
                 self._stop.ask(SERVICE, f"nothing heard from the service for {SILENCE_S:g} s")
 
 

@@ -14,7 +14,7 @@ from commissioner.encoding import plain
 from commissioner.errors import Aborted, CheckFailed, CommissionerError, DriveFault, LinkError, UsageError
 from commissioner.link.drive.facts import Intent
 from commissioner.link.drive.inverter import Inverter
-from commissioner.link.drive.ordinary.tuning import Operator, Tuned
+from commissioner.link.drive.ordinary.tuning import REST, Operator, Tuned
 from commissioner.link.wire.port import Port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.nameplate import Nameplate
@@ -28,7 +28,7 @@ from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
 from commissioner.report.run.summary import summarise
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.commission import Commissioned, Order, write_report
+from commissioner.run.commission import Commissioned, Order, Origin, write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -98,18 +98,23 @@ def tune(
     *,
     open_port: Callable[[], Any] | None = None,
     clock: Clock | None = None,
+    origin: Origin | None = None,
 ) -> Commissioned:
     """Every end from the first request on is a run with a folder, which `restore` takes. `open_port`: a context of a port."""
+    origin = origin or Origin()
     order = wanted.order
     tuning = wanted.tuning
     _check_supervised(order.profile, tuning, hardwired_stop=wanted.hardwired_stop)
     found = TuneFindings()
     opened = open_port or (lambda: open_drive(order.url, order.profile, order.plan))
     with DriveLock.take(parse_url(order.url), order.profile, ACT) as lock:
-        facts = {"repeat": wanted.repeat, "pause_s": wanted.pause_s, "hardwired_stop": wanted.hardwired_stop}
-        folder = order.open_folder(runs, lock, tune=facts)
-        asked, time_taken = OperatorStop(), clock or Clock()
+        facts: dict[str, Any] = {
+            "tune": {"repeat": wanted.repeat, "pause_s": wanted.pause_s, "hardwired_stop": wanted.hardwired_stop}
+        }
+        folder = order.open_folder(runs, lock, **facts, **({"origin": origin.facts} if origin.facts else {}))
+        asked, time_taken = origin.stop or OperatorStop(), clock or Clock()
         with closing(folder), stopped_by_file(folder.path, asked):
+            origin.begun(folder.path)
             attended = _Attended(operator, asked, folder, time_taken.now)
             run = _Run(wanted, folder, found, attended, present, time_taken, earlier_values(runs, order.nameplate))
             ended = run.carry_out(opened, lock)
@@ -144,9 +149,15 @@ class _Attended:
         self._operator, self._stop, self._folder, self._now = operator, stop, folder, now
         self._told_s = now()
         self._wish: StopAsked | None = None
+        self._questions = 0
 
     def does(self, text: str) -> bool:
-        return self._operator.does(text)
+        """Asked where the tune was started; whoever follows the journal reads it, too."""
+        self._questions += 1
+        self._folder.journal("asked_at_drive", {"number": self._questions, "text": text}, durable=True)
+        is_done = self._operator.does(text)
+        self._folder.journal("answered_at_drive", {"number": self._questions, "done": is_done}, durable=True)
+        return is_done
 
     def wants_stop(self) -> str:
         if self._now() - self._told_s >= TELL_S:
@@ -240,10 +251,20 @@ class _Run:
             if number > 1:
                 self._pause(inverter)
             self._tell(TuningBegan(number, self._wanted.repeat))
-            done = tuner.once()
+            try:
+                done = tuner.once()
+            except CommissionerError as failure:
+                self._note_rest(failure)
+                raise
             self._found.repeats.append(done)
             self._folder.journal("tuned_once", done, durable=True)
             self._tell(TunedOnce(number, self._wanted.repeat, done))
+
+    def _note_rest(self, failure: CommissionerError) -> None:
+        """The last steps have run: where the file has one that looks, and it did not fail, the drive was seen at rest."""
+        looks = any(step.do in ("expect", "await") for step in self._wanted.tuning.finally_)
+        if looks and failure.step != REST:
+            note(self._folder, "tuning_ended", {"why": failure.what})
 
     def _pause(self, inverter: Inverter) -> None:
         """The motor cools; the drive is looked at meanwhile, so that its watchdog is fed and a trip is seen."""

@@ -6,10 +6,12 @@ import datetime as dt
 from dataclasses import dataclass
 
 from commissioner.records import drive_words
+from commissioner.report.run.standing import RESTORED_SINCE
 from commissioner.service.access.visitors import Visitor
 from commissioner.service.library import Drive
 from commissioner.service.page.texts import NBSP, Texts
 from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Control, Party
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.watch import Seen
@@ -112,7 +114,7 @@ def _of_run(run: LiveRun, t: Texts) -> _Said:
     if state.output == "unknown":
         return _take_as_live(t.gettext("The drive does not confirm that its output is off. Isolate its supply"), t)
     if state.output == "on" and state.phase == "tuning":
-        small = t.gettext("The drive tunes itself at standstill, started from the command line")
+        small = t.gettext("The drive tunes itself at standstill")
         return _Said("live", t.gettext("MOTOR ENERGISED"), small, t.gettext("Esc or Space"))
     if state.output == "on":
         return _Said("live", t.gettext("MOTOR ENERGISED"), _test_line(run, t), t.gettext("Esc or Space"))
@@ -214,7 +216,7 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
         )
     is_open = run is not None and run.feed.state.output != "off"
     if seen.status is not None and seen.age_s <= OLD_S and not seen.error:
-        return _by_status(run, seen, t)
+        return _by_status(run, _standing(parts, run), seen, t)
     if is_open:
         return _take_as_live(t.gettext("The drive does not answer. Isolate its supply"), t)
     if not seen.says_status and seen.age_s <= OLD_S:
@@ -234,7 +236,17 @@ def _at_rest(parts: Parts, run: LiveRun | None, drive: Drive | None, seen: Seen,
     return _Said("asking", t.gettext("State of the motor not known"), t.gettext("The drive is being asked"), nothing)
 
 
-def _by_status(run: LiveRun | None, seen: Seen, t: Texts) -> _Said:
+def _standing(parts: Parts, run: LiveRun | None) -> str:
+    """How the run stands now: what was written or restored after its end is in the archive."""
+    if run is None or run.feed.state.end is None:
+        return ""
+    try:
+        return parts.archive.find(run.id).standing
+    except Refusal:  # its end is not saved yet
+        return ""
+
+
+def _by_status(run: LiveRun | None, standing: str, seen: Seen, t: Texts) -> _Said:
     assert seen.status is not None
     if seen.status.is_energised:
         return _Said(
@@ -247,11 +259,11 @@ def _by_status(run: LiveRun | None, seen: Seen, t: Texts) -> _Said:
     word = t.say("The drive says: %(state)s", state=t.gettext(seen.status.state))
     if run is None:
         return _Said("off", off, word, t.gettext("nothing energised"))
-    level, small, stop = _ended(run, word, t)
+    level, small, stop = _ended(run, standing, word, t)
     return _Said(level, off, small, stop)
 
 
-def _ended(run: LiveRun, word: str, t: Texts) -> tuple[str, str, str]:
+def _ended(run: LiveRun, standing: str, word: str, t: Texts) -> tuple[str, str, str]:
     """Level, sentence and STOP's second line of a run that is over, with the drive's fresh word that the output is off."""
     state, nothing = run.feed.state, t.gettext("nothing energised")
     end = state.end
@@ -263,9 +275,10 @@ def _ended(run: LiveRun, word: str, t: Texts) -> tuple[str, str, str]:
         text = t.say("Stopped by %(who)s. %(word)s", who=who, word=word)
         return "off", text, t.say("stopped %(time)s", time=_time(str(state.stop["utc"])))
     if outcome == "commissioned":
-        done = (
-            "Measured and written" if state.written else "Measured: every parameter within its acceptance. Not written"
-        )
+        done = {
+            "commissioned": "Measured and written",
+            RESTORED_SINCE: "Measured, written, and the old values restored",
+        }.get(standing, "Measured: every parameter within its acceptance. Not written")
         return "off", f"{t.gettext(done)}. {word}", nothing
     what = {"rejected": "Measured, not good enough", "aborted": "The run was aborted"}.get(outcome, "The run failed")
     return "off-bad" if outcome != "rejected" else "off", f"{t.gettext(what)}. {word}", nothing

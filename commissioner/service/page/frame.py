@@ -69,6 +69,11 @@ def prepare() -> None:
         words_of(language)
 
 
+def prepare_causes() -> None:
+    """The names of causes, which bring numba along: in a thread as well, once the first page is out."""
+    import commissioner.diagnose.causes  # noqa: F401
+
+
 def render(request: Request, view: View, place: Place = NOWHERE, *, status: int = 200, **context: Any) -> Response:
     """The page, with a session where the browser has none yet."""
     parts, who, texts = parts_of(request), visitor_of(request), texts_of(request)

@@ -17,6 +17,7 @@ from starlette.requests import HTTPConnection
 from commissioner.service.problems import Refusal
 
 LANGUAGES = ("en", "de")
+UNIT_SIGNS = {"ohm": "Ω", "degC": "°C"}
 NBSP = "\u00a0"
 
 
@@ -104,7 +105,8 @@ class Texts:
         return f"+{text}" if value is not None and value > 0 and not text.startswith("\u2212") else text
 
     def short(self, value: Any, unit: str = "") -> str:
-        """A value of the core as a person reads it: four digits, words translated."""
+        """A value of the core as a person reads it: four digits, words translated, units by their signs."""
+        unit = UNIT_SIGNS.get(unit, unit)
         if isinstance(value, bool):
             return self.gettext("yes" if value else "no")
         if isinstance(value, int | float):
@@ -132,6 +134,13 @@ def texts_of(connection: HTTPConnection) -> Texts:
 def sentence(text: str) -> str:
     """With its first letter as a sentence has it."""
     return text[:1].upper() + text[1:]
+
+
+def typeset(text: str) -> str:
+    """What the core writes for every console, as a page has it: signs, and no break before a unit."""
+    for plain, sign in (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ")):
+        text = text.replace(plain, sign)
+    return re.sub(r"(\d) us\b", rf"\1{NBSP}µs", re.sub(r"(\d) ?%", rf"\1{NBSP}%", text))
 
 
 def told(refusal: Refusal, texts: Texts) -> Refusal:

@@ -9,7 +9,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from commissioner.errors import CommissionerError
 from commissioner.service.access.visitors import visitor_of
-from commissioner.service.page import shelves, work
+from commissioner.service.page import shelves, tuning, work
 from commissioner.service.page.frame import ToLogin, local, refused
 from commissioner.service.page.texts import texts_of, told
 from commissioner.service.problems import Refusal, disk_refuses, refusal_of, respond
@@ -17,6 +17,7 @@ from commissioner.service.problems import Refusal, disk_refuses, refusal_of, res
 router = APIRouter()
 router.include_router(shelves.router)
 router.include_router(work.router)
+router.include_router(tuning.router)
 
 
 def install(app: FastAPI) -> None:

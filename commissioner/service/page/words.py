@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
-from commissioner.service.page.texts import NBSP, Texts, sentence
+from commissioner.service.page.texts import NBSP, Texts, sentence, typeset
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -19,7 +19,7 @@ SCRIPT_TEXTS = (
     "The run is being started …", "Type %s and confirm the points above.", "done, %s", "running", "waits", "highest", "limit",
     "%s old", "%s old: stale", "Still above the wanted standard error: %s. Strip: ± 10 %.",
     "All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.",
-    "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "last word %s ago",
+    "asks for control; without an answer it passes in %s", "Test %k of %n", "between tests", "%a of %b", "%a, done", "%a, now", "again", "last word %s ago",
     "MOTOR ENERGISED", "ENERGISED SOON", "%s to correct", "energises nothing, writes nothing",
     "Reading the drive …", "The file is being sent …", "no value",
 )  # fmt: skip
@@ -63,6 +63,12 @@ def _named(text: str) -> str:
     return text
 
 
+def with_symbols(text: str) -> Markup:
+    """`L_M` as it is set; everything else escaped."""
+    marked = re.sub(r"\b([RLT])_(s|R|M|sigma)\b", r"\1<sub>\2</sub>", str(escape(text)))
+    return Markup(marked.replace("<sub>sigma</sub>", "<sub>σ</sub>"))
+
+
 class Words:
     """The same in one language."""
 
@@ -100,7 +106,7 @@ class Words:
     def sentence(self, text: object) -> str:
         """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
         plain = _named(str(text))
-        said = sentence(self._t.tell(plain))
+        said = with_symbols(typeset(sentence(self._t.tell(plain))))
         return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:

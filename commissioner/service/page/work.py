@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-import shlex
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -25,13 +24,14 @@ from commissioner.service.library import (
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
-from commissioner.service.page.texts import Texts, sentence, texts_of
+from commissioner.service.page.texts import UNIT_SIGNS, Texts, sentence, texts_of, typeset
+from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.checks import make_checks
 from commissioner.service.routes.library import start_simulator
 from commissioner.service.routes.runs import RunWish, start_run
-from commissioner.service.routes.write import Act, act, plan
+from commissioner.service.routes.write import Act, act, drive_of, plan
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.live import live_document
 from commissioner.service.simulator import SCENARIOS
@@ -150,7 +150,7 @@ def _motor_page(
 def say_plate(judged: dict[str, Any], t: Texts) -> dict[str, Any]:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
-        key: "" if field["ok"] else f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}"
+        key: "" if field["ok"] else typeset(f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}")
         for key, field in judged["fields"].items()
     }
     if judged["efficiency"] is None:
@@ -264,19 +264,9 @@ async def checks(request: Request, drive: str, motor: str) -> Response:
         drive=known,
         motor=chosen,
         document=document,
-        tuning=_tuning(known, chosen),
+        tuning=tuning_of(known),
+        call=call_of(known, chosen),
     )
-
-
-def _tuning(drive: Drive, motor: Motor) -> dict[str, Any] | None:
-    """The drive's own standstill tuning, where its file knows one: what it does, and the call that lets it."""
-    from commissioner.link.files.drive_file import load_profile
-
-    tuning = load_profile(drive.profile).tuning
-    if tuning is None:
-        return None
-    call = ["commissioner", "tune", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source]
-    return {"form": tuning.form, "energises": tuning.energises, "proof": tuning.proof, "call": shlex.join(call)}
 
 
 @router.get("/drives/{drive}/energise")
@@ -335,6 +325,8 @@ async def run(request: Request, run: str) -> Response:
     live = parts.desk.runs.get(run)
     if live is not None and not live.has_result:
         state = live.feed.state
+        if (page := tuning_page(request, live)) is not None:
+            return page
         document = live_document(state, live.feed.current_now_a)
         return render(request, LIVE, Place(run=run, drive=live.drive), state=state, live=document, run=live)
     entry = parts.archive.find(run)
@@ -350,6 +342,8 @@ async def run(request: Request, run: str) -> Response:
         "has_report": (entry.folder / "report.html").is_file(),
         "has_snapshot": (entry.folder / "snapshot.json").is_file(),
     }
+    if (result.get("tune") or {}).get("rows"):
+        return tuned_page(request, place, **facts)
     if result.get("parameters") and entry.outcome in ("commissioned", "rejected"):
         return render(request, RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
@@ -412,9 +406,18 @@ async def _act(request: Request, run: str, what: Act) -> Response:
         run=run,
         what=what,
         done=done.get("report") or done,
+        units=_units(drive_of(parts, run)),
         who_wrote=who.person,
         motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
     )
+
+
+def _units(drive: Drive | None) -> dict[str, str]:
+    """Of the drive's items, in the signs of a page."""
+    from commissioner.link.files.drive_file import load_profile
+
+    items = load_profile(drive.profile).items if drive is not None else {}
+    return {name: UNIT_SIGNS.get(item.unit, item.unit) for name, item in items.items()}
 
 
 def _place(parts: Parts, run: str) -> Place:

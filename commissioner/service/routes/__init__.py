@@ -18,8 +18,9 @@ def all_routers() -> list[APIRouter]:
         library,
         recordings,
         runs,
+        tuning,
         write,
     )
 
-    modules = (health, library, checks, runs, control, events, write, history, recordings, incoming, access)
+    modules = (health, library, checks, runs, tuning, control, events, write, history, recordings, incoming, access)
     return [module.router for module in modules]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import asdict
 from typing import Annotated, Any
 
@@ -50,7 +51,7 @@ async def add_drive(request: Request, table: DriveTable, who: Operator) -> dict[
     """Check and keep a drive. It is not asked for yet: POST /api/checks does."""
     parts = parts_of(request)
     drive = parts.library.add_drive(table)
-    parts.audit.write(who.person, who.address, "added a drive", drive=drive.id)
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, "added a drive", drive=drive.id)
     return asdict(drive)
 
 
@@ -138,7 +139,7 @@ async def start_simulator(request: Request, scenario: str, who: Visitor) -> dict
     is_new = not parts.simulator.is_running or parts.simulator.scenario != scenario
     await parts.simulator.start(scenario)
     if is_new:
-        parts.audit.write(who.person, who.address, "started the simulator", scenario=scenario)
+        await asyncio.to_thread(parts.audit.write, who.person, who.address, "started the simulator", scenario=scenario)
     return asdict(parts.library.drive(SIMULATOR))
 
 

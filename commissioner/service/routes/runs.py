@@ -14,6 +14,7 @@ from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.archive import Entry
+from commissioner.service.library import Drive, Motor
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask, refusal_from
@@ -57,11 +58,16 @@ async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
             limit="a drive with an address",
             remedy="start the simulator first",
         )
+    verb = parts.desk.commissioning(wish.axes_deg, write_back=wish.write_back)
+    return await begin(parts, drive, motor, verb, who, write_back=wish.write_back)
+
+
+async def begin(parts: Parts, drive: Drive, motor: Motor, verb: list[str], who: Visitor, **told: Any) -> LiveRun:
+    """The run of this verb, begun; the audit says so before anything moves."""
     party = Party(who.session.id if who.session else "", who.person)
-    parts.audit.write(
-        who.person, who.address, "asked to energise", drive=drive.id, motor=motor.id, write_back=wish.write_back
-    )
-    run = await parts.desk.start(drive, motor, wish.axes_deg, write_back=wish.write_back, party=party)
+    facts = {"drive": drive.id, "motor": motor.id, **told}
+    await asyncio.to_thread(parts.audit.write, who.person, who.address, "asked to energise", **facts)
+    run = await parts.desk.start(drive, motor, verb, party)
     await asyncio.to_thread(parts.audit.write, who.person, who.address, "run begun", run=run.id)
     return run
 

@@ -19,6 +19,8 @@ from commissioner.service.runs.child import ask, refusal_from
 router = APIRouter()
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Act = Literal["write-back", "restore"]
+PLAN_S, ACT_S = 120.0, 1800.0
+"""A restore proves first that the run's samples lead to its decisions: minutes on a slow computer; and what writes is not to be killed."""
 DONE = {"write-back": "wrote", "restore": "restored"}
 
 
@@ -56,23 +58,24 @@ async def restore(request: Request, run: str, agreement: Agreement, who: Operato
 async def plan(parts: Parts, run: str, what: Act) -> dict[str, Any]:
     """The table, read from the drive afresh."""
     entry = parts.archive.find(run)
-    drive = _drive_of(parts, run)
-    return await _with_drive(parts, drive, [what, entry.run, *_address(drive), "--plan", *_runs(parts), "--json"])
+    drive = drive_of(parts, run)
+    arguments = [what, entry.run, *_address(drive), "--plan", *_runs(parts), "--json"]
+    return await _with_drive(parts, drive, arguments, PLAN_S)
 
 
 async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> dict[str, Any]:
     """Write what the table of `token` showed; the audit has it before and after."""
     entry = parts.archive.find(run)
-    drive = _drive_of(parts, run)
+    drive = drive_of(parts, run)
     await asyncio.to_thread(parts.audit.write, who.person, who.address, f"asked to {what}", run=run, table=token)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
-    done = await _with_drive(parts, drive, arguments)
+    done = await _with_drive(parts, drive, arguments, ACT_S)
     rows = (done.get("report") or done).get("written") or []
     await asyncio.to_thread(parts.audit.write, who.person, who.address, DONE[what], run=run, registers=len(rows))
     return done
 
 
-async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -> dict[str, Any]:
+async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], within_s: float) -> dict[str, Any]:
     if drive is not None and (parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id)):
         raise Refusal(
             409,
@@ -87,7 +90,7 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -
     if watch is not None:
         await asyncio.to_thread(watch.pause)
     try:
-        code, document = await ask(arguments, log)
+        code, document = await ask(arguments, log, within_s)
     finally:
         if watch is not None:
             watch.resume()
@@ -96,7 +99,7 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str]) -
     return document
 
 
-def _drive_of(parts: Parts, run: str) -> Drive | None:
+def drive_of(parts: Parts, run: str) -> Drive | None:
     """The drive of this library that the run was made on; None for one that is not in it."""
     asked = parts.archive.request(run)
     name = (asked.get("origin") or {}).get("drive")

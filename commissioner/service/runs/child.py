@@ -25,7 +25,7 @@ def program(*arguments: str) -> list[str]:
 
 
 class Child:
-    """One `commissioner run --dead-man`. Its end of the pipe going away, or falling silent, means zero volts."""
+    """One `commissioner run` or `tune` with `--dead-man`. Its end of the pipe going away, or falling silent, means zero volts."""
 
     def __init__(self, process: asyncio.subprocess.Process, log: Path) -> None:
         self._process, self._log = process, log
@@ -63,6 +63,10 @@ class Child:
     def stop(self, person: str, reason: str) -> None:
         """The operator's word."""
         self._say("stop", {"person": person, "reason": reason})
+
+    def answer(self, number: int, *, is_done: bool) -> None:
+        """To what the run's journal asks the person at the drive."""
+        self._say("answer", {"number": number, "done": is_done})
 
     async def wait(self) -> int:
         """The exit code; what the run said at its end is in `said`."""

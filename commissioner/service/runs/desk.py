@@ -9,9 +9,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from commissioner.run.archive.folder import read_document
+from commissioner.run.holding.drive_lock import runs_holding
 from commissioner.run.stopping.dead_man import SERVICE
 from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.audit import Audit
@@ -21,13 +20,15 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import Child
 from commissioner.service.runs.control import Control, Pages, Party
 from commissioner.service.runs.feed import Feed
+from commissioner.service.runs.others import drive_at, going_on, request_of
 from commissioner.service.runs.watch import DriveWatch
 
 POLL_S, SUMMARY_S = 0.04, 0.095
 CONFIRM_S = 3.0
 """A stop waits so long for the drive's word before it says that there was none."""
-FRESH_S, STALE_S = 5.0, 10.0
-"""A run that somebody else started is taken as live while its journal is so young."""
+LOOK_S, GONE_S = 0.5, 2.5
+"""Between two looks for runs that somebody else of this computer started. Such a run lives while its process has the drive's
+lock; one that has let it go, until it has been silent for so long."""
 KEPT = 40
 """Feeds of ended runs that stay in memory."""
 
@@ -89,6 +90,7 @@ class Desk:
     _pending: dict[str, _Pending] = field(default_factory=dict)
     _controls: dict[str, Control] = field(default_factory=dict)
     _watches: dict[str, DriveWatch] = field(default_factory=dict)
+    _holding: frozenset[str] = frozenset()
     is_closing: bool = False
 
     # --- looking ------------------------------------------------------------------------------------------------
@@ -113,14 +115,12 @@ class Desk:
         return self._watches.setdefault(key, DriveWatch(drive.url, drive.profile))
 
     # --- starting -----------------------------------------------------------------------------------------------
-    async def start(
-        self, drive: Drive, motor: Motor, axes_deg: Sequence[float], *, write_back: bool, party: Party
-    ) -> LiveRun:
-        """A run as a child process. Refusal 409: somebody has the drive."""
+    async def start(self, drive: Drive, motor: Motor, verb: Sequence[str], party: Party) -> LiveRun:
+        """A run as a child process: `verb` and its own options; `commissioning`, `tuning`. Refusal 409: somebody has the drive."""
         self._check_free(drive)
         self.control(drive.id).take(party)
         watch = self.watch(drive)
-        child = await Child.start(self._arguments(drive, motor, axes_deg, write_back), self._log("run", drive.id))
+        child = await Child.start(self._arguments(drive, motor, verb), self._log("run", drive.id))
         self._pending[drive.id] = _Pending(party, child)
         try:
             await asyncio.to_thread(watch.pause)
@@ -143,13 +143,16 @@ class Desk:
             raise Refusal(409, f"{drive.name} is in use: {person}", step="start a run", value=holder.id if holder else "starting",
                           limit="one run at a time on a drive", remedy="wait for its end, or stop it")  # fmt: skip
 
-    def _arguments(self, drive: Drive, motor: Motor, axes_deg: Sequence[float], write_back: bool) -> list[str]:
+    def commissioning(self, axes_deg: Sequence[float], *, write_back: bool) -> list[str]:
+        """The verb of an ordinary run."""
         chosen = axes_deg or self.settings.file.service.axes_deg
         axes = ["--axes", ",".join(f"{axis:g}" for axis in chosen)] if chosen else []
         more = ["--write-back"] if write_back else []
-        more += [] if self.settings.file.service.diagnosis else ["--no-diagnosis"]
+        return ["run", *axes, *more, *([] if self.settings.file.service.diagnosis else ["--no-diagnosis"])]
+
+    def _arguments(self, drive: Drive, motor: Motor, verb: Sequence[str]) -> list[str]:
         return [
-            "run", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, *axes, *more, "--runs",
+            *verb, "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, "--runs",
             str(self.settings.runs), "--dead-man", "--json",
         ]  # fmt: skip
 
@@ -183,13 +186,13 @@ class Desk:
         run.exit_code = waiting.result() if waiting else None
         run.is_over = True
         self._free_drive(run)
-        self._write_end(run)
+        await asyncio.to_thread(self._write_end, run)
         run.feed.close()
 
     def _has_gone(self, run: LiveRun, waiting: asyncio.Task[int] | None) -> bool:
         if waiting is not None:
             return waiting.done()
-        return run.feed.age_s > (1.0 if run.feed.state.is_over else STALE_S)
+        return run.feed.age_s > GONE_S and run.id not in self._holding
 
     def _watch_over(self, run: LiveRun) -> None:
         state = run.feed.state
@@ -250,29 +253,35 @@ class Desk:
     async def look_around(self) -> None:
         """Take up runs that somebody started from the command line, until the service closes."""
         while not self.is_closing:
-            for folder in await asyncio.to_thread(_young, self.settings.runs):
-                if folder.name not in self.runs and not self._is_beginning(folder):
-                    self._take_up(folder)
-            await asyncio.sleep(1.0)
+            with contextlib.suppress(OSError):  # a folder that cannot be read now may be at the next look
+                self._holding = await asyncio.to_thread(runs_holding)
+                for folder in await asyncio.to_thread(going_on, self.settings.runs, self._holding):
+                    if self._is_unknown(folder.name) and not self._is_beginning(folder):
+                        await self._take_up(folder)
+            await asyncio.sleep(LOOK_S)
+
+    def _is_unknown(self, run: str) -> bool:
+        """Also one that fell silent, was given up, and has its drive all the same."""
+        known = self.runs.get(run)
+        return known is None or (known.child is None and known.is_cut_off and run in self._holding)
 
     def _is_beginning(self, folder: Path) -> bool:
         """Of our own: its child says so itself."""
-        return bool(self._pending) and bool(_origin(folder))
+        return bool(self._pending) and bool(request_of(folder).get("origin"))
 
-    def _take_up(self, folder: Path) -> None:
-        request = (
-            read_document((folder / "request.json").read_text("utf-8")) if (folder / "request.json").is_file() else {}
-        )
+    async def _take_up(self, folder: Path) -> None:
+        request = request_of(folder)
+        if not request:  # it comes right after the folder
+            return
         feed = Feed(folder)
         feed.poll()
         if feed.state.is_over:
             return
-        drive = next((d.id for d in self.library.drives() if d.url and d.url == request.get("url")), "")
-        run = LiveRun(folder.name, drive, str((request.get("origin") or {}).get("motor", "")), feed, None)
-        if drive:
-            watch = self.watch(self.library.drive(drive))
-            watch.pause(0.0)
-        self._add(run)
+        drive = await asyncio.to_thread(drive_at, self.library, str(request.get("url", "")))
+        if drive is not None:
+            self.watch(drive).pause(0.0)
+        motor = str((request.get("origin") or {}).get("motor", ""))
+        self._add(LiveRun(folder.name, drive.id if drive else "", motor, feed, None))
 
     async def close(self) -> None:
         """Zero volts everywhere, then the end of every child."""
@@ -291,22 +300,3 @@ class Desk:
 def _is_off(run: LiveRun) -> bool:
     state = run.feed.state
     return state.output == "off" and state.is_confirmed
-
-
-def _young(runs: Path) -> list[Path]:
-    """Folders whose journal somebody has written to just now."""
-    if not runs.is_dir():
-        return []
-    now, found = time.time(), []
-    for folder in sorted(runs.iterdir(), reverse=True)[:20]:
-        with contextlib.suppress(OSError):
-            if abs(now - (folder / "journal.jsonl").stat().st_mtime) < FRESH_S:  # a clock may have been set back
-                found.append(folder)
-    return found
-
-
-def _origin(folder: Path) -> dict[str, Any]:
-    with contextlib.suppress(OSError):
-        origin = read_document((folder / "request.json").read_text("utf-8")).get("origin")
-        return origin if isinstance(origin, dict) else {}
-    return {}

@@ -99,8 +99,11 @@ class Feed:
         """To the pages: what there is to show now. Called ten times a second; silent where nothing is new."""
         if self.is_news and any(watcher.is_page for watcher in self._watchers):
             self.is_news = False
-            document = live_document(self.state, self.current_now_a)
-            self._publish(Message("live", None, json.dumps(document, separators=(",", ":"))))
+            self._publish(self._summary())
+
+    def _summary(self) -> Message:
+        document = live_document(self.state, self.current_now_a)
+        return Message("live", None, json.dumps(document, separators=(",", ":")))
 
     @contextmanager
     def watch(self, after: int = -1, *, is_page: bool = False) -> Iterator[Watcher]:
@@ -109,6 +112,8 @@ class Feed:
         for line in [] if is_page else JournalFollower(self.folder / "journal.jsonl").new():
             if after < line["n"] < self.state.records:
                 watcher.send(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
+        if is_page:  # what was news before it came it has not heard
+            watcher.send(self._summary())
         if self.is_closed:
             watcher.send(None)
         self._watchers.add(watcher)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from commissioner.service.runs.state import AxisTest, RunState
+from commissioner.service.runs.state import AxisTest, OwnTuning, RunState
 
 
 def live_document(state: RunState, current_now_a: float) -> dict[str, Any]:
@@ -29,6 +29,7 @@ def live_document(state: RunState, current_now_a: float) -> dict[str, Any]:
             "high_wb": _rounded(state.flux_high_wb),
             "limit_wb": _rounded(state.flux_limit_wb),
         },
+        "tuning": _tuning(state.tuning),
         "estimate": state.history[-1] if state.history else None,
         "utc": state.utc,
     }
@@ -37,6 +38,12 @@ def live_document(state: RunState, current_now_a: float) -> dict[str, Any]:
 def history_document(state: RunState) -> list[list[float]]:
     """Every estimate of the running test so far."""
     return state.history
+
+
+def _tuning(tuning: OwnTuning | None) -> dict[str, Any] | None:
+    if tuning is None:
+        return None
+    return {"done": len(tuning.done), "question": tuning.question and tuning.question["number"]}
 
 
 def _test(test: AxisTest) -> dict[str, Any]:

@@ -26,6 +26,14 @@ class AxisTest:
 
 
 @dataclass
+class OwnTuning:
+    """A drive's own tuning: the results of each repeat that is done, and what the person at the drive is asked now."""
+
+    done: list[dict[str, Any]] = field(default_factory=list)
+    question: dict[str, Any] | None = None
+
+
+@dataclass
 class RunState:
     """`output`: on | off | unknown, by the drive's own word; `phase`: what the run is at."""
 
@@ -60,6 +68,7 @@ class RunState:
     verdict: dict[str, Any] | None = None
     link: dict[str, Any] | None = None
     diagnosis_s: float = 0.0
+    tuning: OwnTuning | None = None
     is_restored: bool = False
 
     @property
@@ -211,8 +220,32 @@ def _restored(state: RunState, _record: dict[str, Any]) -> None:
     state.is_restored = True
 
 
-def _tuned(state: RunState, _record: dict[str, Any]) -> None:
-    """One tuning of its own is over: the drive was seen at rest."""
+def _tuning_began(state: RunState, _record: dict[str, Any]) -> None:
+    state.tuning, state.phase = OwnTuning(), "tuning"
+
+
+def _asked(state: RunState, record: dict[str, Any]) -> None:
+    state.tuning = state.tuning or OwnTuning()
+    state.tuning.question = record
+
+
+def _answered(state: RunState, _record: dict[str, Any]) -> None:
+    if state.tuning is not None:
+        state.tuning.question = None
+
+
+def _tuned_once(state: RunState, record: dict[str, Any]) -> None:
+    state.tuning = state.tuning or OwnTuning()
+    state.tuning.done.append(record)
+    _at_rest(state, record)
+
+
+def _tunings_judged(state: RunState, _record: dict[str, Any]) -> None:
+    state.phase = "judging"
+
+
+def _at_rest(state: RunState, _record: dict[str, Any]) -> None:
+    """A tuning of its own is over: the drive was seen at rest."""
     state.output, state.output_utc, state.is_confirmed, state.output_word = "off", state.utc, True, "at rest"
 
 
@@ -226,5 +259,6 @@ _FOLDS = {
     "run_ended": _ended, "diagnosing": _diagnosing, "diagnosed": _diagnosed, "drive_identified": _identified,
     "checks_judged": _put("checks", "results"), "guard_acted": _put("guard"), "verdict_reached": _put("verdict"),
     "error": _put("error"), "link": _put("link"), "parameters_written": _put("written", "written"),
-    "snapshot_restored": _restored, "stop_asked": _stopped, "tuned_once": _tuned,
+    "snapshot_restored": _restored, "stop_asked": _stopped, "tuned_once": _tuned_once,
+    "tuning_began": _tuning_began, "tunings_judged": _tunings_judged, "tuning_ended": _at_rest, "asked_at_drive": _asked, "answered_at_drive": _answered,
 }  # fmt: skip

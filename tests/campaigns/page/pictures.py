@@ -10,8 +10,6 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from playwright.sync_api import expect
-
 from tests.support.browser import SIZES, SLOW_MS, Technician, chromium, technician
 from tests.support.service_process import ServiceProcess
 
@@ -71,12 +69,11 @@ def work(album: Album) -> None:
     hand.wait_energised()
     page.locator("[data-p='3']").filter(has_not_text="–").wait_for()
     album.take("live", whole=True)
-    expect(page.locator("#prog")).to_contain_text("2", timeout=SLOW_MS)
-    page.locator("[data-last='3']").filter(has_not_text="–").wait_for()
-    hand.wait_energised()
-    page.locator("[data-p='3']").filter(has_not_text="–").wait_for()
-    page.wait_for_timeout(1500)
-    album.take("live-second", whole=True)
+    second = page.locator("[data-last='3']").filter(has_not_text="–").or_(page.locator(".verdict"))
+    second.wait_for()  # on a busy host the run is over before its pictures are taken
+    if page.locator("#live").count():
+        page.wait_for_timeout(1500)
+        album.take("live-second", whole=True)
     hand.wait_result()
     album.take("result-early")
     run = page.url.rsplit("/", 1)[1]
@@ -106,7 +103,8 @@ def shelves(album: Album, run: str) -> None:
     page.locator("#dropform button").click()
     page.wait_for_url("**/recordings/*")
     album.take("recording-works")
-    page.locator("#working").wait_for(state="detached", timeout=120_000)
+    page.locator("#working").wait_for(state="detached", timeout=SLOW_MS)
+    page.wait_for_timeout(800)
     album.take("recording")
     hand.go("/audit")
     album.take("audit")
@@ -127,7 +125,7 @@ def ends(album: Album) -> None:
     hand.service.wait_over(run, 200)
     page.wait_for_timeout(1500)
     album.take("stopped")
-    second = hand.service.start_run(axes_deg=[0, 60, 120])
+    second = hand.service.start_run(axes_deg=[0])
     hand.service.wait_over(second, 300)
     hand.go("/runs")
     album.take("archive")
@@ -157,13 +155,16 @@ def main() -> None:
     parser.add_argument("--language", default="en", choices=("en", "de"))
     parser.add_argument("--speed", default="1")
     parser.add_argument("--only", default="")
+    parser.add_argument("--axes", default="0, 60, 120")
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     parts: list[Callable[[Album], None]] = [work, ends]
     with (
         tempfile.TemporaryDirectory() as folder,
         chromium() as browser,
-        ServiceProcess(Path(folder) / "s", speed=asked.speed, diagnosis=True) as service,
+        ServiceProcess(
+            Path(folder) / "s", speed=asked.speed, diagnosis=True, settings=f"axes_deg = [{asked.axes}]"
+        ) as service,
         technician(browser, service, asked.language) as hand,
     ):
         album = Album(hand, asked.out, set(filter(None, asked.only.split(","))))

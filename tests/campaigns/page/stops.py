@@ -17,8 +17,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 from tests.support.service_process import ServiceProcess
 
@@ -38,37 +39,39 @@ class Stop:
     is_confirmed: bool
 
 
-def by_post(service: ServiceProcess, run: str) -> bool:
+def by_post(service: ServiceProcess, run: str, _line: ClientConnection) -> bool:
     return service.client.post(f"/api/runs/{run}/stop", json={"reason": "campaign"}).status_code == 200
 
 
-def by_form(service: ServiceProcess, run: str) -> bool:
+def by_form(service: ServiceProcess, run: str, _line: ClientConnection) -> bool:
     return service.client.post("/stop", data={"run": run}, follow_redirects=False).status_code == 303
 
 
-def by_socket(service: ServiceProcess, run: str) -> bool:
-    with connect(f"ws://127.0.0.1:{service.port}/api/runs/{run}/control") as socket:
-        socket.send('{"stop": "campaign"}')
-        while "stopped" not in (said := json.loads(socket.recv())):
-            pass
+def by_socket(_service: ServiceProcess, _run: str, line: ClientConnection) -> bool:
+    line.send('{"stop": "campaign"}')
+    while "stopped" not in (said := json.loads(line.recv())):
+        pass
     return all(one["zero_volts"] for one in said["stopped"])
 
 
-WAYS: tuple[Callable[[ServiceProcess, str], bool], ...] = (by_socket, by_post, by_form)
+WAYS: tuple[Callable[[ServiceProcess, str, ClientConnection], bool], ...] = (by_socket, by_post, by_form)
 
 
 def one_stop(service: ServiceProcess, number: int, draw: random.Random) -> Stop:
     """A run, begun, stopped, judged by the simulator's log."""
     run, way, wanted_s = service.start_run(), WAYS[number % len(WAYS)], draw.uniform(0.0, MOTOR_TIME_S)
 
-    def is_there(document: dict) -> bool:
+    def is_there(document: dict[str, Any]) -> bool:
         live = document.get("live")
         return live is None or (bool(live["tests"]) and live["tests"][0]["energised_s"] >= wanted_s and wanted_s > 0.0)
 
-    service.wait_for(run, is_there, 120)
-    was_energised, pressed, began = service.is_energised(), time.time(), time.monotonic()
-    is_confirmed = way(service, run)
-    answer_s = time.monotonic() - began
+    with connect(
+        f"ws://127.0.0.1:{service.port}/api/runs/{run}/control", max_queue=None
+    ) as line:  # a page's is open before
+        service.wait_for(run, is_there, 120)
+        was_energised, pressed, began = service.is_energised(), time.time(), time.monotonic()
+        is_confirmed = way(service, run, line)
+        answer_s = time.monotonic() - began
     zero_volts_s = service.wait_dead(pressed)
     service.wait_over(run)
     is_late_edge = was_energised and zero_volts_s == 0.0  # it went off by itself between look and press

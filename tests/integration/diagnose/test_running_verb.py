@@ -74,14 +74,17 @@ def test_the_extended_model_plays_what_was_measured_and_is_a_scenario(start, dia
     assert simulate(SimulateRequest(str(model), path.parent / "ideal.csv")).samples == 15000
 
 
-def test_the_start_is_identified(start):
+def test_the_start_is_identified(start, tmp_path):
     path, truth = start
-    found = identify_any(IdentifyRequest((path,)))
+    found = identify_any(IdentifyRequest((path,), out=tmp_path / "out"))
     assert isinstance(found, IdentifiedRunning)
     for key, true in truth["inverse_gamma"].items():
         assert found.document["parameters"][key]["value"] == pytest.approx(true, rel=0.05)
     assert found.document["inertia_kg_m2"]["value"] == pytest.approx(truth["inertia_kg_m2"], rel=0.02)
     assert any("diagnose" in remark for remark in found.document["remarks"])
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Measured against simulated" in page and "data:image/png" in page
+    assert json.loads((tmp_path / "out" / "identification.json").read_text("utf-8")) == found.document
 
 
 def test_kinds_are_not_mixed(start, capsys, tmp_path):

@@ -1,9 +1,6 @@
 """`tune` as a user calls it: the command line, TCP, an emulated drive in its own process, and its answer key afterwards."""
 
 import json
-import signal
-import subprocess
-import sys
 import time
 from contextlib import closing
 
@@ -13,25 +10,7 @@ from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.runs.feed import Feed
 from tests.support.command_line import call
 from tests.support.preloaded import PreloadedProcess
-
-
-class Vendor:
-    """`python -m sim.vendors.serve` as a process; `truth` after the block."""
-
-    def __init__(self, *arguments):
-        self._command = [sys.executable, "-m", "sim.vendors.serve", *arguments]
-
-    def __enter__(self):
-        self.process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
-        )
-        self.url = f"tcp://{self.process.stdout.readline().split()[2]}"
-        return self
-
-    def __exit__(self, *_):
-        self.process.send_signal(signal.SIGTERM)
-        out, _ = self.process.communicate(timeout=20)
-        self.truth = json.loads(out.splitlines()[-1])
+from tests.support.vendor_process import Vendor
 
 
 def tune(drive, runs, *more, profile="schneider_atv340"):

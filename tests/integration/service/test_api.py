@@ -180,6 +180,10 @@ def test_a_recording_is_identified_and_one_that_is_none_is_refused(service, fini
         time.sleep(0.02)
     assert document["exit_code"] == 0, document
     assert document["result"]["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(3.7, rel=0.02)
+    pictures = service.client.get(document["report"])
+    assert "sandbox" in pictures.headers["content-security-policy"]
+    assert "Measured against simulated" in pictures.text and pictures.text.count("<svg") >= 6
+    assert str(service.runs) not in pictures.text
     kept = set((service.runs / ".service" / "recordings").iterdir())
     is_problem(
         service.client.post("/api/recordings", files={"files": ("run.exe", b"MZ")}, data={"verb": "identify"}), 415

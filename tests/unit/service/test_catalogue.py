@@ -147,7 +147,13 @@ def test_a_sentence_with_values_is_told_with_them():
 def test_what_has_no_translation_says_its_language():
     told = words.Words(Texts("de")).sentence("never <heard> of")
     assert told == '<span lang="en">Never &lt;heard&gt; of</span>'
-    assert words.Words(Texts("en")).sentence("never <heard> of") == "Never <heard> of"
+    assert words.Words(Texts("en")).sentence("never <heard> of") == "Never &lt;heard&gt; of"
+
+
+def test_what_the_core_writes_for_a_console_is_set_as_a_page_sets_it():
+    told = words.Words(Texts("en")).sentence("they lie +12.0 +- 0.3 us behind; L_M <holds> at 75% of sqrt(3)")
+    assert told == "They lie +12.0 ± 0.3\u00a0µs behind; L<sub>M</sub> &lt;holds&gt; at 75\u00a0% of √3"
+    assert Texts("de").short(3.7, "ohm") == "3,7\u00a0Ω"
 
 
 def test_numbers_are_written_as_the_language_writes_them():

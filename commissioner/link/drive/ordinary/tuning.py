@@ -30,6 +30,8 @@ BEGIN_S = 2.0
 """So long a status may stand as before the start; then the drive has not begun."""
 APART_S = 0.5
 """Between the two readings of a result."""
+REST = "tune: finally"
+"""The step of a failure to see the drive at rest at the end."""
 LOST_ANSWERS = 3
 """In a row, while a tuning is watched: then the link counts as lost and the drive is stopped by every path."""
 
@@ -237,7 +239,7 @@ class Tuner:
         if problems:
             first = problems[-1]
             raise DriveFault(
-                f"the drive does not confirm that it is at rest: {first.what}", step="tune: finally", value=first.value,
+                f"the drive does not confirm that it is at rest: {first.what}", step=REST, value=first.value,
                 limit=first.limit, remedy="take the motor as live: isolate the drive's supply, then look at its status",
             ) from error  # fmt: skip
 
@@ -252,7 +254,7 @@ class Tuner:
         while (seen := self._raw(step.item) & step.mask) not in step.done:
             if self._clock() > end:
                 raise DriveFault(
-                    f"{step.item} is {seen:#06x}", step="tune: finally", value=seen, limit=f"one of {list(step.done)}",
+                    f"{step.item} is {seen:#06x}", step=REST, value=seen, limit=f"one of {list(step.done)}",
                     remedy="isolate the drive's supply",
                 )  # fmt: skip
             self._sleep(step.every_s)

@@ -3,7 +3,7 @@ import { number, on, say, send } from "./page.js";
 
 const $ = (selector) => document.querySelector(selector);
 const WINDOW_S = 2, FLUX_WINDOW_S = 8;
-const FACTOR = [1, 1, 1e3, 1e3], DIGITS = [3, 3, 3, 1], SYMBOL = ["R_s", "R_R", "L_σ", "L_M"];
+const FACTOR = [1, 1, 1e3, 1e3], DIGITS = [3, 3, 3, 1], SYMBOL = ["s", "R", "σ", "M"].map((index, k) => `${k < 2 ? "R" : "L"}<sub>${index}</sub>`);
 const WANTED = ["resistance_std_percent", "rotor_resistance_std_percent", "leakage_std_percent", "magnetizing_std_percent"];
 if ($("#livedata")) begin(); /* a run may have ended, and its page have changed, before this file was here */
 function begin() {
@@ -74,10 +74,11 @@ function gauge(id, now, high, limit, digits, unit) {
   box.querySelector("[data-high]").textContent = number(high, digits, unit);
   box.querySelector("[data-limit]").textContent = number(limit, digits, unit);
 }
-function item(test, k) {
+const axisName = (test, k, tests) => `${number(test.axis_deg, 0)}°${k && test.axis_deg === tests[0].axis_deg ? ` ${say("again")}` : ""}`;
+function item(test, k, tests) {
   const made = $("#testitem").content.firstElementChild.cloneNode(true);
   made.dataset.test = k;
-  made.querySelector("b").textContent = `${number(test.axis_deg, 0)}°`;
+  made.querySelector("b").textContent = axisName(test, k, tests);
   return made;
 }
 function progress(live) {
@@ -104,11 +105,11 @@ function parameters(live) {
   };
   show(done, (k) => `[data-last="${k}"]`, (k) => `[data-lasterr="${k}"]`);
   show(test, (k) => `[data-p="${k}"]`, (k) => `[data-e="${k}"]`);
-  if (done) $("#lasthead").textContent = `${number(done.axis_deg, 0)}°`;
-  if (test) $("#nowhead").textContent = `${number(test.axis_deg, 0)}°`;
+  if (done) $("#lasthead").textContent = say("%a, done", `${number(done.axis_deg, 0)}°`);
+  if (test) $("#nowhead").textContent = say("%a, now", `${number(test.axis_deg, 0)}°`);
   if (!test?.parameters) return;
   const above = SYMBOL.filter((_, k) => (100 * test.std[k]) / test.parameters[k] > (acceptance[WANTED[k]] ?? 3));
-  $("#settle").textContent = above.length ? say("Still above the wanted standard error: %s. Strip: ± 10 %.", above.join(", ")) : say("All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.");
+  $("#settle").innerHTML = above.length ? say("Still above the wanted standard error: %s. Strip: ± 10 %.", above.join(", ")) : say("All four within the wanted standard error. Preliminary: the fit after the test decides. Strip: ± 10 %.");
 }
 function sparks() {
   if (!history.length) return;

@@ -98,18 +98,23 @@ async function follow(phase) {
   if (!OVER.has(phase) && !(before === "" && phase)) return;
   isChanging = true;
   try {
-    const answer = await fetch(location.href, { headers: { accept: "text/html" } });
-    if (!answer.ok) return;
-    const next = new DOMParser().parseFromString(await answer.text(), "text/html");
-    if (next.querySelector("#livedata") && $("#livedata")) { place.phase = before; return; }
-    for (const selector of ["#main", "#steps"]) {
-      const fresh = next.querySelector(selector), old = $(selector);
-      if (fresh && old) old.replaceWith(fresh);
-    }
-    document.title = next.title;
-    $("#main").focus({ preventScroll: true });
-    scrollTo(0, 0);
+    if (!(await renew((next) => !(next.querySelector("#livedata") && $("#livedata"))))) place.phase = before;
   } catch { place.phase = before; } finally { isChanging = false; }
+}
+/* the work of this page as the service shows it now, where `isWanted` says so of it */
+export async function renew(isWanted = () => true) {
+  const answer = await fetch(location.href, { headers: { accept: "text/html" } });
+  if (!answer.ok) return true;
+  const next = new DOMParser().parseFromString(await answer.text(), "text/html");
+  if (!isWanted(next)) return false;
+  for (const selector of ["#main", "#steps"]) {
+    const fresh = next.querySelector(selector), old = $(selector);
+    if (fresh && old) old.replaceWith(fresh);
+  }
+  document.title = next.title;
+  $("#main").focus({ preventScroll: true });
+  scrollTo(0, 0);
+  return true;
 }
 on("over", () => { place.phase = "…"; follow("ended"); });
 

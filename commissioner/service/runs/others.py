@@ -1,0 +1,51 @@
+"""Runs that somebody else of this computer started: which go on, what they were asked to do, on which drive."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from typing import Any
+
+from commissioner.errors import CommissionerError
+from commissioner.run.archive.folder import read_document
+from commissioner.service.library import Drive, Library
+
+FRESH_S = 5.0
+"""A run without a lock here (another computer's on a share, or one that only diagnoses) goes on where its journal is so young."""
+NEWEST = 20
+
+
+def going_on(runs: Path, holding: frozenset[str]) -> list[Path]:
+    """Folders of the archive whose run has its drive (`holding`), and of those whose journal was written to just now."""
+    if not runs.is_dir():
+        return []
+    names, now = sorted((path.name for path in runs.iterdir()), reverse=True), time.time()
+    found = [runs / name for name in names if name in holding]
+    for name in (name for name in names[:NEWEST] if name not in holding):
+        with contextlib.suppress(OSError):
+            age_s = now - (runs / name / "journal.jsonl").stat().st_mtime
+            if abs(age_s) < FRESH_S:  # a clock may have been set back
+                found.append(runs / name)
+    return found
+
+
+def request_of(folder: Path) -> dict[str, Any]:
+    """What a run was asked to do; empty as long as that is not written down."""
+    with contextlib.suppress(OSError):
+        return read_document((folder / "request.json").read_text("utf-8"))
+    return {}
+
+
+def drive_at(library: Library, url: str) -> Drive | None:
+    """The drive of the library that this address leads to, however either is written."""
+    from commissioner.link.files.drive_file import load_profile
+    from commissioner.link.wire.url import parse_url
+    from commissioner.run.holding.endpoint import endpoint
+
+    for drive in (drive for drive in library.drives() if drive.url):
+        with contextlib.suppress(CommissionerError):
+            device = load_profile(drive.profile).link.device_id
+            if endpoint(parse_url(drive.url), device) == endpoint(parse_url(url), device):
+                return drive
+    return None

@@ -1,0 +1,39 @@
+"""An ordinary drive as a process, with its keypad and, at the end, its answer key."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from types import TracebackType
+from typing import Any
+
+
+class Vendor:
+    """`python -m sim.vendors.serve` as a process; `truth` after the block."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._command = [sys.executable, "-m", "sim.vendors.serve", *arguments]
+        self.truth: dict[str, Any] = {}
+
+    def __enter__(self) -> Vendor:
+        self.process = subprocess.Popen(
+            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8"
+        )
+        assert self.process.stdout is not None
+        self.url = f"tcp://{self.process.stdout.readline().split()[2]}"
+        return self
+
+    def press(self, key: str) -> None:
+        """A key of its keypad: tune | remote | off-on."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{key}\n")
+        self.process.stdin.flush()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        out, _ = self.process.communicate(timeout=20)
+        self.truth = json.loads(out.splitlines()[-1])
