@@ -114,7 +114,7 @@ def diagnose(
         steps.append(step)
         report(step)
 
-    heard(Said(f"noise {rms_a * 1e3:.3g} mA rms, from {noise.source}"))
+    heard(Said(f"noise {'' if noise.is_known else 'at most '}{rms_a * 1e3:.3g} mA rms, from {noise.source}"))
     excluded = (*excluded, *_not_told_apart(len(audit.excited_hz)))
     try:
         check = partial(check_before_search, noise=noise)

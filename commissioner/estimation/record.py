@@ -51,7 +51,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Record:
-    """Windows of one motor. `has_zero`: three currents were measured; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
+    """Windows of one motor. `has_zero`: three currents were measured; else `computed`: the phases that may have no sensor; `sigma`: white noise of alpha, beta, zero; of the voltage vector's parts;
     of the electrical speed before smoothing."""
 
     windows: tuple[Window, ...]
@@ -65,6 +65,7 @@ class Record:
     sigma_v: float
     sigma_w: float = 0.0
     remarks: tuple[str, ...] = ()
+    computed: str = ""
 
     @property
     def has_start(self) -> bool:
@@ -93,7 +94,7 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     has_speed = all(r.speed_rad_per_s is not None for r in recordings)
     computed = [r.source for r in recordings if is_negative_sum(*r.currents_a)]
     has_zero = not computed and all(np.isfinite(r.currents_a[k]).any() for r in recordings for k in range(3))
-    sigmas = []
+    sigmas, without = [], set("uvw") if computed else set[str]()
     for one in recordings:
         if abs(one.sample_period_s / period - 1.0) > 1e-6:
             raise _refused(
@@ -112,7 +113,9 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
                 "one phase order",
                 "exchange two current channels, or two voltages, with --map",
             )
-        if _turns_backwards(voltage):
+        is_backwards = _turns_backwards(voltage)
+        without |= {("uwv" if is_backwards else "uvw")[k] for k in range(3) if not np.isfinite(one.currents_a[k]).any()}
+        if is_backwards:
             current, voltage = current * [1, -1, 1], voltage * [1, -1]
             remarks.append(
                 f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another."
@@ -132,19 +135,17 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
     if computed:
         remarks.append(
             f"{', '.join(computed)}: third current computed from two: not used as a sensor. Which of the three it is cannot be told from "
-            "the sum, and unlike gains of the sensors are hard to see."
+            "the sum; unlike gains of two sensors are looked for in each pair."
         )
     elif not has_zero:
-        remarks.append(
-            "Two currents only: the third is taken as minus their sum, and unlike gains of the sensors are hard to see."
-        )
+        remarks.append("Two currents only: the third is taken as minus their sum, with what one sensor reads wrong.")
     sigma = np.median(np.array(sigmas), axis=0)
     floor = 1e-6 * scales.current_a
     commanded = bool(recordings[0].metadata.get("switching_frequency_hz"))
     return Record(
         tuple(windows), period, scales, plate, has_speed, has_zero, commanded, (max(sigma[0], floor), max(sigma[1], floor), max(sigma[2], floor)),
         float(np.hypot(sigma[3], sigma[4]) / np.sqrt(2.0)),
-        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks),
+        _speed_noise(recordings, plate) if has_speed else 0.0, tuple(remarks), "".join(sorted(without)),
     )  # fmt: skip
 
 

@@ -16,6 +16,8 @@ NAMEPLATE_TOLERANCE = 0.05
 """A drive whose own plate differs by more than this from the job's motor is set up for another motor."""
 DC_LINK_RIPPLE = 0.02
 """Largest change of the link voltage between two readings that still counts as steady."""
+UNEVEN = 2.0
+"""Of the fastest read of a window: a slower one is told."""
 REST_SPEED_RAD_PER_S = 0.5
 
 
@@ -160,19 +162,21 @@ def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[Check
     if pace is None:
         return
     plan = plan_link(pace, sample_period_s)
+    is_kept = plan is None or pace.is_kept(plan, sample_period_s)
+    slow = f" at best, {1e3 * pace.slowest_s:.3g} ms at worst" if pace.slowest_s > UNEVEN * pace.round_trip_s else ""
     took, rate = (
-        f"{1e3 * pace.round_trip_s:.3g} ms for {pace.samples} samples",
+        f"{1e3 * pace.round_trip_s:.3g} ms{slow} for {pace.samples} samples",
         f"{1.0 / sample_period_s:.0f} samples a second",
     )
     limit = f"at most {1e3 * pace.samples * sample_period_s:.3g} ms: the drive takes {rate}"
     yield CheckResult(
         "the link keeps up with the samples",
-        plan is not None,
+        plan is not None and is_kept,
         took if plan is None or not plan.is_reduced else f"{took}: {plan.sentence(sample_period_s)}",
         limit
         if plan is not None and not plan.is_reduced
         else f"{limit}; slower with means, or with samples kept in the drive",
-        "use a link that answers sooner: a cable in place of radio, VPN or gateway; a serial line of "
+        f"use a link that answers sooner{'' if is_kept else ' and evenly'}: a cable in place of radio, VPN or gateway; a serial line of "
         f"{least_baud(pace, sample_period_s, is_reduced=plan is None):.0f} Bd or more",
     )
 

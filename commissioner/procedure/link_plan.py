@@ -32,7 +32,8 @@ HIGHEST_TONE = 0.05
 class StreamPace:
     """What the link carries: the fastest of a few reads of a whole sample window, made before anything is energised, the
     samples (all channels) and registers of one window, those of its data, the longest mean the drive makes, in control
-    periods, and the samples its memory keeps."""
+    periods, the samples its memory keeps, and the slowest of those reads: what a busy host adds now and then is caught up
+    with from the drive's memory, and must fit there."""
 
     round_trip_s: float
     samples: int
@@ -40,6 +41,24 @@ class StreamPace:
     data_registers: int = 0
     most_averaged: int = 1
     kept_samples: int = 0
+    slowest_s: float = 0.0
+
+    def window_s(self, mean: float, control_period_s: float) -> float:
+        """In which the link must pass a window of two currents, each sample the mean of so many control periods."""
+        return FOR_SAMPLES * (self.data_registers // len(TWO_CURRENTS)) * mean * control_period_s
+
+    def least_mean(self, control_period_s: float) -> float:
+        """Control periods in the shortest mean of which windows pass; infinite where a window holds none."""
+        one_s = self.window_s(1.0, control_period_s)
+        return self.round_trip_s / one_s if one_s else math.inf
+
+    def longest_mean(self, longest_s: float, control_period_s: float) -> int:
+        """Control periods in the longest mean that the drive makes and that a sample may last."""
+        return min(self.most_averaged, int(longest_s / control_period_s + 1e-9))
+
+    def is_kept(self, plan: LinkPlan, control_period_s: float) -> bool:
+        """Whether the drive's memory holds what the slowest answer keeps waiting."""
+        return not self.kept_samples or self.slowest_s <= self.kept_samples * plan.averaged * control_period_s
 
 
 @dataclass(frozen=True)
@@ -85,35 +104,28 @@ def plan_link(pace: StreamPace | None, control_period_s: float) -> LinkPlan | No
     """The least reduction that the link carries; None where it carries none. Without a pace nothing is reduced."""
     if pace is None or pace.round_trip_s <= pace.samples * control_period_s:
         return LinkPlan()
-    samples = pace.data_registers // len(TWO_CURRENTS)
-    most = min(pace.most_averaged, int(LONGEST_SAMPLE_S / control_period_s + 1e-9))
-    for averaged in range(1, most + 1):
-        if pace.round_trip_s <= FOR_SAMPLES * samples * averaged * control_period_s:
-            return LinkPlan(TWO_CURRENTS, averaged)
+    least = pace.least_mean(control_period_s)
+    if least <= pace.longest_mean(LONGEST_SAMPLE_S, control_period_s):
+        return LinkPlan(TWO_CURRENTS, max(1, math.ceil(least - 1e-9)))
     return _captured(pace, control_period_s)
 
 
 def _captured(pace: StreamPace, control_period_s: float) -> LinkPlan | None:
     """Tones kept in the drive, DC levels streamed as slowly as windows come."""
-    samples = pace.data_registers // len(TWO_CURRENTS)
-    least_s = pace.round_trip_s / (FOR_SAMPLES * samples) if samples else math.inf
-    most = min(pace.most_averaged, int(LONGEST_LEVEL_SAMPLE_S / control_period_s + 1e-9))
-    if least_s > most * control_period_s or not pace.kept_samples:
+    least, most = pace.least_mean(control_period_s), pace.longest_mean(LONGEST_LEVEL_SAMPLE_S, control_period_s)
+    if least > most or not pace.kept_samples:
         return None
     kept = max(KEPT_SAMPLE_S, LONGEST_TEST_S / pace.kept_samples) / control_period_s
     captured = math.ceil(kept - 1e-9)
-    if captured > min(pace.most_averaged, LONGEST_SAMPLE_S / control_period_s + 1e-9):
+    if captured > pace.longest_mean(LONGEST_SAMPLE_S, control_period_s):
         return None
-    return LinkPlan(TWO_CURRENTS, min(most, math.ceil(EASE * least_s / control_period_s)), captured)
+    return LinkPlan(TWO_CURRENTS, min(most, math.ceil(EASE * least)), captured)
 
 
 def least_baud(pace: StreamPace, control_period_s: float, *, is_reduced: bool) -> float:
     """The serial rate from which on every sample passes; `is_reduced`: from which on a plan exists."""
     bits = BITS_PER_REGISTER * pace.registers + OVERHEAD_BITS
     whole_s = pace.samples * control_period_s
-    if not is_reduced:
-        return bits / whole_s
-    longest = LONGEST_LEVEL_SAMPLE_S if pace.kept_samples else LONGEST_SAMPLE_S
-    most = min(pace.most_averaged, int(longest / control_period_s + 1e-9))
-    means_s = FOR_SAMPLES * (pace.data_registers // len(TWO_CURRENTS)) * most * control_period_s
-    return bits / max(whole_s, means_s)
+    longest_s = LONGEST_LEVEL_SAMPLE_S if pace.kept_samples else LONGEST_SAMPLE_S
+    means_s = pace.window_s(pace.longest_mean(longest_s, control_period_s), control_period_s)
+    return bits / (max(whole_s, means_s) if is_reduced else whole_s)

@@ -55,17 +55,25 @@ def bounded_text(path: Path, limit: int = MAX_BYTES) -> bytes:
 
 
 def numeric_columns(path: Path, file: pa_parquet.ParquetFile) -> list[str]:
-    """The columns that are numbers: texts, lists and dictionaries can unpack to any size and are never read."""
+    """The columns that are numbers: texts, lists and dictionaries can unpack to any size and are never read.
+
+    A chunk's metadata are looked at only where its first row could be read: Arrow's own look at damaged ones ends the process.
+    """
     if file.metadata.num_columns > MAX_COLUMNS:
         raise too_large(path, f"{file.metadata.num_columns} columns", MAX_COLUMNS)
     schema = file.schema_arrow
     names = [f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)]
     groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
     rows = max(sum(max(group.num_rows, 0) for group in groups), file.metadata.num_rows)
-    values = sum(max(g.column(k).num_values, 0) for g in groups for k in range(g.num_columns))
-    size, limit = NUMBER_BYTES * max(rows * len(names), values), unpacked_limit(path)
-    if size > limit:
-        raise too_large(path, size, limit)
+    limit = unpacked_limit(path)
+    if NUMBER_BYTES * rows * len(names) > limit:
+        raise too_large(path, NUMBER_BYTES * rows * len(names), limit)
+    for k in range(len(groups)):
+        next(file.iter_batches(batch_size=1, row_groups=[k], columns=names, use_threads=False), None)
+    chunks = [k for k in range(file.metadata.num_columns) if file.schema.column(k).path in names]
+    values = sum(max(g.column(k).num_values, 0) for g in groups for k in chunks)
+    if NUMBER_BYTES * values > limit:
+        raise too_large(path, NUMBER_BYTES * values, limit)
     return names
 
 

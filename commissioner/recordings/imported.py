@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from commissioner.errors import ConfigurationError, DataRefused
-from commissioner.monitor.intake.states import states
+from commissioner.monitor.intake.states.stretches import states
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.mapping import ChannelMap

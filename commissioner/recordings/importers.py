@@ -17,12 +17,14 @@ import numpy as np
 from commissioner.errors import DataRefused, UsageError
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
 from commissioner.recordings.reading.mend import with_time, with_whole_time, without_doubled_rows
 from commissioner.recordings.reading.preface import Clock, clock_in
 from commissioner.recordings.reading.recognise import Recognised, recognise
+from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
@@ -47,14 +49,14 @@ NOT_READ = {".mdf": "MDF 3", ".xlsx": "Excel", ".xls": "Excel"}
 HEAD_BYTES = 65536
 
 
-def read_running(path: Path, mapping: ChannelMap | None = None) -> RunningRecording:
+def read_running(path: Path, mapping: ChannelMap | None = None, motor: str | None = None) -> RunningRecording:
     """The recording in `path`, whatever its format; DataRefused names the column that could not be found."""
-    return to_running(import_table(path, mapping))
+    return to_running(import_table(path, mapping, motor))
 
 
-def import_table(path: Path, mapping: ChannelMap | None = None) -> Table:
+def import_table(path: Path, mapping: ChannelMap | None = None, motor: str | None = None) -> Table:
     """As `contract_table`, of a running motor: DataRefused where time, currents or voltages of one are missing."""
-    table = contract_table(path, mapping)
+    table = contract_table(path, mapping, motor)
     require_running(table)
     return table
 
@@ -72,12 +74,19 @@ def has_currents_only(table: Table) -> bool:
     return "time_s" in columns and currents >= 2 and not any(name.startswith("voltage_") for name in columns)
 
 
-def contract_table(path: Path, mapping: ChannelMap | None = None) -> Table:
+def contract_table(path: Path, mapping: ChannelMap | None = None, motor: str | None = None) -> Table:
     """The file's table under the contract's names, in SI, whatever its format; columns of other names under their own.
+    With a plate, of the file or `motor` (a name or a file), six channels without names may be told by their signals.
 
     UsageError: no such file. DataRefused: no table, or one that can be read in two ways.
     """
-    mapping = mapping or ChannelMap()
+    table = _read(path, mapping or ChannelMap())
+    if not any(note.code == UNNAMED for note in table.notes) or (motor is None and has_no_plate(table.metadata)):
+        return table
+    return told_by_signals(table, plate_of(table.metadata, table.source, motor))
+
+
+def _read(path: Path, mapping: ChannelMap) -> Table:
     if not path.is_file():
         raise UsageError(
             f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
@@ -215,7 +224,7 @@ def _table(
         columns, doubled = without_doubled_rows(columns)
         columns, whole = with_whole_time(columns)
         made += [*doubled, *whole]
-    unnamed = [ReadingNote("unnamed_channel", f"{name}: its name does not say what it is") for name in found.unnamed]
+    unnamed = [ReadingNote(UNNAMED, f"{name}: its name does not say what it is") for name in found.unnamed]
     return Table(columns, metadata, source, (*notes, *found.notes, *made, *unnamed), found.readings)
 
 
@@ -235,13 +244,14 @@ def _with_constants(columns: dict[str, Signal], metadata: Mapping[str, float | s
 
 
 def _lacks(table: Table, missing: list[str]) -> DataRefused:
-    unnamed = [note for note in table.notes if note.code == "unnamed_channel"]
+    unnamed = [note for note in table.notes if note.code == UNNAMED]
     return DataRefused(
         f"{table.source}: the recording lacks {', '.join(missing)}: speed and torque cannot be reconstructed from it",
         step="recognise columns",
         value=_some(table.columns),
         limit="time_s, three line currents and three voltages, in SI units",
-        remedy=HOW_TO_MAP if unnamed else "record all six channels against time, or rename the columns to the contract's (time_s, "
+        remedy=f"{HOW_TO_MAP}; three currents and three voltages with units may be told by their signals where the plate is given (--motor)"
+        if unnamed else "record all six channels against time, or rename the columns to the contract's (time_s, "
         "current_u_a, voltage_u_v or voltage_uv_v ...); without a time column give `# sample_period_s: 0.000125` as the "
         "first line; or " + HOW_TO_MAP,
     )  # fmt: skip

@@ -31,7 +31,7 @@ FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw
 """Units that stand for something only with a factor which the file does not give."""
 IN_NAME = re.compile(
     r"[\[(（【]\s*([^\])）】]*)\s*[\])）】]\s*$|(?:^|\s+)(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
-    r"|_(ms|us|s|mA|A|mV|V|kV|rpm)$"
+    r"|(?<!_per)_(ms|us|s|mA|A|mV|V|kV|rpm)$"
 )
 """A unit at the end of a name: in brackets, after `in`, after a slash, or after an underscore."""
 

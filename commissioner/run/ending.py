@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import traceback
 from contextlib import suppress
+from pathlib import Path
 
 from commissioner.errors import CommissionerError, DriveError, DriveFault, UsageError, WriteBackFailed
 from commissioner.link.drive.facts import DisarmReport
@@ -11,6 +14,7 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder, archive_lost
 
+OF_DISK = {errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
 
@@ -44,14 +48,29 @@ def still_live(live: DriveFault, error: CommissionerError | None) -> Commissione
 
 
 def as_error(surprise: Exception, folder: RunFolder) -> CommissionerError:
-    """A disk that takes no more, or a defect of ours, whose traceback goes to the journal."""
-    if isinstance(surprise, OSError):
+    """A disk that takes no more, something else that the operating system refused, or a defect of ours; of these two the
+    traceback goes to the journal."""
+    if isinstance(surprise, OSError) and _is_of_disk(surprise, folder.path):
         return archive_lost(folder.path, surprise)
     note(folder, "defect", "".join(traceback.format_exception(surprise)))
+    if isinstance(surprise, OSError):
+        where = str(surprise.filename) if surprise.filename is not None else type(surprise).__name__
+        return CommissionerError(
+            f"the operating system refused {where}: {surprise.strerror or surprise}", step="run",
+            value=errno.errorcode.get(surprise.errno or 0, where), limit="a call that succeeds",
+            remedy="check that file, device or connection, its permissions and what this host has left (open files, memory)",
+        )  # fmt: skip
     return CommissionerError(
         f"a defect in commissioner: {type(surprise).__name__}: {surprise}", step="run",
         remedy="please report it with the run folder",
     )  # fmt: skip
+
+
+def _is_of_disk(failure: OSError, folder: Path) -> bool:
+    """Whether it is the run folder that failed: by the file's name, else by what only a disk says."""
+    if failure.filename is not None:
+        return Path(os.fsdecode(failure.filename)).absolute().is_relative_to(folder.absolute())
+    return failure.errno in OF_DISK
 
 
 def with_host(error: CommissionerError, gap_s: float, watchdog_s: float | None) -> CommissionerError:

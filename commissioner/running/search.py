@@ -86,7 +86,8 @@ class Search:
         """Every form that this recording could show."""
         record, known = self.problem.record, {*without, *self.excluded}
         return [
-            Named(c.name, form) for c in CATALOGUE.values() if c.name not in known and c.needs(record) for form in c.forms
+            Named(c.name, form) for c in CATALOGUE.values() if c.name not in known and c.needs(record)
+            for form in c.forms if form.needs(record)
         ]  # fmt: skip
 
     def columns(self, causes: Sequence[Named]) -> tuple[Column, ...]:
@@ -263,7 +264,8 @@ def _rivals(seeking: Search, fit: Fit, accepted: Sequence[Named], k: int, most: 
     basis, _ = np.linalg.qr(fit.jacobian[kept].T)
     mine = fit.jacobian[own] - (fit.jacobian[own] @ basis) @ basis.T
     candidates = [c for c in seeking.candidates(names) if c.cause not in always_tied(one.cause)]
-    candidates += [Named(one.cause, f) for f in CATALOGUE[one.cause].forms if f != one.form]
+    forms = (f for f in CATALOGUE[one.cause].forms if f.needs(seeking.problem.record))
+    candidates += [Named(one.cause, f) for f in forms if f != one.form]
     columns = [Column("p", AT[n]) for c in candidates for n in c.form.numbers]
     theirs = jacobian(seeking.problem, fit.machine, columns)
     theirs = theirs - (theirs @ basis) @ basis.T

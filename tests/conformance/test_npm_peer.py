@@ -96,10 +96,11 @@ def test_a_drive_of_modbus_serial_is_read_written_and_restored_over_a_serial_lin
     assert drive.truth["registers"]["1300"] == 36000
 
 
-def test_modbus_serial_reads_and_writes_our_simulator(modules):
-    with SimProcess("--scenario", "default", "--tcp", "0") as sim:
-        port = sim.url.rpartition(":")[2]
-        command = ["node", str(PEERS / "master.js"), port]
+@pytest.mark.parametrize("wire", [("--tcp", "0"), ("--rtu", "pty", "--baud", "115200")], ids=["tcp", "rtu"])
+def test_modbus_serial_reads_and_writes_our_simulator(modules, wire):
+    with SimProcess("--scenario", "default", *wire) as sim:
+        at = sim.url.rpartition(":")[2] if "--tcp" in wire else sim.url.partition("//")[2].partition("?")[0]
+        command = ["node", str(PEERS / "master.js"), at, *(["115200"] if "--rtu" in wire else [])]
         environment = os.environ | {"NODE_PATH": str(modules)}
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
     assert done.returncode == 0, done.stderr

@@ -8,6 +8,8 @@ import pytest
 
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.verdict.detection_limits import detection_limits
+from commissioner.diagnose.verdict.evidence import hold_out
+from commissioner.motor.computed import without_computed_third
 from tests.hidden_effects.cases import class_of
 from tests.hidden_effects.generators.another_hand import PEAK_A, TONES_HZ, Machine, recorded
 
@@ -55,6 +57,19 @@ def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbo
         assert limit["value"] < max(abs(cause.sizes[key][0]), 1e-12), (cause.name, limit)
     if symbol:
         assert seen.causes[0].sizes[symbol][0] == pytest.approx(size, rel=0.01)
+
+
+def test_a_gain_error_before_the_computed_third_current_is_named_and_no_noise_is_larger_than_what_is_left():
+    """What quiet frequencies hold had been called noise, forty times of it."""
+    made = recorded(Machine(gains=(0.98, 1.0, 1.0)), 1.0)
+    u, v = np.round(made.current_u_a, 5), np.round(made.current_v_a, 5)
+    seen = diagnose([without_computed_third(replace(made, current_u_a=u, current_v_a=v, current_w_a=-(u + v)))])
+    assert [c.name for c in seen.causes] == ["sensor_gain_mismatch"] and seen.verdict.value == "explained"
+    assert seen.causes[0].sizes["gain_v_over_u"][0] == pytest.approx(1.0 / 0.98 - 1.0, rel=0.03)
+    assert seen.held_out.noise_a == pytest.approx(seen.held_out.rmse_after_a, rel=0.02)
+    found, loud = seen.found, replace(seen.noise, sigma_a=3.0 * seen.noise.sigma_a, is_known=False)
+    held = hold_out(found.nominal, found.fit, found.record, found.layout, loud)
+    assert held.noise_a is None and held.rmse_after_a == seen.held_out.rmse_after_a and held.share == pytest.approx(1.0)
 
 
 def test_a_recording_without_any_noise_has_what_is_in_it():

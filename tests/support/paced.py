@@ -57,11 +57,13 @@ class Paced:
         return self.station.drive.firmware.samples.overruns
 
 
-def commissioned(runs: Path, pace: Pace, scenario: str = "default", seed: int = 1, axes=None, faults=()) -> Paced:
-    """`axes`: None takes the procedure's."""
+def commissioned(
+    runs: Path, pace: Pace, scenario: str = "default", seed: int = 1, axes=None, faults=(), connection: str = "star"
+) -> Paced:
+    """`axes`: None takes the procedure's; `connection`: the plate's."""
     drawn = load(scenario)
     station, profile = Station(drawn, seed, faults, pace), load_profile("simulated")
-    plate = Nameplate(**{name: getattr(drawn.plant.nameplate, name) for name in PLATE}, connection="star")
+    plate = Nameplate(**{name: getattr(drawn.plant.nameplate, name) for name in PLATE}, connection=connection)
     warm_up(plate)
     port = InProcessPort(station)
     folder = RunFolder.create(runs, "simulated")

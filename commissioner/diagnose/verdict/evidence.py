@@ -32,12 +32,13 @@ ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
 class HeldOut:
     """Error on segments the fit did not see, and noise, rms over phases and samples, A; `share` of the structured error power
 
-    removed there. `is_measured` False with a single segment: then these are in-sample figures.
+    removed there. `is_measured` False with a single segment: then these are in-sample figures. `noise_a` None: taken from quiet
+    frequencies, where slow parts of the test itself count as noise, it would be more than all that is left.
     """
 
     rmse_before_a: float
     rmse_after_a: float
-    noise_a: float
+    noise_a: float | None
     share: float
     is_measured: bool
 
@@ -57,12 +58,14 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     table = np.array(each_segment(of_segment, record))
     period = record.facts.sample_period_s
     floor = np.array([noise.rms_a(s.count, period) ** 2 for s in record.segments]) * table[:, 2]
+    is_contradicted = not noise.is_known and floor.sum() > table[:, 1].sum()
+    floor = np.minimum(floor, table[:, 1]) if is_contradicted else floor
     removed = table[:, 0] - table[:, 1]
     mean = table.sum(axis=0)
     return HeldOut(
         float(np.sqrt(mean[0] / mean[2])),
         float(np.sqrt(mean[1] / mean[2])),
-        float(np.sqrt(floor.sum() / mean[2])),
+        None if is_contradicted else float(np.sqrt(floor.sum() / mean[2])),
         float(np.clip(removed.sum() / max(float((table[:, 0] - floor).sum()), 1e-3 * float(floor.sum())), -1.0, 1.0)),
         many,
     )

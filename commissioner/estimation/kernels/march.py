@@ -46,7 +46,7 @@ HEAT_S, HEAT_R, CAGE, LOOP, LINE = (
 )
 DEAD, DEAD_KNEE, V_GAIN, V_OFFSET = AT["dead_voltage"], AT["dead_knee"], AT["voltage_gain_re"], AT["voltage_offset_re"]
 W_GAIN, W_LAG, W_RIPPLE, DELAY = AT["speed_gain"], AT["speed_lag"], AT["speed_ripple_cos"], AT["delay"]
-GAIN, OFFSET = AT["current_gain_v"], AT["current_offset_u"]
+GAIN, OFFSET, PAIR = AT["current_gain_v"], AT["current_offset_u"], AT["current_pair_u"]
 INERTIA, CONSTANT, FAN, RIPPLE = AT["inertia"], AT["load_constant"], AT["load_fan"], AT["load_ripple_cos"]
 MOST_FLUX = 6.0
 """Square of the flux over rated flux beyond which the law of the iron goes on with its last value: a fit on its way."""
@@ -197,7 +197,10 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
 
 @_inlined
 def _chain(p, current, period, out):
-    """What the current's sensors make of it: age, gains against their mean, offsets; alpha, beta, zero."""
+    """What the current's sensors make of it: age, gains against their mean, offsets; alpha, beta, zero.
+
+    Of two sensors one reads too much by half of what they differ by and the other too little; the phase without one is
+    their negative sum."""
     n = out.shape[0]
     if p[DELAY] != 0.0:
         s = p[DELAY] / period
@@ -215,11 +218,13 @@ def _chain(p, current, period, out):
                 out[q, j] = mixed
     gv, gw = p[GAIN], p[GAIN + 1]
     ou, ov, ow = current * p[OFFSET], current * p[OFFSET + 1], current * p[OFFSET + 2]
+    no_u, no_v, no_w = 0.5 * p[PAIR], 0.5 * p[PAIR + 1], 0.5 * p[PAIR + 2]
     for q in range(n):
         a, b = out[q, 0], out[q, 1]
-        u = a * (1.0 - gv - gw) + ou
-        v = (-0.5 * a + HALF_3 * b) * (1.0 + gv) + ov
-        w = (-0.5 * a - HALF_3 * b) * (1.0 + gw) + ow
+        iu, iv, iw = a, -0.5 * a + HALF_3 * b, -0.5 * a - HALF_3 * b
+        u = iu * (1.0 - gv - gw) + ou + no_w * iu - no_v * iu + no_u * (iw - iv)
+        v = iv * (1.0 + gv) + ov + no_u * iv - no_w * iv + no_v * (iu - iw)
+        w = iw * (1.0 + gw) + ow + no_v * iw - no_u * iw + no_w * (iv - iu)
         out[q, 0] = (2.0 * u - v - w) / 3.0
         out[q, 1] = (v - w) / np.sqrt(3.0)
         out[q, 2] = (u + v + w) / 3.0

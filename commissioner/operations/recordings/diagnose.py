@@ -83,7 +83,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
     said = read_mapping(request.mapping) if request.mapping else None
-    tables = [contract_table(Path(path), said) for path in request.files]
+    tables = [contract_table(Path(path), said, request.motor) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
     if are_sheets(tables):

@@ -89,7 +89,7 @@ def identify_any(
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
-    tables = [contract_table(path, said) for path in request.files]
+    tables = [contract_table(path, said, request.motor) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
     if are_sheets(tables):

@@ -9,7 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.monitor.chain import Observation, Refused, Wishes
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
 from commissioner.monitor.intake.findings import Finding
-from commissioner.monitor.intake.states import states
+from commissioner.monitor.intake.states.stretches import states
 from commissioner.monitor.partial import Partial, of_currents, refused_audit, without_plate
 from commissioner.monitor.result import (
     as_document,
@@ -78,7 +78,7 @@ class PartlyMonitored:
 
 def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | PartlyMonitored | NotMonitored:
     """One recording, watched, compared and, where asked for, learned and written out. Partial data give a partial answer."""
-    table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None)
+    table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None, request.motor)
     if has_currents_only(table):
         return _of_currents(table, request, observe)
     require_running(table)

@@ -8,7 +8,7 @@ from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.findings import Finding
-from commissioner.monitor.intake.states import Stretch, cut_out, states
+from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
 from commissioner.motor.circuit import Quantity

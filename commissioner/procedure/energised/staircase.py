@@ -16,7 +16,7 @@ import numpy as np
 from commissioner.errors import Aborted
 from commissioner.identify.inverter import staircase as resistance
 from commissioner.identify.inverter.first_current import FirstCurrent, HeldLevel, first_current, stepped_inductance_h
-from commissioner.identify.inverter.settling import Approach, settle
+from commissioner.identify.inverter.settling import Approach, Settled, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
@@ -199,7 +199,7 @@ class _Stair(DirectCurrent):
         """The inductance between the two levels held last says how high the top may be."""
         period = period_s(self.findings)
         larger, smaller = self._whole[-2:]
-        inductance_h = stepped_inductance_h(larger, smaller, period, self._tail)
+        inductance_h = stepped_inductance_h(larger, smaller, self._heading(), period)
         self._top_a = min(self._top_a, TOP * self._limit_wb / max(resistance.SEEN_DOUBT * inductance_h, 1e-9))
 
     def walk(self, voltages_v: Sequence[float]) -> Generator[Command, Any, None]:
@@ -273,13 +273,16 @@ class _Stair(DirectCurrent):
 
     def levels(self) -> tuple[DcLevel, ...]:
         """The levels with the currents they have settled at, or would have."""
-        settled = settle([approach for _, approach in self._held], self._slow_s)
+        settled = self._heading()
         rows = zip(self._held, settled.current_a, settled.std_a, strict=True)
         return tuple(DcLevel(voltage_v, float(a), float(s)) for (voltage_v, _), a, s in rows)
 
     def first_current(self) -> FirstCurrent:
         """From the levels that were held: the larger, the smaller, the larger again."""
-        return first_current(self._whole, period_s(self.findings), self._tail)
+        return first_current(self._whole, self._heading(), period_s(self.findings))
+
+    def _heading(self) -> Settled:
+        return settle([approach for _, approach in self._held], self._slow_s)
 
     @property
     def _tail(self) -> int:

@@ -18,6 +18,8 @@ from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
             "_deg": "angle", "_nm": "torque"}  # fmt: skip
+SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency": "Hz", "resistance": "ohm", "angle": "deg",
+         "torque": "Nm"}  # fmt: skip
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
 
@@ -58,8 +60,17 @@ def recognise(
         else:
             with np.errstate(invalid="ignore", over="ignore"):
                 columns[meaning] = factor * values[k] if factor != 1.0 else values[k]
-        readings.append(ColumnReading(name, meaning, unit, factor))
+        readings.append(ColumnReading(name, meaning, unit or _own_unit(name), factor))
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _own_unit(name: str) -> str:
+    """What a name of the contract says by its ending; nothing of other names."""
+    if name not in CONTRACT_COLUMNS:
+        return ""
+    if name == "speed_rad_per_s":
+        return "rad/s"
+    return next((SHOWN[measures] for ending, measures in MEASURES.items() if name.endswith(ending)), "")
 
 
 def _power_unit(name: str) -> str:

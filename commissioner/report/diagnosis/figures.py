@@ -75,23 +75,24 @@ def shade_is_visible(seen: Residuals, has_causes: bool) -> bool:
 
 
 @_styled
-def over_time_and_axis(seen: Residuals, has_causes: bool, noise_a: float) -> Figure:
-    """Two panels: error rms over the recording's time, and for each axis."""
+def over_time_and_axis(seen: Residuals, has_causes: bool, noise_a: float | None) -> Figure:
+    """Two panels: error rms over the recording's time, and for each axis; the noise where it is known."""
     figure = _figure(2.9)
     left, right = figure.subplots(1, 2, width_ratios=(2, 1), sharey=True)
     _pair(left, seen.time_s, seen.time_before_a * 1e3, seen.time_after_a * 1e3, has_causes, ".")
     left.set(xlabel="time / s", ylabel="size of the error / mA rms")
-    left.axhline(noise_a * 1e3, color=MUTED, linestyle="--", label="noise")
+    if noise_a is not None:
+        left.axhline(noise_a * 1e3, color=MUTED, linestyle="--", label="noise")
+        right.axhline(noise_a * 1e3, color=MUTED, linestyle="--")
     at = np.arange(seen.by_axis_deg.shape[0])
     width = 0.4 if has_causes else 0.6
     right.bar(at - (0.2 if has_causes else 0.0), seen.by_axis_before_a * 1e3, width, color=ORANGE)
     if has_causes:
         right.bar(at + 0.2, seen.by_axis_after_a * 1e3, width, color=BLUE)
-    right.axhline(noise_a * 1e3, color=MUTED, linestyle="--")
     right.set_xticks(at, [f"{a:.0f}°" for a in seen.by_axis_deg])
     right.set_xlim(-0.8, at.size - 0.2)
     right.set(xlabel="axis")
-    left.set_ylim(0, 1.05 * 1e3 * float(max(seen.time_before_a.max(), seen.time_after_a.max(), noise_a)))
+    left.set_ylim(0, 1.05 * 1e3 * float(max(seen.time_before_a.max(), seen.time_after_a.max(), noise_a or 0.0)))
     _legend_above(figure, left)
     return figure
 

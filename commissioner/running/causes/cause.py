@@ -19,11 +19,13 @@ PHASES = "uvw"
 
 @dataclass(frozen=True)
 class Form:
-    """One way in which a cause can be there. `numbers` are screened from zero; `spare` ones are freed once it is accepted."""
+    """One way in which a cause can be there. `numbers` are screened from zero; `spare` ones are freed once it is accepted;
+    `needs`: of the recording."""
 
     name: str
     numbers: tuple[str, ...]
     spare: tuple[str, ...] = ()
+    needs: Callable[[Record], bool] = field(default=lambda _: True, compare=False)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from commissioner.recordings.reading.mapping import ChannelMap, Target
 from commissioner.records import RunningRecording
 
 RATE_HZ, ROWS = 5000.0, 600
+MOTOR = "motor_2kw2"
+"""Whose plate is given beside each file, as `--motor`."""
 T = np.arange(ROWS) / RATE_HZ
 A = 2 * np.pi / 3
 AMPS = [7.3 * np.cos(2 * np.pi * 50 * T - k * A - 0.6) + 0.11 * np.cos(2 * np.pi * 250 * T + k * A) for k in range(3)]
@@ -379,7 +381,7 @@ def verdict(name: str, folder: Path) -> str:
     path = folder / f"{name}{made.ending}"
     path.write_bytes(made.data)
     try:
-        seen = read_running(path)
+        seen = read_running(path, motor=MOTOR)
     except DataRefused as refusal:
         if not made.channels:
             return f"refused: {refusal.what.replace(str(path), name)} [{refusal.value}]"
@@ -387,7 +389,7 @@ def verdict(name: str, folder: Path) -> str:
             return f"refused without a way to tell: {refusal.what.replace(str(path), name)}"
         told = ChannelMap({c: Target(t) for c, t in zip(made.channels, TARGETS, strict=True)})
         try:
-            wrong = _off(read_running(path, told), made)
+            wrong = _off(read_running(path, told, MOTOR), made)
         except DataRefused as second:
             return f"refused though told: {second.what.replace(str(path), name)} [{second.value}]"
         return "asked" if not wrong else f"WRONG once told: {wrong}"

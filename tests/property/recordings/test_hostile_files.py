@@ -29,6 +29,7 @@ from commissioner.settings import load_motor
 FEW = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 SIGNALS = ("segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
 MEGABYTE = 1 << 20
+FOREIGN = Path(__file__).parents[2] / "data" / "foreign_formats"
 
 
 def typed(act) -> object:
@@ -87,6 +88,15 @@ def test_a_parquet_of_more_numbers_than_the_limit_is_refused_before_they_are_rea
         read_table(path)
     monkeypatch.setattr(bounds, "MAX_BYTES", 6 * 8 * 200_000)
     assert read_table(path).columns["time_s"].size == 200_000
+
+
+def test_a_parquet_whose_metadata_end_arrow_is_refused_in_words():
+    """In a process of its own: what must not happen is its end by signal 6."""
+    path = FOREIGN / "torn_histogram.parquet"
+    look = "import sys; from commissioner.cli.app import main; sys.argv[1:] = ['recordings', 'import', sys.argv[1]]; main()"
+    seen = subprocess.run([sys.executable, "-c", look, str(path)], capture_output=True, text=True, check=False)
+    assert seen.returncode == 3, seen.stderr
+    assert "not a readable table" in " ".join(seen.stderr.split())
 
 
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from commissioner.errors import ConfigurationError
-from commissioner.monitor.intake.states import states
+from commissioner.monitor.intake.states.stretches import states
 from commissioner.operations.recordings.monitor import MonitorRequest, PartlyMonitored, monitor
 from commissioner.recordings.imported import store, understand
 from commissioner.recordings.table import write_table

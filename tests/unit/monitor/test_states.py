@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from commissioner.monitor.intake.carrier import means_over_carrier
-from commissioner.monitor.intake.states import cut_out, states
+from commissioner.monitor.intake.states.stretches import cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
 from commissioner.recordings.importers import read_running

@@ -112,3 +112,14 @@ def test_a_link_that_carries_no_plan_is_refused_and_an_unmeasured_one_is_not():
     assert plan_link(StreamPace(0.2, 29, 125, 117, 100), 2e-4) is None
     assert plan_link(StreamPace(0.03, 29, 125, 117, 2), 2e-4) is None
     assert plan_link(None, 2e-4) == LinkPlan()
+
+
+def test_a_late_answer_is_told_and_refused_where_the_drive_does_not_keep_what_it_holds_up():
+    def seen(slowest_s):
+        pace = StreamPace(0.0057, 29, 125, 117, 100, 500, slowest_s)
+        results = judge_drive(replace(IDENTITY, control_period_s=2e-4), (STATUS, STATUS), {}, PLATE, LIMITS, 6.4, pace)
+        return next(result for result in results if result.name == "the link keeps up with the samples")
+
+    assert seen(0.006).has_passed and "worst" not in seen(0.006).value
+    assert seen(0.08).has_passed and "80 ms at worst" in seen(0.08).value
+    assert not seen(0.11).has_passed and "evenly" in seen(0.11).remedy

@@ -232,6 +232,19 @@ def test_the_computed_third_is_left_out_of_a_standstill_recording_and_said(tmp_p
     assert recording.notes[-1].what.startswith("third current computed from two")
 
 
+def test_each_column_is_shown_with_the_unit_that_its_name_says(tmp_path: Path) -> None:
+    path = tmp_path / "ours.csv"
+    speed = 150.0 + 0.0 * TIME
+    path.write_text(
+        "time_s,current_u_a,current_v_a,current_w_a,voltage_u_v,voltage_v_v,voltage_w_v,speed_rad_per_s\n"
+        + rows(TIME, [*CURRENTS, *V, speed])
+    )
+    _, document = understand(path)
+    shown = {c["name"]: (c["unit"], c["factor"]) for c in document["columns"]}
+    assert shown["speed_rad_per_s"] == ("rad/s", 1.0)
+    assert shown["time_s"] == ("s", 1.0) and shown["current_u_a"] == ("A", 1.0) and shown["voltage_u_v"] == ("V", 1.0)
+
+
 def test_what_was_imported_reads_the_same_and_keeps_what_was_changed(tmp_path: Path) -> None:
     path, out = tmp_path / "scope.csv", tmp_path / "out.csv"
     path.write_text(FILES["rigol"])

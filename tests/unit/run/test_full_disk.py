@@ -16,6 +16,7 @@ from commissioner.link.wire.url import parse_url
 from commissioner.procedure.findings import RunEnded
 from commissioner.run import commission
 from commissioner.run.archive.folder import RunFolder
+from commissioner.run.ending import as_error
 from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
@@ -83,6 +84,32 @@ def test_the_drive_is_let_go_and_the_run_ends_at_whatever_record_the_disk_fills_
         assert (ended.outcome, ended.error["step"]) == ("faulted", "archive")
         assert "No space left" in ended.reason
         assert "--runs" in ended.error["remedy"]
+
+
+@pytest.mark.parametrize(
+    ("failure", "step", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "archive", "No space left"),
+        (ConnectionResetError(errno.ECONNRESET, "Connection reset by peer"), "run", "ConnectionResetError"),
+        (
+            PermissionError(errno.EACCES, "Permission denied", "/dev/ttyUSB0"),
+            "run",
+            "refused /dev/ttyUSB0: Permission denied",
+        ),
+        (OSError(errno.EMFILE, "Too many open files"), "run", "Too many open files"),
+    ],
+)
+def test_what_the_operating_system_refused_is_named_by_what_failed(folder, failure, step, said):
+    error = as_error(failure, folder)
+    assert error.step == step and said in error.what
+    assert ("archive" in error.what) is (step == "archive")
+
+
+def test_a_file_of_the_run_folder_that_fails_is_the_archive(folder):
+    assert (
+        as_error(PermissionError(errno.EACCES, "Permission denied", str(folder.path / "blocks.bin")), folder).step
+        == "archive"
+    )
 
 
 def test_a_defect_on_a_full_disk_still_lets_the_drive_go(folder):

@@ -1,0 +1,124 @@
+"""What each window of levels is called: off, residual, standstill, start, ramp, load step, steady, coast-down."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commissioner.monitor.intake.states.windows import HOPS, Levels
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import Signal
+
+RESIDUAL_VOLTAGE = 0.03
+"""Of the rated voltage, from which on a motor without current still has flux: it coasts."""
+FAST_CHANGE = 0.12
+"""Of the supply frequency, within half a second, that makes a ramp."""
+STEP = 0.15
+"""Of the current's level, between two stretches that are each constant within a third of it."""
+SETTLED = 0.08
+"""Of the level that follows, within which a start's current has come down."""
+START_CURRENT = 2.0
+"""Of the rated current, from which on a recording that begins with it begins in a start."""
+STANDING = 0.02
+"""Of the rated frequency: a slower vector is direct current."""
+LEAST_STEADY_S = 0.4
+OFF_CURRENT = 0.05
+"""Of the rated current: an energised motor idles on 0.12 at least."""
+
+
+def named(levels: Levels, plate: Nameplate) -> list[str]:
+    current, count = levels.current_a, levels.time_s.size
+    idle = current < OFF_CURRENT * plate.rated_current_a
+    names = ["steady"] * count
+    if idle.all():
+        return names
+    has_run = False
+    for k in range(count):
+        if idle[k]:
+            has_voltage = levels.voltage_v[k] > RESIDUAL_VOLTAGE * plate.rated_voltage_v / np.sqrt(3.0)
+            names[k] = "coast-down" if has_run else ("residual" if has_voltage else "off")
+        else:
+            has_run = True
+    standing = ~idle & (levels.frequency_hz < STANDING * plate.rated_frequency_hz)
+    for k in np.flatnonzero(standing).tolist():
+        names[k] = "standstill"
+    if standing.all():
+        return names
+    _name_ramps(levels, idle | standing, names)
+    for begin, end in _runs([n != "steady" for n in names]):
+        _name_within(levels, begin, end, names, plate.rated_current_a)
+    return names
+
+
+def _name_ramps(levels: Levels, idle: np.ndarray, names: list[str]) -> None:
+    half = max(round(0.25 / levels.hop_s), 1)
+    for k in range(len(names)):
+        a, b = max(k - half, 0), min(k + half, len(names) - 1)
+        if idle[a : b + 1].any():
+            continue
+        change = abs(levels.frequency_hz[b] - levels.frequency_hz[a]) / max(levels.frequency_hz[a : b + 1].max(), 1e-9)
+        if change > FAST_CHANGE * (b - a) / (2 * half):
+            names[k] = "ramp"
+    # what lies between off and a ramp, shorter than a ramp is seen over, belongs to it
+    ramps = [k for k, n in enumerate(names) if n == "ramp"]
+    if ramps and (k := ramps[0]) <= 2 * half + int(np.argmin(idle)):
+        for j in range(int(np.argmin(idle)), k):
+            names[j] = "ramp"
+
+
+def _runs(cut: list[bool]) -> list[tuple[int, int]]:
+    """(begin, end) of the stretches that are not cut."""
+    edges = np.flatnonzero(np.diff(np.r_[1, np.array(cut, dtype=int), 1]))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a: float) -> None:
+    """The start at the head of an energised stretch, and steps of the level inside it."""
+    current = levels.current_a[begin:end]
+    later = float(np.median(current[current.size // 2 :]))
+    settled = 0
+    was_off = begin > 0 and names[begin - 1] in ("off", "residual", "coast-down")
+    is_first = begin == 0 and float(current[:HOPS].max()) > max(START_CURRENT * rated_a, 2.0 * later)
+    if was_off or is_first:
+        above = np.flatnonzero(current > (1.0 + STEP) * later)
+        if above.size and above[0] <= 2 * HOPS and current.max() > 1.5 * later:
+            settled = int(_first_still(current, int(np.argmax(current))))
+        else:
+            settled = HOPS
+        for k in range(begin, min(begin + settled, end)):
+            names[k] = "start"
+    if end < len(names):
+        # windows that reach over the switch-off: half of them lie before it
+        for k in range(max(end - HOPS // 2, begin + settled), end):
+            names[k] = names[end]
+        end = max(end - HOPS, begin + settled)
+    if begin > 0:
+        for k in range(begin, min(begin + HOPS // 2, end)):
+            names[k] = names[begin - 1]
+    _name_steps(levels, begin + settled, end, names)
+
+
+def _first_still(current: Signal, peak: int) -> int:
+    """From where behind the peak the level stays within a few per cent of what follows."""
+    for k in range(peak, current.size - HOPS):
+        ahead = current[k : k + 3 * HOPS]
+        if np.ptp(ahead) < SETTLED * np.median(ahead):
+            return k
+    return current.size
+
+
+def _name_steps(levels: Levels, begin: int, end: int, names: list[str]) -> None:
+    least = round(LEAST_STEADY_S / levels.hop_s)
+    if end - begin < 2 * least:
+        return
+    current = levels.current_a[begin:end]
+    at = range(least, current.size - least)
+    apart = [abs(np.median(current[k + HOPS // 2 :]) - np.median(current[: k - HOPS // 2])) for k in at]
+    rest = [float(np.std(current[: k - HOPS // 2]) + np.std(current[k + HOPS // 2 :])) for k in at]
+    k = int(np.argmin(rest))
+    if apart[k] < STEP * float(np.median(current)) or rest[k] > apart[k] / 3.0:
+        return
+    middle = begin + at[k]
+    for j in range(middle - HOPS // 2, middle + HOPS // 2):
+        names[j] = "load step"
+    _name_steps(levels, begin, middle - HOPS // 2, names)
+    _name_steps(levels, middle + HOPS // 2, end, names)
