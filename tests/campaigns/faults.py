@@ -34,11 +34,11 @@ from tests.campaigns.short_run import truth
 from tests.campaigns.short_run.one_run import Outcome, run_until_undisturbed, short_scenario
 from tests.campaigns.short_run.sequences import WIRES, Sequence, sequences
 from tests.campaigns.short_run.short_course import PLAN, Script, plate
+from tests.support.preloaded import PRELOADED
 
 SHARE = 50
 """Sequences drawn from one seed. Hypothesis begins each share with its simplest sequences."""
-WORKERS = multiprocessing.get_context("forkserver")
-WORKERS.set_forkserver_preload(["tests.campaigns.short_run.one_run", "tests.campaigns.short_run.warm"])
+WORKERS = PRELOADED
 
 
 def share(count: int, seed: int, wire: str, end: float = float("inf"), *, shrinks: bool = False) -> list[Outcome]:

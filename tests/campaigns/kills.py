@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import multiprocessing
 import os
 import signal
 import sys
@@ -49,12 +48,12 @@ from tests.campaigns.short_run.short_course import (
     plate,
     short_course,
 )
+from tests.support.preloaded import PRELOADED
 from tests.support.sim_process import SimProcess
 
 LONGEST_RUN_S = 60.0
 PROFILE = "simulated"
-VICTIMS = multiprocessing.get_context("forkserver")
-VICTIMS.set_forkserver_preload(["tests.campaigns.short_run.one_run", "tests.campaigns.short_run.warm"])
+VICTIMS = PRELOADED
 WHOLE_RUN_ATTEMPTS = 5
 """A busy machine can miss the short reply time-out of these runs."""
 

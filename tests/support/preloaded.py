@@ -17,8 +17,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-_SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(["tests.support.preload"])
+PRELOADED = multiprocessing.get_context("forkserver")
+"""The one server of a process: whoever else forks from it takes it from here, with all that any of them needs."""
+PRELOADED.set_forkserver_preload(
+    ["tests.support.preload", "tests.campaigns.short_run.one_run", "tests.campaigns.short_run.warm"]
+)
 
 
 class PreloadedProcess:
@@ -30,7 +33,7 @@ class PreloadedProcess:
         for stream in self._streams:
             stream.touch()
         names = tuple(map(str, self._streams))
-        self.process = _SERVER.Process(
+        self.process = PRELOADED.Process(
             target=_begin, args=(module, list(arguments), names, str(cwd or Path.cwd()), dict(os.environ))
         )
         self.process.start()
