@@ -176,7 +176,7 @@ def _keeps_up(pace: StreamPace | None, sample_period_s: float) -> Iterator[Check
         limit
         if plan is not None and not plan.is_reduced
         else f"{limit}; slower with means, or with samples kept in the drive",
-        f"use a link that answers sooner{'' if is_kept else ' and evenly'}: a cable in place of radio, VPN or gateway; a serial line of "
+        "use a link that answers sooner and evenly: a cable in place of radio, VPN or gateway; a serial line of "
         f"{least_baud(pace, sample_period_s, is_reduced=plan is None):.0f} Bd or more",
     )
 
