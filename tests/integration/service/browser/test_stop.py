@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 
 from tests.integration.service.conftest import PAGE_LOST_S
 from tests.support.service.browser import SLOW_MS, technician
+from tests.support.service.service_process import ServiceProcess
 
 pytestmark = pytest.mark.timeout(900)
 """A guard against hanging: what is judged by time says so itself."""
@@ -40,8 +41,15 @@ def test_stop_ends_the_voltage_in_each_of_its_ways(service, browser, way):
         assert (told[0]["by"], told[0]["run"], told[0]["zero_volts"]) == (way, run, True)
 
 
-def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(service, browser):
-    with technician(browser, service) as first, technician(browser, service, "de") as second:
+def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(browser, tmp_path):
+    """A run of six tests: it must still be energised when the second page has been lost."""
+    settings = f"page_lost_s = {PAGE_LOST_S}\nhand_over_s = 60.0\naxes_deg = [0, 60, 120, 180, 240, 300]"
+    with (
+        ServiceProcess(tmp_path, settings=settings) as service,
+        technician(browser, service) as first,
+        technician(browser, service, "de") as second,
+    ):
+        service.start_simulator()
         run = first.energise()
         first.wait_energised()
         second.go(f"/runs/{run}")
@@ -66,8 +74,6 @@ def test_two_browsers_one_operates_and_hands_over_and_a_lost_page_stops_the_run(
 
 def test_a_page_that_has_lost_the_service_says_what_it_cannot_do(browser, tmp_path):
     """The service is killed: zero volts by the dead man; the page points at the emergency stop."""
-    from tests.support.service.service_process import ServiceProcess
-
     with ServiceProcess(tmp_path) as service, technician(browser, service) as hand:
         service.start_simulator()
         run = service.start_run()
