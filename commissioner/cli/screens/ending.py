@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
-
 from commissioner.cli.screens import screen
 from commissioner.run.commission import Commissioned
 
 EXIT_CODES = {"commissioned": 0, "rejected": 3, "aborted": 4, "faulted": 5}
-
-
-def say_folder(folder: Path) -> None:
-    """To the service that holds this process: a line of its own as soon as there is a folder."""
-    sys.stdout.write(json.dumps({"run": folder.name, "folder": str(folder)}) + "\n")
-    sys.stdout.flush()
 
 
 def show_and_exit(done: Commissioned, *, as_json: bool) -> None:

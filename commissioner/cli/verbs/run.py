@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-
 from rich.markup import escape
 
+from commissioner.cli.held import held_by_a_service
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.ending import say_folder, show_and_exit
+from commissioner.cli.screens.ending import show_and_exit
 from commissioner.cli.screens.live import LiveView
 from commissioner.cli.signals import let_end
 from commissioner.operations.check import CheckRequest, check
 from commissioner.operations.commission import CommissionRequest, check_request, commission
 from commissioner.run.commission import Origin
-from commissioner.run.stopping.dead_man import DeadMan
 from commissioner.run.stopping.operator_stop import OperatorStop
 
 
@@ -34,16 +32,10 @@ def run(request: CommissionRequest, *, yes: bool, as_json: bool, dead_man: bool 
 
 
 def hold_and_commission(request: CommissionRequest) -> None:
-    """A run that a service holds by the pipe at our standard input. Nobody is asked here; nothing is shown but two JSON
-    documents: the folder as soon as there is one, on a line of its own, and the result."""
+    """A run that a service holds: two JSON documents, the folder and the result."""
     check_request(request)
-    stop = OperatorStop()
-    held = DeadMan(sys.stdin.fileno(), stop)
-    held.start()
-    facts = held.wait_for_begin()
-    with stop:
-        done = commission(request, origin=Origin(facts, say_folder, stop))
-        let_end()
+    with held_by_a_service() as (_, _, origin):
+        done = commission(request, origin=origin)
     show_and_exit(done, as_json=True)
 
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import typer
 
+from commissioner.cli.held import held_by_a_service
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.ending import EXIT_CODES, say_folder
-from commissioner.cli.signals import let_end
+from commissioner.cli.screens.ending import EXIT_CODES, show_and_exit
 from commissioner.errors import UsageError
 from commissioner.operations.tune import TunedOnce, TuneRequest, TuningBegan, check_request
 from commissioner.operations.tune import tune as carry_out
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
-from commissioner.run.commission import Origin
 from commissioner.run.stopping.dead_man import DeadMan
 from commissioner.run.stopping.operator_stop import OperatorStop
 
@@ -56,18 +54,11 @@ class AtThePage:
 
 
 def hold_and_tune(request: TuneRequest) -> None:
-    """A tune that a service holds by the pipe at our standard input, as `run --dead-man`."""
+    """A tune that a service holds, as `run --dead-man`."""
     check_request(request)
-    stop = OperatorStop()
-    held = DeadMan(sys.stdin.fileno(), stop)
-    held.start()
-    facts = held.wait_for_begin()
-    with stop:
-        done = carry_out(request, AtThePage(held, stop), _quiet, Origin(facts, say_folder, stop))
-        let_end()
-    screen.emit({**done.result, "folder": str(done.folder)})
-    if code := EXIT_CODES[done.ended.outcome]:
-        raise SystemExit(code)
+    with held_by_a_service() as (held, stop, origin):
+        done = carry_out(request, AtThePage(held, stop), _quiet, origin)
+    show_and_exit(done, as_json=True)
 
 
 def tune(request: TuneRequest, *, yes: bool, as_json: bool, dead_man: bool = False) -> None:

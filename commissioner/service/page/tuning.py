@@ -6,7 +6,7 @@ import shlex
 from typing import Any
 
 from fastapi import APIRouter, Request
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import Response
 
 from commissioner.registers.tuning import Tuning
 from commissioner.service.access.accounts import Role
@@ -15,6 +15,7 @@ from commissioner.service.archive import Entry
 from commissioner.service.library import Drive, Motor
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
+from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.tuning import Answer, TuneWish, give_answer, start_tuning
@@ -72,14 +73,12 @@ def _tune_page(request: Request, drive: Drive, motor: Motor, message: str = "", 
 
 @router.post("/drives/{drive}/tune")
 async def do_tune(request: Request, drive: str) -> Response:
-    """The button was held; or, for whoever cannot hold one, the motor's name was typed. Three points confirmed."""
+    """The button was held."""
     who, fields = await enter_form(request)
-    parts, wants_json = parts_of(request), "application/json" in request.headers.get("accept", "")
+    parts = parts_of(request)
     known, motor = parts.library.drive(drive), parts.library.motor(fields.get("motor", ""))
-    confirmed = all(fields.get(f"confirm{k}") == "yes" for k in (1, 2, 3))
-    if not confirmed or not (fields.get("held") == "yes" or fields.get("word", "").strip() == motor.id):
-        message = "Nothing was energised: confirm the three points and type the motor’s name."
-        return _tune_page(request, known, motor, message, 422)
+    if not is_meant(fields, motor):
+        return _tune_page(request, known, motor, NOT_MEANT, 422)
     repeat = fields.get("repeat", "")
     wish = TuneWish(
         drive=known.id,
@@ -89,13 +88,7 @@ async def do_tune(request: Request, drive: str) -> Response:
         hardwired_stop=fields.get("hardwired_stop") == "yes",
         confirm=True,
     )
-    try:
-        run = await start_tuning(parts, wish, who)
-    except Refusal as refusal:
-        if wants_json:
-            raise
-        return refused(request, refusal, Place(drive=known.id), f"/drives/{known.id}/checks?motor={motor.id}")
-    return JSONResponse({"url": f"/runs/{run.id}"}, 201) if wants_json else go(f"/runs/{run.id}")
+    return await to_the_run(request, start_tuning(parts, wish, who), known, motor)
 
 
 @router.post("/runs/{run}/answer")

@@ -24,6 +24,7 @@ from commissioner.service.library import (
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
+from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
 from commissioner.service.page.texts import UNIT_SIGNS, Texts, sentence, texts_of, typeset
 from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
@@ -298,23 +299,14 @@ def _energise_page(request: Request, drive: Drive, motor: Motor, message: str = 
 
 @router.post("/drives/{drive}/energise")
 async def do_energise(request: Request, drive: str) -> Response:
-    """The button was held; or, for whoever cannot hold one, the motor's name was typed. Three points confirmed."""
+    """The button was held."""
     who, fields = await enter_form(request)
-    parts, wants_json = parts_of(request), "application/json" in request.headers.get("accept", "")
+    parts = parts_of(request)
     known, motor = parts.library.drive(drive), parts.library.motor(fields.get("motor", ""))
-    confirmed = all(fields.get(f"confirm{k}") == "yes" for k in (1, 2, 3))
-    meant = fields.get("held") == "yes" or fields.get("word", "").strip() == motor.id
-    if not (confirmed and meant):
-        message = "Nothing was energised: confirm the three points and type the motor’s name."
-        return _energise_page(request, known, motor, message, 422)
+    if not is_meant(fields, motor):
+        return _energise_page(request, known, motor, NOT_MEANT, 422)
     wish = RunWish(drive=known.id, motor=motor.id, write_back=fields.get("write_back") == "yes", confirm=True)
-    try:
-        run = await start_run(parts, wish, who)
-    except Refusal as refusal:
-        if wants_json:
-            raise
-        return refused(request, refusal, Place(drive=known.id), f"/drives/{known.id}/checks?motor={motor.id}")
-    return JSONResponse({"url": f"/runs/{run.id}"}, 201) if wants_json else go(f"/runs/{run.id}")
+    return await to_the_run(request, start_run(parts, wish, who), known, motor)
 
 
 @router.get("/runs/{run}")

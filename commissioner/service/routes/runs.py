@@ -49,6 +49,12 @@ async def start(request: Request, wish: RunWish, who: Operator) -> dict[str, Any
 async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
     """The run, begun. The audit says so before anything moves."""
     drive, motor = parts.library.drive(wish.drive), parts.library.motor(wish.motor)
+    verb = parts.desk.commissioning(wish.axes_deg, write_back=wish.write_back)
+    return await begin(parts, drive, motor, verb, who, write_back=wish.write_back)
+
+
+async def begin(parts: Parts, drive: Drive, motor: Motor, verb: list[str], who: Visitor, **told: Any) -> LiveRun:
+    """The run of this verb, begun; the audit says so before anything moves."""
     if not drive.url:
         raise Refusal(
             409,
@@ -58,12 +64,6 @@ async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
             limit="a drive with an address",
             remedy="start the simulator first",
         )
-    verb = parts.desk.commissioning(wish.axes_deg, write_back=wish.write_back)
-    return await begin(parts, drive, motor, verb, who, write_back=wish.write_back)
-
-
-async def begin(parts: Parts, drive: Drive, motor: Motor, verb: list[str], who: Visitor, **told: Any) -> LiveRun:
-    """The run of this verb, begun; the audit says so before anything moves."""
     party = Party(who.session.id if who.session else "", who.person)
     facts = {"drive": drive.id, "motor": motor.id, **told}
     await asyncio.to_thread(parts.audit.write, who.person, who.address, "asked to energise", **facts)

@@ -52,15 +52,6 @@ async def start(request: Request, wish: TuneWish, who: Operator) -> dict[str, An
 async def start_tuning(parts: Parts, wish: TuneWish, who: Visitor) -> LiveRun:
     """The tuning, begun."""
     drive, motor = parts.library.drive(wish.drive), parts.library.motor(wish.motor)
-    if not drive.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="start a run",
-            value=drive.id,
-            limit="a drive with an address",
-            remedy="start the simulator first",
-        )
     verb = ["tune", "--repeat", str(wish.repeat), *([] if wish.pause_s is None else ["--pause", f"{wish.pause_s:g}"])]
     verb += ["--write-back"] if wish.write_back else []
     verb += ["--hardwired-stop"] if wish.hardwired_stop else []
