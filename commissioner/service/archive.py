@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from commissioner.errors import CommissionerError
-from commissioner.run.archive.catalogue import RunSummary, summarise
-from commissioner.run.archive.folder import read_document
+from commissioner.run.archive.catalogue import RunSummary, read_run
+from commissioner.run.archive.documents import read_document, read_result
 from commissioner.service.problems import Refusal
 
 PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
@@ -73,16 +72,12 @@ class Archive:
         return entry
 
     def summary(self, run: str) -> RunSummary:
-        return summarise(self.find(run).folder)
+        return read_run(self.find(run).folder)
 
     def result(self, run: str) -> dict[str, Any]:
-        """The result document; of a run without one, what its journal says."""
+        """The result document; of a run without one, what its journal says. DataRefused: it is damaged."""
         entry = self.find(run)
-        path = entry.folder / "result.json"
-        document = read_document(path.read_text("utf-8", "replace")) if path.is_file() else {}
-        if document:
-            return document
-        return {
+        return read_result(entry.folder) or {
             "run": entry.run,
             "outcome": entry.outcome,
             "reason": entry.reason,
@@ -127,19 +122,16 @@ class Archive:
         known = self._read.get(name)
         if known is not None and known[0] == changed:
             return known[1]
-        try:
-            entry = _read_entry(folder)
-        except (CommissionerError, OSError, ValueError, KeyError, TypeError):
-            return None
+        entry = _read_entry(folder)
         self._read[name] = (changed, entry)
         return entry
 
 
 def _read_entry(folder: Path) -> Entry:
-    summary = summarise(folder)
+    summary = read_run(folder)
     request = folder / "request.json"
     asked = read_document(request.read_text("utf-8", "replace")) if request.is_file() else {}
-    origin, plate = asked.get("origin") or {}, asked.get("nameplate") or {}
+    origin, plate = (part if isinstance(part := asked.get(name), dict) else {} for name in ("origin", "nameplate"))
     parameters = (summary.result or {}).get("parameters")
     return Entry(
         summary.run,
@@ -179,7 +171,7 @@ def _utc_of(run: str) -> str:
 def _plate_text(plate: Mapping[str, Any]) -> str:
     try:
         return f"{plate['rated_power_w'] / 1000:g} kW, {plate['rated_voltage_v']:g} V, {plate['rated_current_a']:g} A"
-    except (KeyError, TypeError):
+    except (KeyError, TypeError, ValueError):
         return ""
 
 

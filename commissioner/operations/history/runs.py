@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import UsageError
 from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.archive.documents import read_result
 from commissioner.run.index.index import Found, Refreshed
 from commissioner.run.index.index import find as look_up
 from commissioner.run.index.index import refresh as bring_into_step
@@ -49,8 +50,9 @@ def write_runs(archive: Archive, wanted: Wanted, out: Path) -> WrittenTable:
 
 
 def show_run(runs: Path, run: str) -> RunSummary:
-    """The run of which the id starts so, or the newest for `last`. UsageError: none or several."""
-    return find_run(runs, run)
+    """The run of which the id starts so, or the newest for `last`. UsageError: none or several. DataRefused: its result is damaged."""
+    found = find_run(runs, run)
+    return replace(found, result=read_result(Path(found.folder)))
 
 
 def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:

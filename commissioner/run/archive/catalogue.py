@@ -12,8 +12,8 @@ from commissioner.run.archive.summary import (
     OLD_OR_NEW,
     RESTORED,
     RunSummary,
-    read_file,
     read_summary,
+    sound_result,
     summarise,
     unreadable,
 )
@@ -42,7 +42,7 @@ def read_run(folder: Path, *, with_result: bool = True) -> RunSummary:
         found = read_summary(folder, (folder / "journal.jsonl").stat().st_size)
         if found is None:
             return summarise(folder)
-        return replace(found, result=read_file(folder / "result.json") or None) if with_result else found
+        return replace(found, result=sound_result(folder)) if with_result else found
     except (CommissionerError, OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
         return unreadable(folder, error)
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from commissioner.errors import CommissionerError, DataRefused
+from commissioner.report.run.contract import RunDocument
 
 
 def read_document(text: str) -> dict[str, Any]:
@@ -29,6 +33,28 @@ def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
             folder, name, f"no {missing[0]}" if document else "not readable" if path.is_file() else "no such file"
         )
     return document
+
+
+def read_result(folder: Path) -> dict[str, Any] | None:
+    """What the run's `result.json` says; None where it has none. DataRefused: damaged, or a value of another kind than promised;
+    what is not there, or null, may be an older version's."""
+    if not (folder / "result.json").is_file():
+        return None
+    document = read_saved(folder, "result.json")
+    try:
+        _promised().validate_python(document, strict=True)
+    except ValidationError as error:
+        wrong = [at for at in error.errors(include_url=False) if at["type"] != "missing" and at["input"] is not None]
+        if wrong:
+            where = ".".join(map(str, wrong[0]["loc"]))
+            seen = f"{where}: {wrong[0]['msg']}, not {wrong[0]['input']!r:.80}"
+            raise damaged(folder, "result.json", seen) from error
+    return document
+
+
+@cache
+def _promised() -> TypeAdapter[RunDocument]:
+    return TypeAdapter(RunDocument)
 
 
 def damaged(folder: Path, name: str, seen: str) -> DataRefused:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from commissioner.errors import DataRefused
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
-from commissioner.run.archive.documents import read_document
+from commissioner.run.archive.documents import read_document, read_result
 from commissioner.run.archive.journal import Record, read_journal
 
 NAME = "summary.json"
@@ -80,7 +81,7 @@ def summary_of(folder: Path, records: list[Record]) -> RunSummary:
     end: Record = next(reversed(_of(records, "run_ended")), {})
     start: Record = next(iter(_of(records, "run_started")), {})
     identity: Record = next(iter(_of(records, "drive_identified")), {})
-    result, request = read_file(folder / "result.json"), read_file(folder / "request.json")
+    result, request = sound_result(folder) or {}, read_file(folder / "request.json")
     serial = identity.get("serial_number")
     origin = _mapping(request.get("origin"))
     named: Mapping[str, Any] = next(reversed(_of(records, NAMED)), origin)
@@ -126,6 +127,14 @@ def unreadable(folder: Path, error: Exception) -> RunSummary:
     """The row of a folder that cannot be read at all."""
     what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
     return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", 0.0, "not known")
+
+
+def sound_result(folder: Path) -> dict[str, Any] | None:
+    """The run's result where it has one that can be read, and is of the form that was promised."""
+    try:
+        return read_result(folder)
+    except DataRefused:
+        return None
 
 
 def read_file(path: Path) -> dict[str, Any]:

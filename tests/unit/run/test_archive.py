@@ -1,16 +1,21 @@
 """The run folder loses nothing that was written and shows where a kill tore the rest."""
 
 import json
+import re
 import stat
 
 import numpy as np
 import pytest
 
 from commissioner.encoding import plain
+from commissioner.errors import DataRefused
+from commissioner.operations.history.runs import show_run
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
-from commissioner.run.archive.catalogue import summarise
+from commissioner.run.archive.catalogue import find_run, summarise
 from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal, write_recording
+from commissioner.service.archive import Archive
+from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
 
 def _block(first: int, count: int = 29, *, lost: int = 0, with_w: bool = True) -> SampleBlock:
@@ -156,3 +161,34 @@ def test_a_comment_with_an_equals_sign_is_a_value_too(tmp_path, mark):
     )
     metadata = read_table(path).metadata
     assert metadata["rated_current_a"] == 5.2 and metadata["note"] == "at 20:15, R=3"
+
+
+@pytest.mark.parametrize(
+    ("written", "seen"),
+    [
+        ('{"outcome": "commissioned", "parameters": {"stator_res', "not readable"),
+        ('{"outcome": 7, "parameters": [1], "reason": {"a": []}, "checks": 3}', "outcome: .* not 7"),
+        ('{"outcome": "rejected", "parameters": [1]}', r"parameters.*: .* not \[1\]"),
+        ('{"outcome": "rejected", "remarks": "x"}', "remarks: .* not 'x'"),
+        ('{"outcome": "rejected", "checks": [{"name": [], "has_passed": 1}]}', r"checks\.0\.name: .* not \[\]"),
+        ("[" * 100_000, "not readable"),
+    ],
+)
+def test_a_damaged_result_is_refused_by_name_and_hides_no_other_run(tmp_path, written, seen):
+    good, bad = "20260101-000000-simulated-abcdef", "20260102-000000-simulated-abcdef"
+    result = result_of(good, MACHINE)
+    make_run(tmp_path, good, result=result)
+    (make_run(tmp_path, bad, result=result) / "result.json").write_text(written)
+    assert show_run(tmp_path, good).result == Archive(tmp_path).result(good) == result
+    for read in (show_run, lambda root, run: Archive(root).result(run)):
+        with pytest.raises(DataRefused, match="result.json is damaged") as refusal:
+            read(tmp_path, bad)
+        assert refusal.value.value and re.match(seen, str(refusal.value.value))
+    assert find_run(tmp_path, bad).result is None
+    assert [entry.run for entry in Archive(tmp_path).entries()] == [bad, good]
+
+
+def test_a_result_of_an_older_version_is_shown(tmp_path):
+    run = "20250101-000000-simulated-abcdef"
+    make_run(tmp_path, run, result={"outcome": "rejected", "energised_s": None, "parameters": {}})
+    assert show_run(tmp_path, run).result == {"outcome": "rejected", "energised_s": None, "parameters": {}}
