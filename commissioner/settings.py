@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError, UsageError, no_file
 from commissioner.motor.nameplate import Nameplate, check, connection_of
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.validation import first_problem
@@ -129,13 +129,7 @@ def load_procedure(
 def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file of bounded size."""
     if not path.is_file():
-        raise UsageError(
-            f"there is no file {path}",
-            step="read configuration",
-            value=str(path),
-            limit="an existing TOML file",
-            remedy="check the path",
-        )
+        raise no_file(path, "read configuration", "an existing TOML file")
     if path.stat().st_size > MAX_BYTES:
         raise ConfigurationError(
             file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected=f"at most {MAX_BYTES} bytes"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import UnionType
@@ -80,6 +81,8 @@ def human(key: str) -> tuple[str, str]:
 
 def _limit(problem: Mapping[str, Any], unit: str) -> str:
     bound: Mapping[str, Any] = problem.get("ctx") or {}
+    if isinstance(problem.get("input"), float) and not math.isfinite(problem["input"]):
+        return "a finite number"
     match problem["type"]:
         case "greater_than":
             return f"above {bound['gt']:g}{unit}"

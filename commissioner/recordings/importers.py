@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.errors import DataRefused, UsageError
+from commissioner.errors import DataRefused, no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
-from commissioner.recordings.reading.mend import with_time, with_whole_time, without_doubled_rows
+from commissioner.recordings.reading.mend import require_seconds, with_time, with_whole_time, without_doubled_rows
 from commissioner.recordings.reading.preface import Clock, clock_in
 from commissioner.recordings.reading.recognise import Recognised, recognise
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
@@ -88,10 +88,7 @@ def contract_table(path: Path, mapping: ChannelMap | None = None, motor: str | N
 
 def _read(path: Path, mapping: ChannelMap) -> Table:
     if not path.is_file():
-        raise UsageError(
-            f"there is no file {path}", step="read recording", value=str(path), limit="an existing file",
-            remedy="check the path",
-        )  # fmt: skip
+        raise no_file(path, "read recording")
     suffix = path.suffix.lower()
     if suffix in NOT_READ:
         raise DataRefused(
@@ -217,6 +214,8 @@ def _table(
     if clock.interval_s is None and isinstance(period, float):
         clock = replace(clock, interval_s=period, said_by="sample_period_s")
     made = with_time(columns, clock)
+    if not made:
+        require_seconds(columns, found.readings, source)
     if clock.interval_s is not None and "sample_period_s" not in metadata and made:
         metadata["sample_period_s"] = clock.interval_s
     _with_constants(columns, metadata)

@@ -21,7 +21,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 from numpy.typing import NDArray
 
-from commissioner.errors import DataRefused, UsageError
+from commissioner.errors import DataRefused, UsageError, no_file
 from commissioner.motor.computed import without_computed_third
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
@@ -79,13 +79,7 @@ READ = "CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4 or COMTRADE"
 def read_table(path: Path) -> Table:
     """The table in `path`. Raises UsageError where there is no such file, DataRefused where it is not a table."""
     if not path.is_file():
-        raise UsageError(
-            f"there is no file {path}",
-            step="read recording",
-            value=str(path),
-            limit="an existing file",
-            remedy="check the path",
-        )
+        raise no_file(path, "read recording")
     try:
         if path.suffix == ".parquet":
             return _read_parquet(path)

@@ -11,7 +11,7 @@ from commissioner.service.configuration import SimulatorTable
 from commissioner.service.library import Library
 from commissioner.service.problems import Refusal
 
-START_S = 120.0
+START_S = 900.0
 """It compiles its kernels at the first start; later it takes about a second."""
 SCENARIOS = (
     "default", "linear", "small_motor", "large_motor", "sto_open", "fault_present", "overtemperature", "flux_hazard",
@@ -66,7 +66,7 @@ class Simulator:
         said = await self._said()
         await self._end()
         raise Refusal(503, "the simulator did not start", step="start simulator", value=said,
-                      limit=f"listening within {START_S:g} s", remedy="run `python -m sim --tcp 0` by hand to see what it says")  # fmt: skip
+                      limit=f"listening within {START_S:g} s", remedy="try again: what was compiled so far is kept; `python -m sim --tcp 0` shows what it says")  # fmt: skip
 
     async def _said(self) -> str:
         if self._process is None or self._process.returncode is None or self._process.stderr is None:

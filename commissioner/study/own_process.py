@@ -7,18 +7,20 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from commissioner.errors import LinkUnreachable
 
-START_S = 120.0
-"""The simulator compiles its kernels at the first start; later starts take about a second."""
+START_S, LONG_S = 900.0, 10.0
+"""The simulator compiles its kernels at the first start, minutes on a busy computer; later starts take about a second."""
 
 
 @contextmanager
-def simulated_inverter(scenario: str, speed: str, seed: int, more: Sequence[str] = ()) -> Iterator[str]:
-    """The drive URL of a running `python -m sim`; the process ends with the context."""
+def simulated_inverter(
+    scenario: str, speed: str, seed: int, more: Sequence[str] = (), wait: Callable[[], None] = lambda: None
+) -> Iterator[str]:
+    """The drive URL of a running `python -m sim`; the process ends with the context. `wait` is called where it takes long."""
     command = [
         sys.executable,
         "-m",
@@ -39,7 +41,7 @@ def simulated_inverter(scenario: str, speed: str, seed: int, more: Sequence[str]
         start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
     )  # fmt: skip
     try:
-        yield f"tcp://127.0.0.1:{_port(process)}?device=1"
+        yield f"tcp://127.0.0.1:{_port(process, wait)}?device=1"
     finally:
         process.terminate()
         try:
@@ -49,7 +51,7 @@ def simulated_inverter(scenario: str, speed: str, seed: int, more: Sequence[str]
             process.wait()
 
 
-def _port(process: subprocess.Popen[str]) -> int:
+def _port(process: subprocess.Popen[str], wait: Callable[[], None]) -> int:
     """The port the simulator prints as `listening tcp 127.0.0.1:PORT`."""
     lines: queue.Queue[str] = queue.Queue()
     assert process.stdout is not None
@@ -61,8 +63,11 @@ def _port(process: subprocess.Popen[str]) -> int:
             lines.put(line)
 
     threading.Thread(target=collect, daemon=True).start()
-    deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline:
+    began, is_long = time.monotonic(), False
+    while time.monotonic() < began + START_S:
+        if not is_long and time.monotonic() > began + LONG_S:
+            is_long = True
+            wait()
         try:
             line = lines.get(timeout=0.1)
         except queue.Empty:
@@ -77,5 +82,5 @@ def _port(process: subprocess.Popen[str]) -> int:
         step="start simulator",
         value=said.splitlines()[-1] if said else "no answer",
         limit=f"listening within {START_S:g} s",
-        remedy="run `python -m sim --tcp 0` by hand to see what it says",
+        remedy="start again: what was compiled so far is kept; `python -m sim --tcp 0` shows what the simulator says",
     )

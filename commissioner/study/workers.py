@@ -96,7 +96,7 @@ def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[dict[str, Any]
     except ImportError as error:
         raise UsageError(
             "a cluster needs Dask", step="study", value=scheduler, limit="the package `distributed`",
-            remedy="pip install 'commissioner[study]'",
+            remedy="pip install \".[study]\" in the folder of this program",
         ) from error  # fmt: skip
     try:
         client = distributed.Client(scheduler, timeout="10s", set_as_default=False)

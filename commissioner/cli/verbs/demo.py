@@ -27,7 +27,12 @@ def demo(
 
     if not as_json:
         screen.out.print("[dim]starting the simulated inverter (its own process, Modbus TCP on loopback)[/]")
-    with simulated_inverter(scenario, speed, seed) as url:
+
+    def wait() -> None:
+        if not as_json:
+            screen.out.print("[dim]compiling the simulator: at the first start only, minutes on a slow computer[/]")
+
+    with simulated_inverter(scenario, speed, seed, wait=wait) as url:
         request = CommissionRequest(
             url, "simulated", "motor_2kw2", runs, None, parse_axes(axes), write_back,
             DIAGNOSIS_S if diagnosis else 0.0, strict=strict,

@@ -88,7 +88,7 @@ def require_extra() -> None:
             step="serve",
             value=str(missing.name),
             limit="the extra `serve`",
-            remedy="pip install 'commissioner[serve]'",
+            remedy='pip install ".[serve]" in the folder of this program',
         ) from missing
 
 

@@ -17,7 +17,7 @@ from commissioner.diagnose.export.model_file import plain as without_effects
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.model import Layout, Model
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError, UsageError, no_file
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.running import is_running_model, played
@@ -150,13 +150,7 @@ def _motor(name: str, plain: bool) -> _Motor:
 
 def _extended(path: Path, plain: bool) -> _Motor:
     if not path.is_file():
-        raise UsageError(
-            f"there is no file {path}",
-            step="read model",
-            value=str(path),
-            limit="an existing file",
-            remedy="check the path",
-        )
+        raise no_file(path, "read model")
     if path.stat().st_size > MAX_BYTES:
         raise ConfigurationError(
             file=str(path), key="size", value=path.stat().st_size, expected=f"at most {MAX_BYTES} bytes"

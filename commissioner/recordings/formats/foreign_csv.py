@@ -17,7 +17,7 @@ from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to_numbers
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
-from commissioner.recordings.reading.preface import Clock, clock_in, metadata_of, pairs
+from commissioner.recordings.reading.preface import Clock, clock_in, metadata_of, pairs, probes_in
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -60,6 +60,9 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     said = pairs(layout.preface)
     if encoding not in ("UTF-8", "Latin-1", "Windows-1252"):
         notes.append(ReadingNote("encoding", f"the text is in {encoding}"))
+    if probes := probes_in(layout.preface):
+        notes.append(ReadingNote("probes", f"probes of {probes} are named above the columns: numbers are taken as they are printed; "
+                                 "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
     names, units, clock = _start_and_increment(layout, clock_in(said))
     return RawTable(names, units, tuple(columns), dict(metadata_of(said)), clock, tuple(notes))
 

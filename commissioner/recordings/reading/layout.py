@@ -152,9 +152,13 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
     names, units, used = _by_keys(above, width, names, units, used)
-    return Layout(
-        separator, lines[first].start, names, units, tuple(above[: len(above) - used]), 0, is_split and separator == ","
-    )
+    preface = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
+    return Layout(separator, lines[first].start, names, units, preface, 0, is_split and separator == ",")
+
+
+def _beyond(header: Sequence[Row], width: int) -> list[Row]:
+    """Names beyond the numbers over values in the row of units: keys with values (Rigol: `Start` and `Increment`)."""
+    return [list(pair) for pair in zip(*(row[width:] for row in header), strict=False)] if len(header) == 2 else []
 
 
 def _by_keys(

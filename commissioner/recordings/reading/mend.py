@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.errors import DataRefused
+from commissioner.recordings.names import key_of
 from commissioner.recordings.reading.preface import Clock
+from commissioner.recordings.table import ColumnReading
+from commissioner.recordings.units import read_unit
 from commissioner.records import ReadingNote, Signal
 
 LEAST_ROWS = 16
+_COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", "samples", "sequence"}
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
 
@@ -31,6 +36,22 @@ def with_time(columns: dict[str, Signal], clock: Clock) -> list[ReadingNote]:
     return [
         ReadingNote("time_made", f"time from {clock.said_by or 'the sample interval'}: {clock.interval_s:.6g} s a row")
     ]
+
+
+def require_seconds(columns: Mapping[str, Signal], readings: Sequence[ColumnReading], source: str) -> None:
+    """DataRefused: what was taken for the time counts the rows, by its name or by a unit that is none of time."""
+    time = columns.get("time_s")
+    if time is None or time.size < 3 or not np.all(np.diff(time) == 1.0):
+        return
+    for reading in readings:
+        unit = reading.unit.strip("[]() ")
+        counts = _COUNTERS & {key_of(reading.name), key_of(unit)} or (unit and read_unit(unit) is None)
+        if reading.meaning == "time_s" and counts:
+            raise DataRefused(
+                f"{source}: {reading.name} counts the rows, and the file does not say how long a row lasts", step="read the time",
+                value=f"{reading.name} {unit}".strip(), limit="seconds, or a sample interval or rate above the columns",
+                remedy="give `# sample_period_s: 0.000125` as the first line, with the period of your recording",
+            )  # fmt: skip
 
 
 def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:

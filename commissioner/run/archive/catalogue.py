@@ -65,6 +65,11 @@ def find_folder(root: Path, name: str) -> Path:
     else:
         matching = [root / one for one in names if one.startswith(name) and _is_run(root / one)]
     exact = [path for path in matching if path.name == name] or matching
+    if name == "last" and not exact:
+        raise UsageError(
+            f"there is no run in {root}/", step="archive", value="no run", limit="at least one run",
+            remedy="give the folder of an archive with --runs, or make a run: `commissioner demo`",
+        )  # fmt: skip
     if len(exact) != 1:
         raise UsageError(
             f"{len(exact)} runs match {name!r}",

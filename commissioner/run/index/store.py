@@ -147,7 +147,7 @@ class SharedStore:
         missing = isinstance(failure, ImportError)
         return CommissionerError(
             "the archive's database cannot be used", step="archive index", value=first, limit=self._shown,
-            remedy="pip install 'commissioner[postgres]'" if missing else "check address, database, user and `~/.pgpass`; without "
+            remedy="pip install \".[postgres]\" in the folder of this program" if missing else "check address, database, user and `~/.pgpass`; without "
             "--archive the folders alone are read",
         )  # fmt: skip
 

@@ -16,7 +16,7 @@ from commissioner.cli.screens import screen
 from commissioner.cli.signals import let_end
 from commissioner.errors import DriveFault
 from commissioner.link.wire.secrets import Secrets
-from tests.support.command_line import COMMAND
+from tests.support.command_line import COMMAND, call
 
 ONE_RUN = "20260101-000000-simulated"
 
@@ -252,3 +252,19 @@ def test_what_is_no_secret_is_shown_as_it_was():
     assert (
         Secrets(["check", "--drive", "tcp://127.0.0.1:1"]).hide("check tcp://127.0.0.1:1") == "check tcp://127.0.0.1:1"
     )
+
+
+@pytest.mark.parametrize(
+    "verb", [("identify",), ("diagnose",), ("monitor",), ("recordings", "import"), ("simulate", "--plain")]
+)
+def test_a_folder_given_for_a_file_is_called_one(verb, tmp_path):
+    folder = tmp_path / "recordings.json"
+    folder.mkdir()
+    done = call(*verb, str(folder), *(("--out", str(tmp_path / "x.csv")) if verb[0] == "simulate" else ()))
+    assert done.code == 2 and "is a folder" in " ".join(done.stderr.split()), done.stderr
+
+
+@pytest.mark.parametrize("verb", [("runs", "show"), ("runs", "verify"), ("replay",), ("runs", "report")])
+def test_the_last_run_of_an_empty_archive_is_told_as_such(verb, tmp_path):
+    done = call(*verb, "last", "--runs", str(tmp_path))
+    assert done.code == 2 and "there is no run in" in " ".join(done.stderr.split()), done.stderr

@@ -255,3 +255,36 @@ def test_what_was_imported_reads_the_same_and_keeps_what_was_changed(tmp_path: P
     np.testing.assert_allclose(again.currents_a[0], CURRENTS[0], atol=1e-4)
     assert "Start and Increment" in again.metadata["import_changes"]
     assert "<img" in Path(files["picture"]).read_text("utf-8")
+
+
+SHORT = ("X,Ia,Ib,Ic,Va,Vb,Vc,Start,Increment,", "Sequence,A,A,A,V,V,V,-1.0e-01,5.000000e-04,")
+"""Oscilloscopes end their rows of numbers before the header's last names."""
+
+
+@pytest.mark.parametrize(("head", "end"), [(SHORT, ","), (SHORT, ""), ([x.rstrip(",") for x in SHORT], "")])
+def test_start_and_increment_stand_beyond_the_numbers(tmp_path: Path, head, end) -> None:
+    path = tmp_path / "scope.csv"
+    path.write_text(lines(*head) + rows(np.arange(600), NAMED, 5, end=end))
+    recording = read_running(path)
+    assert recording.sample_period_s == pytest.approx(5e-4)
+    np.testing.assert_allclose(recording.currents_a[0], CURRENTS[0], atol=1e-4)
+
+
+@pytest.mark.parametrize("head", [f"X,{ABC}\nSequence,A,A,A,V,V,V\n", f"Sample,{ABC}\n", f"X,{ABC}\n"])
+def test_a_column_that_counts_rows_is_no_time(tmp_path: Path, head) -> None:
+    path, body = tmp_path / "scope.csv", rows(np.arange(600), NAMED, 5)
+    path.write_text(head + body)
+    with pytest.raises(DataRefused, match=r"counts the rows|lacks time"):
+        read_running(path)
+    path.write_text("# sample_period_s: 0.0005\n" + head + body)
+    assert read_running(path).sample_period_s == pytest.approx(5e-4)
+
+
+def test_probes_that_the_file_names_are_said_and_not_applied(tmp_path: Path) -> None:
+    path = tmp_path / "scope.csv"
+    path.write_text(lines("Probe,1:1,1:1,1:1,200:1,200:1,200:1", f"Time (s),{ABC}") + rows(TIME, NAMED))
+    table, _ = understand(path)
+    assert next(note.what for note in table.notes if note.code == "probes").startswith("probes of 200:1 are named")
+    np.testing.assert_allclose(table.columns["voltage_u_v"], V[0], atol=1e-4)
+    path.write_text(lines("Probe Attenuation,1,1,1,1,1,1", f"Time (s),{ABC}") + rows(TIME, NAMED))
+    assert not any(note.code == "probes" for note in understand(path)[0].notes)

@@ -181,7 +181,7 @@ def test_a_damaged_result_is_refused_by_name_and_hides_no_other_run(tmp_path, wr
     (make_run(tmp_path, bad, result=result) / "result.json").write_text(written)
     assert show_run(tmp_path, good).result == Archive(tmp_path).result(good) == result
     for read in (show_run, lambda root, run: Archive(root).result(run)):
-        with pytest.raises(DataRefused, match="result.json is damaged") as refusal:
+        with pytest.raises(DataRefused, match=r"result\.json is damaged") as refusal:
             read(tmp_path, bad)
         assert refusal.value.value and re.match(seen, str(refusal.value.value))
     assert find_run(tmp_path, bad).result is None
