@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor.intake.against_plate import against_plate, of_contradiction, over_currents
+from commissioner.monitor.intake.against_plate import against_plate, of_contradiction, over_currents, volts_per_hertz
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.loads.mean_speed import whole_record_speed
@@ -120,6 +120,7 @@ def observe(
             return observe(recording, plate, wishes, order)
     trouble = too_little(frame, part, found, search)
     if trouble is not None:
+        trouble = volts_per_hertz(audited, plate) or trouble
         return Refused(audited, trouble, (*audited.findings, trouble))
     poles = pole_count(found, found.spectrum, plate.pole_pairs, wishes.load_frequencies_hz)
     if poles is not None:

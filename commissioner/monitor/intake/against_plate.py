@@ -10,6 +10,9 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction
 from commissioner.records import ReadingNote, RunningRecording
 
+VOLTS_PER_HERTZ = (0.1, 4.0)
+"""Of the plate's: motors at no load are run at a third, starts at a few hertz at twice."""
+
 
 def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Contradiction | None:
     """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen."""
@@ -24,6 +27,24 @@ def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) ->
         seen.reactive_var,
     )  # fmt: skip
     return contradiction(point, plate)
+
+
+def volts_per_hertz(audited: Audited, plate: Nameplate) -> Finding | None:
+    """Of a recording that shows nothing turning: a voltage that no motor of this plate is run at; None for any other."""
+    seen = audited.fundamental
+    if seen is None:
+        return None
+    line_v = abs(seen.voltage_v) * math.sqrt(1.5)
+    ratio = line_v / seen.frequency_hz / (plate.rated_voltage_v / plate.rated_frequency_hz)
+    if VOLTS_PER_HERTZ[0] <= ratio <= VOLTS_PER_HERTZ[1]:
+        return None
+    return Finding(
+        "plate_contradiction", "refused",
+        f"the data do not belong to this plate: {line_v:.4g} V between lines at {seen.frequency_hz:.4g} Hz are {ratio:.3g} times "
+        "its volts per hertz, and nothing is seen to turn", line_v,
+        plate.rated_voltage_v * seen.frequency_hz / plate.rated_frequency_hz,
+        "check the voltages' unit, probes and scale, and that the plate is this motor's",
+    )  # fmt: skip
 
 
 def of_contradiction(against: Contradiction, *, stops: bool) -> Finding:

@@ -152,7 +152,7 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
     names, units, used = _by_keys(above, width, names, units, used)
-    preface = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
+    preface: tuple[Row, ...] = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
     return Layout(separator, lines[first].start, names, units, preface, 0, is_split and separator == ",")
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commissioner.monitor.chain import observe
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.levels import clipped_share
 from commissioner.motor.running import from_nameplate
@@ -213,3 +214,22 @@ def test_noise_without_a_motor_is_refused_not_answered() -> None:
     noise = [rng.standard_normal(recording.time_s.size) for _ in range(6)]
     silent = replace(recording, currents_a=tuple(noise[:3]), voltages_v=tuple(noise[3:]))
     assert refused_in(silent, plate).reason.kind == "refused"
+
+
+@pytest.mark.parametrize("scale", [0.005, 5.0, 1.0])
+def test_a_voltage_that_no_such_motor_is_run_at_is_named_where_nothing_turns(scale) -> None:
+    recording, plate, *_ = taken("running_compressor", 1, SHORT)
+    time = np.asarray(recording.time_s)
+    rng = np.random.default_rng(3)
+
+    def waves(size: float, lag: float) -> tuple[np.ndarray, ...]:
+        noise = 1e-3 * size * rng.standard_normal((3, time.size))
+        turns = [2 * np.pi * (50.0 * time - k / 3) - lag for k in range(3)]
+        return tuple(size * np.cos(turn) + noise[k] for k, turn in enumerate(turns))
+
+    still = replace(
+        recording, currents_a=waves(plate.rated_current_a, 0.6),
+        voltages_v=waves(scale * plate.rated_voltage_v * np.sqrt(2 / 3), 0.0), speed_rad_per_s=None,
+    )  # fmt: skip
+    code = "no_period" if scale == 1.0 else "plate_contradiction"
+    assert observe(still, plate).reason.code == code
