@@ -152,8 +152,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
         )  # fmt: skip
     names, units, used, is_split = _names(above, width)
     names, units, used = _by_keys(above, width, names, units, used)
-    preface: tuple[Row, ...] = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
-    return Layout(separator, lines[first].start, names, units, preface, 0, is_split and separator == ",")
+    said = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
+    return Layout(separator, lines[first].start, names, units, said, 0, is_split and separator == ",")
 
 
 def _beyond(header: Sequence[Row], width: int) -> list[Row]:
