@@ -13,7 +13,6 @@ from commissioner.run.archive.catalogue import RunSummary, read_run
 from commissioner.run.archive.documents import read_document, read_result
 from commissioner.service.problems import Refusal
 
-PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 OUTCOMES = ("commissioned", "rejected", "aborted", "faulted", "cut off")
 
 

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request
 
+from commissioner.motor.circuit import PARAMETERS
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
-from commissioner.service.archive import PARAMETERS, Entry
+from commissioner.service.archive import Entry
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask, refusal_from
