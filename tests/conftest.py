@@ -33,6 +33,8 @@ REALTIME = (
 of the service against `sim --speed max` are not: the reader paces them, and they allow 250 ms for what takes one. Nor are
 defects that a rule must catch: what comes late fails it all the more. `NOT_REALTIME` are the tests of these files that
 no clock judges."""
+ALONE = ("campaigns/test_short_campaigns.py", "campaigns/hostile_run", "integration/test_kill.py", "sim/test_faults.py")
+"""Of those, the ones whose whole course is counted in wall time. The others mostly wait: two at a time do one another no harm."""
 NOT_REALTIME = (
     "test_a_full_three_axis_run_at_115200_ends_commissioned",
     "test_what_is_found_at_115200_is_true_within_three_of_its_errors",
@@ -75,6 +77,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
         if is_listed and item.name.split("[")[0] not in NOT_REALTIME:
             item.add_marker(pytest.mark.realtime)
+            if any(item.path.is_relative_to(TESTS / name) for name in ALONE):
+                item.add_marker(pytest.mark.alone)
     if hasattr(config, "workerinput"):
         _costliest_first(items)
 

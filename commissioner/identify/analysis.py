@@ -35,7 +35,6 @@ from commissioner.identify.estimate.leg_refit import with_known_law
 from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
 from commissioner.identify.intake.alignment import (
     FARTHEST,
-    MOST_PERIODS,
     TimeShift,
     more_periods,
     require_near,
@@ -134,7 +133,7 @@ def identify(
         done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
         return done or fit_axis(stretches, plate, period_s, start, inverter, None)
 
-    fit, late = _best_aligned(first, rows_off(periods_late(first, period_s, prior(plate))), one)
+    fit, late = _best_aligned(first, lambda: rows_off(periods_late(first, period_s, prior(plate))), one)
     fits = [fit]
     for stretches in others:
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
@@ -152,26 +151,30 @@ def identify(
 
 
 def _best_aligned(
-    stretches: Sequence[Stretch], coarse: int, fit: Callable[[Sequence[Stretch]], AxisFit]
+    stretches: Sequence[Stretch], coarse: Callable[[], int], fit: Callable[[Sequence[Stretch]], AxisFit]
 ) -> tuple[AxisFit, int]:
-    """`_aligned` from the coarse look; where that would be a refusal also from none, and what explains more counts: an
-    impedance that the inverter's loss has turned said 7 periods of sound tests of a 15-kW motor."""
-    found, refusal = [], None
-    for late in (coarse, 0) if abs(coarse) > MOST_PERIODS else (coarse,):
-        try:
-            found.append(_aligned(stretches, late, fit))
-        except DataRefused as error:
-            refusal = refusal or error
-    if refusal and not found:
-        raise refusal
-    return min(found, key=lambda one: one[0].batch.criterion())
+    """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late.
+
+    A fit whose delay stays between its bounds needs no other rows. Else a coarse look says where to go on, if it looks the same
+    way: alone it is not believed, an impedance that the inverter's loss has turned said 8 periods of sound tests.
+    """
+    try:
+        found = fit(stretches)
+        more = more_periods(found.batch.delay, found.batch.sample_period_s)
+        if not more:
+            return found, 0
+    except DataRefused:
+        more = coarse()
+        if not more:
+            raise
+    seen = coarse()
+    return _aligned(stretches, seen if seen * more > 0 and abs(seen) <= FARTHEST else more, fit)
 
 
 def _aligned(
     stretches: Sequence[Stretch], late: int, fit: Callable[[Sequence[Stretch]], AxisFit]
 ) -> tuple[AxisFit, int]:
-    """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late; `late`: to
-    begin with."""
+    """As `_best_aligned`; `late`: to begin with."""
     for _ in range(MOST_SHIFTS):
         found = fit(shifted(stretches, late))
         period_s = found.batch.sample_period_s
