@@ -25,7 +25,6 @@ the limit or expectation it broke, and the remedy.
 from __future__ import annotations
 
 import reprlib
-from pathlib import Path
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
@@ -60,16 +59,6 @@ class CommissionerError(Exception):
 class UsageError(CommissionerError):
     exit_code = 2
     outcome = "usage"
-
-
-def no_file(path: Path, step: str, limit: str = "an existing file") -> UsageError:
-    """What is raised where `path` is no file that can be read: a folder, a pipe, nothing at all."""
-    if path.exists():
-        what = "a folder" if path.is_dir() else "no regular file"
-        return UsageError(
-            f"{path} is {what}", step=step, value=what, limit=limit, remedy="give the path of one file",
-        )  # fmt: skip
-    return UsageError(f"there is no file {path}", step=step, value=str(path), limit=limit, remedy="check the path")
 
 
 class ConfigurationError(UsageError):

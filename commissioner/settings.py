@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from commissioner.errors import ConfigurationError, UsageError, no_file
+from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate, check, connection_of
+from commissioner.paths import no_file
 from commissioner.procedure.plan import Acceptance, ExcitationPlan, Limits, ProcedurePlan, Supervision
 from commissioner.validation import first_problem
 

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.errors import DataRefused, no_file
+from commissioner.errors import DataRefused
+from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.plate import has_no_plate, plate_of

@@ -21,8 +21,9 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 from numpy.typing import NDArray
 
-from commissioner.errors import DataRefused, UsageError, no_file
+from commissioner.errors import DataRefused, UsageError
 from commissioner.motor.computed import without_computed_third
+from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.whole import whole_file

@@ -17,10 +17,11 @@ from commissioner.diagnose.export.model_file import plain as without_effects
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.model import Layout, Model
-from commissioner.errors import ConfigurationError, UsageError, no_file
+from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.running import is_running_model, played
+from commissioner.paths import no_file
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
 from commissioner.settings import load_motor
 

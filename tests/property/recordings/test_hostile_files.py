@@ -181,7 +181,7 @@ def test_a_foreign_text_above_its_limit_is_refused(tmp_path, monkeypatch):
 def test_a_pipe_is_not_waited_for(tmp_path, name):
     path = tmp_path / name
     os.mkfifo(path)
-    with pytest.raises(UsageError, match="there is no file"):
+    with pytest.raises(UsageError, match="is no regular file"):
         load_motor(str(path)) if name.endswith("toml") else import_table(path)
 
 

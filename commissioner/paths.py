@@ -1,0 +1,17 @@
+"""What is said of a path that leads to no file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commissioner.errors import UsageError
+
+
+def no_file(path: Path, step: str, limit: str = "an existing file") -> UsageError:
+    """What is raised where `path` is no file that can be read: a folder, a pipe, nothing at all."""
+    if path.exists():
+        what = "a folder" if path.is_dir() else "no regular file"
+        return UsageError(
+            f"{path} is {what}", step=step, value=what, limit=limit, remedy="give the path of one file",
+        )  # fmt: skip
+    return UsageError(f"there is no file {path}", step=step, value=str(path), limit=limit, remedy="check the path")
