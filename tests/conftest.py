@@ -58,12 +58,12 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-TOGETHER = ("integration/service",)
-"""Folders whose tests share a costly fixture of a whole session: one worker has them all."""
+TOGETHER = ("integration/service/browser", "integration/service")
+"""Folders whose tests share a costly fixture of a whole session: one worker has them all; the first that fits counts."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
-"""CPU seconds of the tests that take one or more, as `tests/support/suite/durations.py` writes them."""
+"""Seconds of the tests that take one or more, as `tests/support/suite/durations.py` writes them."""
 USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 """What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 

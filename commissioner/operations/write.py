@@ -9,7 +9,7 @@ from commissioner.link.drive.facts import WriteReport
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.identify import Identified
 from commissioner.run.archive.catalogue import RunSummary, find_run
-from commissioner.run.archive.late_report import mark_restored
+from commissioner.run.archive.late_report import mark_restored, mark_written
 from commissioner.run.commission import Commissioned
 from commissioner.run.restore import Restored
 from commissioner.run.restore import restore as write_snapshot
@@ -76,7 +76,9 @@ def planned_write(request: RunRequest) -> Plan:
 def write_run(request: RunRequest, token: str) -> Written:
     """The accepted result of a run into its drive. Aborted where `token` is of another table."""
     summary = request.find()
-    return Written(summary.run, write_accepted(summary, request.drive, token))
+    written = Written(summary.run, write_accepted(summary, request.drive, token))
+    mark_written(summary)
+    return written
 
 
 def write_recorded(request: WriteRequest, identified: Identified, observe: Observe = nobody) -> Commissioned:

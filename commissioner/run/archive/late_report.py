@@ -18,14 +18,21 @@ from commissioner.run.archive.summary import read_file
 
 
 def mark_restored(run: RunSummary) -> None:
-    """The report says on top that the drive holds its old values again; a disk that is full leaves it as it is."""
+    """The report says on top that the drive holds its old values again."""
+    _mark(run, "Restored on {}: the drive holds the values it had before this run.")
+
+
+def mark_written(run: RunSummary) -> None:
+    """The report says on top that the drive holds the values that were only accepted when it was made."""
+    _mark(run, "Written on {}: the drive holds the values of this report, read back.")
+
+
+def _mark(run: RunSummary, sentence: str) -> None:
+    """A disk that is full leaves the report as it is."""
     page = Path(run.folder) / "report.html"
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     with suppress(OSError), closing(RunFolder(page.parent)) as folder:
-        text = page.read_text("utf-8")
-        folder.save_text(
-            page.name, with_notice(text, f"Restored on {when}: the drive holds the values it had before this run.")
-        )
+        folder.save_text(page.name, with_notice(page.read_text("utf-8"), sentence.format(when)))
 
 
 def make_report(run: RunSummary) -> None:

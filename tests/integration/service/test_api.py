@@ -137,6 +137,8 @@ def test_writing_needs_the_token_of_the_table_and_restore_brings_the_old_values(
         service.client.post(f"/api/runs/{finished}/restore", json={"token": old["token"]}).json()["outcome"]
         == "restored"
     )
+    page = (service.runs / finished / "report.html").read_text("utf-8")
+    assert page.index("Restored on ") < page.index("Written on ") < page.index("SIM-INV-7A")
     told = [entry["what"] for entry in service.client.get("/api/audit").json()["entries"]]
     assert {"wrote", "restored", "asked to energise", "run begun"} <= set(told)
     assert service.client.get("/api/audit").json()["chain"]["is_intact"]

@@ -1,15 +1,15 @@
-"""What each test costs: `pytest -p tests.support.suite.durations --costs FILE` writes CPU seconds, children's included.
+"""What each test costs: `pytest -p tests.support.suite.durations --costs FILE` writes seconds, its fixtures included.
 
-CPU seconds also hold on a busy host. `tests/conftest.py` begins the costliest first, from the table kept under `.ci/`; of
-several workers each adds what it ran. `python -m tests.support.suite.durations` makes that table anew, from a whole run.
+Measure on a quiet host, two workers as in CI (`-n 2 --dist loadgroup`). `tests/conftest.py` begins the costliest first, from
+the table kept under `.ci/`; each worker adds what it ran. `python -m tests.support.suite.durations` makes that table anew.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -20,7 +20,7 @@ TABLE = Path(__file__).parents[3] / ".ci" / "costs.json"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--costs", type=Path, default=None, help="Add the CPU seconds of each test to this file.")
+    parser.addoption("--costs", type=Path, default=None, help="Add the seconds of each test to this file.")
 
 
 class Costs:
@@ -30,9 +30,9 @@ class Costs:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item):
-        before = _cpu_s()
+        began = time.monotonic()
         result = yield
-        self.rows[item.nodeid.split("@")[0]] = round(_cpu_s() - before, 1)
+        self.rows[item.nodeid.split("@")[0]] = round(time.monotonic() - began, 1)
         return result
 
     def pytest_sessionfinish(self) -> None:
@@ -47,10 +47,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Costs(file))
 
 
-def _cpu_s() -> float:
-    return sum(os.times()[:4])
-
-
 if __name__ == "__main__":
     TABLE.unlink(missing_ok=True)
-    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.suite.durations", "--costs", TABLE]))
+    sys.exit(subprocess.call([sys.executable, "-m", "pytest", "-p", "tests.support.suite.durations", "--costs", TABLE,
+                               "-n", "2", "--dist", "loadgroup"]))  # fmt: skip
