@@ -55,7 +55,11 @@ LEVEL, NEAR = 0.75, 0.08
 they miss it differs from run to run, and saturating iron would make that a difference of L_M."""
 BEYOND_DOUBT = 0.25
 """Of what L_M changes by between the flux that a test reached and the one it is told for: its standard error there."""
-MOST_SHIFTS = 6
+MOST_SHIFTS = 8
+LESS = 0.98
+"""Of the residual, that other rows must leave where the delay does not say that they are the right ones."""
+BOUND = -0.999
+"""Periods: a delay no larger lies at its lower bound."""
 TRIAL_STEPS = 3
 """For the delay of a fit that needed none: from its end it is two steps away."""
 
@@ -133,7 +137,7 @@ def identify(
         done = next((f for f in earlier.fits if f.is_of(stretches)), None) if earlier else None
         return done or fit_axis(stretches, plate, period_s, start, inverter, None)
 
-    fit, late = _best_aligned(first, lambda: rows_off(periods_late(first, period_s, prior(plate))), one)
+    fit, late = _aligned(first, lambda: rows_off(periods_late(first, period_s, prior(plate))), one)
     fits = [fit]
     for stretches in others:
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
@@ -150,42 +154,39 @@ def identify(
     return replace(_summary(results, examined, plate, estimator, temperature, assumption, shift), fits=as_fitted)
 
 
-def _best_aligned(
+def _aligned(
     stretches: Sequence[Stretch], coarse: Callable[[], int], fit: Callable[[Sequence[Stretch]], AxisFit]
 ) -> tuple[AxisFit, int]:
     """The first test's fit with its currents on the rows of their voltages, and by how many rows they were late.
 
     A fit whose delay stays between its bounds needs no other rows. Else a coarse look says where to go on, if it looks the same
-    way: alone it is not believed, an impedance that the inverter's loss has turned said 8 periods of sound tests.
+    way: alone it is not believed, an impedance that the inverter's loss has turned said 8 periods of sound tests. A delay that
+    lies at its bound with a standard error as large may be any: other rows count where they leave less.
     """
-    try:
-        found = fit(stretches)
-        more = more_periods(found.batch.delay, found.batch.sample_period_s)
-        if not more:
-            return found, 0
-    except DataRefused:
-        more = coarse()
-        if not more:
-            raise
-    seen = coarse()
-    return _aligned(stretches, seen if seen * more > 0 and abs(seen) <= FARTHEST else more, fit)
-
-
-def _aligned(
-    stretches: Sequence[Stretch], late: int, fit: Callable[[Sequence[Stretch]], AxisFit]
-) -> tuple[AxisFit, int]:
-    """As `_best_aligned`; `late`: to begin with."""
+    late, best, is_sure = 0, None, True
     for _ in range(MOST_SHIFTS):
-        found = fit(shifted(stretches, late))
+        try:
+            found = fit(shifted(stretches, late))
+        except DataRefused:
+            if best is not None and not is_sure:
+                return best
+            if late or not (late := coarse()):
+                raise
+            continue
+        if best is not None and not is_sure and found.batch.noise_a > LESS * best[0].batch.noise_a:
+            return best
         period_s = found.batch.sample_period_s
         more = more_periods(found.batch.delay, period_s)
-        if not more:
+        is_sure = more != 0
+        if not is_sure and found.batch.delay.value > BOUND * period_s:
             return found, late
-        late += more
+        more, seen = more or -1, coarse() if not late else 0
+        best = found, late
+        late += seen if seen * more > 0 and abs(seen) <= FARTHEST else more
         if abs(late) > FARTHEST:
             break
     require_near(TimeShift(late, late * period_s, 0.0, period_s))
-    return found, late - more
+    return found, best[1] if best else late
 
 
 def _as_fitted(batch: BatchFit, late: int, period_s: float) -> TimeShift:

@@ -12,12 +12,14 @@ from commissioner.motor.circuit import Quantity
 
 MOST_PERIODS = 3.0
 """By which the currents may lie off the voltage, either way; what is beyond is another fault than a late channel."""
+OWN = 0.25
+"""Of a period: what a sampling chain may be late by itself, beside rows that are."""
 FARTHEST = 6
 """Whole periods that are tried, so that a refusal can name the value."""
 COARSE = 0.6
 """Of a period, by which a coarse look may be wrong."""
-SLACK = 0.05
-"""Of a period, beyond none and one, that is still the fit's own: the model bends there by less than it is known."""
+SLACK = 0.01
+"""Of a period, beyond none and one, that is still the fit's own: 0.05 moved L_sigma of a drive's recording by nine standard errors."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def more_periods(delay: Quantity, period_s: float) -> int:
     late, std = delay.value / period_s, delay.std / period_s
     if late < -SLACK and late < -3.0 * std:
         return math.floor(late)
-    return math.floor(late) if late > 1.0 + SLACK else 0
+    return math.floor(late) if late > 1.0 + SLACK and late > 1.0 + 3.0 * std else 0
 
 
 def rows_off(coarse_periods: float) -> int:
@@ -78,7 +80,7 @@ def _shifted(stretch: Stretch, n: int) -> Stretch:
 def require_near(shift: TimeShift) -> None:
     """DataRefused where the currents lie further off than a sampling chain makes them."""
     periods = shift.value_s / shift.sample_period_s
-    if abs(periods) <= MOST_PERIODS + SLACK:
+    if abs(periods) <= MOST_PERIODS + OWN:
         return
     raise refused(
         "the current answers before the voltage" if periods < 0 else "the current answers too late",

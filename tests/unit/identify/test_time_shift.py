@@ -1,5 +1,7 @@
 """Currents early or late against the voltage, up to three sample periods: found with its error, and the values stay right."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -78,3 +80,43 @@ def test_a_shift_beyond_is_refused_with_its_value(lag):
     with pytest.raises(DataRefused, match="current answers") as refusal:
         identify(recording(lag), PLATE)
     assert f"{lag:+.1f}" in str(refusal.value.value)
+
+
+@pytest.fixture(scope="module")
+def of_a_drive():
+    """The first test of a real inverter with saturating iron, 12-bit sensors and a skin effect."""
+    from sim.recordings.standstill import record
+    from sim.scenario import load
+
+    columns, metadata, _ = record(load("rich"), 3)
+    first = columns["axis_deg"] == columns["axis_deg"][0]
+    first &= np.cumsum(np.diff(columns["axis_deg"], prepend=columns["axis_deg"][0]) != 0) == 0
+    starts = np.flatnonzero(np.diff(columns["segment"], prepend=-1) != 0)
+    first &= np.arange(first.size) - np.repeat(starts, np.diff(starts, append=first.size)) < 6_000
+    names = ("axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v")
+    kept = {name: columns[name][first] for name in names}
+    time, segment, period = (
+        columns["time_s"][first],
+        columns["segment"][first].astype(np.int64),
+        metadata["sample_period_s"],
+    )
+    whole = StandstillRecording(time, segment, **kept, sample_period_s=float(period), metadata=metadata)
+    return whole, identify(whole)
+
+
+@pytest.mark.parametrize("rows", [-3, 2])
+def test_a_shift_by_rows_moves_no_value_of_a_drives_recording(of_a_drive, rows):
+    whole, sound = of_a_drive
+    period = whole.sample_period_s
+    has_partner = np.ones(whole.segment.size, dtype=bool)
+    moved = {name: getattr(whole, name).copy() for name in ("current_u_a", "current_v_a", "current_w_a")}
+    for number in np.unique(whole.segment):
+        at = np.flatnonzero(whole.segment == number)
+        has_partner[at[:rows] if rows > 0 else at[rows:]] = False
+        for column in moved.values():
+            column[at] = np.roll(column[at], rows)
+    columns = {f.name: moved.get(f.name, getattr(whole, f.name)) for f in fields(whole)}
+    seen = identify(replace(whole, **{k: v[has_partner] for k, v in columns.items() if isinstance(v, np.ndarray)}))
+    assert seen.delay_s[0] - sound.delay_s[0] == pytest.approx(rows * period, abs=0.02 * period)
+    away = np.abs(np.array(seen.parameters.as_tuple()) - sound.parameters.as_tuple()) / np.array(sound.std)
+    assert away.max() < 0.2
