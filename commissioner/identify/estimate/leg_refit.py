@@ -19,7 +19,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.model import Matrix
 from commissioner.identify.batch.segments import BatchFit, Segment
-from commissioner.identify.estimate.leg_family import WORST_CHANCE, pairs_of
+from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair, pairs_of
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.leg_pair import PairLaw
 from commissioner.identify.inverter.mixture import chances_of, mixture
@@ -31,6 +31,8 @@ LIKELY, MOST_TRIED, MOST_KEPT = 25.0, 6, 4
 """Pairs tried on the samples: those whose curves are this near the best in chi-square, and how many; then, how many of
 them on every test."""
 ROUNDS, STEPS, TOLERANCE = 3, 8, 0.03
+HOPELESS, NO_WEIGHT = 1000.0, 100.0
+"""Chi-square beyond the best on the first test: no other knees make it up; it would count for exp(-25) in the mean."""
 TEMPER = 0.25
 """Weight of a pair: exp(-TEMPER times chi-square beyond the best), half of what a likelihood gives: laws are near, not exact."""
 
@@ -56,8 +58,7 @@ def with_known_law(
     likely = [p for p in likely if p.misfit < likely[0].misfit + LIKELY][:MOST_TRIED]
     if not likely:
         return list(drawn)
-    first = [_fit_one(fits[0], tests[0], p.law, p.plateaus) for p in likely]
-    begun = sorted((f for f in first if f is not None), key=lambda f: f.sum_of_squares)
+    begun = _on_first_test(fits[0], tests[0], likely)
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]
     free = sum(f.sum_of_squares / f.noise_a**2 for f in fits)
     spare = sum(f.model.leg_size for f in fits) - 4
@@ -66,13 +67,27 @@ def with_known_law(
     return _mean(refits, fits)
 
 
-def _fit_one(fit: BatchFit, segments: Sequence[Segment], law: PairLaw, values: Signal) -> BatchFit | None:
-    """One test with the law in the curve's place; its knees are laid down anew until they stay."""
+def _on_first_test(fit: BatchFit, segments: Sequence[Segment], likely: Sequence[Pair]) -> list[BatchFit]:
+    """The first test with each pair that describes it about as well as any, the best first."""
+    found: list[BatchFit] = []
+    for pair in likely:
+        best = min((f.sum_of_squares for f in found), default=math.inf)
+        if (one := _fit_one(fit, segments, pair.law, pair.plateaus, best + HOPELESS * fit.noise_a**2)) is not None:
+            found.append(one)
+    found.sort(key=lambda f: f.sum_of_squares)
+    return [f for f in found if f.sum_of_squares < found[0].sum_of_squares + NO_WEIGHT * fit.noise_a**2]
+
+
+def _fit_one(fit: BatchFit, segments: Sequence[Segment], law: PairLaw, values: Signal, most: float) -> BatchFit | None:
+    """One test with the law in the curve's place; its knees are laid down anew until they stay. None where the sum of squares
+    stays above `most`."""
     begun = fit
     for _ in range(ROUNDS):
         try:
             begun = _fitted(begun, segments, law, values)
         except DataRefused:
+            return None
+        if begun.sum_of_squares > most:
             return None
         law, values = law.moved(law.admissible(begun.theta[begun.model.leg_slice]))
     return begun
