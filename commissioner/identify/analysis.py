@@ -36,6 +36,7 @@ from commissioner.identify.estimate.sufficiency import require_amperes, require_
 from commissioner.identify.intake.alignment import (
     FARTHEST,
     TimeShift,
+    is_at_bound,
     more_periods,
     require_near,
     rows_off,
@@ -58,8 +59,6 @@ BEYOND_DOUBT = 0.25
 MOST_SHIFTS = 8
 LESS = 0.98
 """Of the residual, that other rows must leave where the delay does not say that they are the right ones."""
-BOUND = -0.999
-"""Periods: a delay no larger lies at its lower bound."""
 TRIAL_STEPS = 3
 """For the delay of a fit that needed none: from its end it is two steps away."""
 
@@ -178,7 +177,7 @@ def _aligned(
         period_s = found.batch.sample_period_s
         more = more_periods(found.batch.delay, period_s)
         is_sure = more != 0
-        if not is_sure and found.batch.delay.value > BOUND * period_s:
+        if not is_sure and not is_at_bound(found.batch.delay, period_s):
             return found, late
         more, seen = more or -1, coarse() if not late else 0
         best = found, late
@@ -186,7 +185,8 @@ def _aligned(
         if abs(late) > FARTHEST:
             break
     require_near(TimeShift(late, late * period_s, 0.0, period_s))
-    return found, best[1] if best else late
+    assert best is not None, "a refusal is raised, or a fit was made"
+    return best
 
 
 def _as_fitted(batch: BatchFit, late: int, period_s: float) -> TimeShift:

@@ -10,9 +10,8 @@ from pathlib import Path
 from commissioner.service.configuration import SimulatorTable
 from commissioner.service.library import Library
 from commissioner.service.problems import Refusal
+from commissioner.study.own_process import START_S
 
-START_S = 900.0
-"""It compiles its kernels at the first start; later it takes about a second."""
 SCENARIOS = (
     "default", "linear", "small_motor", "large_motor", "sto_open", "fault_present", "overtemperature", "flux_hazard",
     "poor", "rich", "watchdog_refused", "wrong_identity",

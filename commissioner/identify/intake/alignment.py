@@ -21,6 +21,9 @@ COARSE = 0.6
 SLACK = 0.01
 """Of a period, beyond none and one, that is still the fit's own: 0.05 moved L_sigma of a drive's recording by nine standard errors."""
 
+LOWEST = -0.999
+"""Periods: a fitted delay no larger lies at its lower bound, the period before."""
+
 
 @dataclass(frozen=True)
 class TimeShift:
@@ -51,8 +54,13 @@ def more_periods(delay: Quantity, period_s: float) -> int:
     return math.floor(late) if late > 1.0 + SLACK and late > 1.0 + 3.0 * std else 0
 
 
+def is_at_bound(delay: Quantity, period_s: float) -> bool:
+    """Whether a fitted delay lies at its lower bound: where its standard error is as large, nothing says where it belongs."""
+    return delay.value <= LOWEST * period_s
+
+
 def rows_off(coarse_periods: float) -> int:
-    """Whole periods to take off before any fit: none where the fit itself finds the way from where it begins."""
+    """Whole periods that a coarse look would take off; none where a fit finds the way by itself."""
     return math.floor(coarse_periods) if not -COARSE < coarse_periods < 1.0 + COARSE else 0
 
 

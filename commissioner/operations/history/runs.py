@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import UsageError
-from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.archive.catalogue import RunSummary, find_folder, read_run
 from commissioner.run.archive.documents import read_result
 from commissioner.run.index.index import Found, Refreshed
 from commissioner.run.index.index import find as look_up
@@ -51,8 +51,8 @@ def write_runs(archive: Archive, wanted: Wanted, out: Path) -> WrittenTable:
 
 def show_run(runs: Path, run: str) -> RunSummary:
     """The run of which the id starts so, or the newest for `last`. UsageError: none or several. DataRefused: its result is damaged."""
-    found = find_run(runs, run)
-    return replace(found, result=read_result(Path(found.folder)))
+    folder = find_folder(runs, run)
+    return replace(read_run(folder, with_result=False), result=read_result(folder))
 
 
 def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:

@@ -103,14 +103,12 @@ def metadata_of(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
 
 def probes_in(preface: Sequence[Sequence[str]]) -> str:
     """Ratios of probes other than one that a row of the preface names, as `200:1, 10:1`; empty where there is none."""
-    rows = [row for row in preface if row and re.fullmatch(r"probe|(?:probe)?(?:attenuation|ratio)", _letters(row[0]))]
+    rows = [
+        row for row in preface if row and re.fullmatch(r"(?:probe|(?:probe)?(?:attenuation|ratio))\d*", key(row[0]))
+    ]
     found = [_RATIO.fullmatch(cell.strip()) for row in rows for cell in row[1:]]
     ratios = [float(one[1]) for one in found if one]
     return ", ".join(f"{ratio:g}:1" for ratio in dict.fromkeys(ratios) if ratio != 1.0)
-
-
-def _letters(cell: str) -> str:
-    return "".join(c for c in cell.lower() if c.isalpha())
 
 
 _RATIO = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?)\s*(?::\s*1|x)?", re.IGNORECASE)
