@@ -21,6 +21,8 @@ from sim.wire.pace import Pace
 from sim.wire.station import Drive, Options, sim_device
 
 FUNCTIONS = (3, 6, 16, 23)
+LOOP_LATE_S = 1e-3
+"""epoll's resolution: asyncio calls nothing earlier, and by so much later."""
 
 
 class Handler(ServerRequestHandler):
@@ -33,7 +35,7 @@ class Handler(ServerRequestHandler):
         self.held = b""
         self.is_deaf = False
         self.undecoded = b""
-        self.heard_until = self.said_until = 0.0
+        self.heard_until = self.turned_at = self.said_until = 0.0
 
     def data_received(self, data: bytes) -> None:
         """On a paced line once the bytes have been on the wire and the slave has turned round."""
@@ -43,14 +45,27 @@ class Handler(ServerRequestHandler):
             return
         self.heard_until = max(self.loop.time(), self.heard_until) + pace.bytes_s(len(data))
         silence_s = 2.0 * pace.silence_s if self.said_until < self.loop.time() else pace.silence_s
-        self.loop.call_at(self.heard_until + max(silence_s, pace.turnaround_s), self.hear, data)
+        self._at(self.heard_until + max(silence_s, pace.turnaround_s), self.turn, data)
+
+    def turn(self, data: bytes, at: float) -> None:
+        """The slave begins its answer; what its own computing takes is hidden behind the bytes that go out."""
+        self.turned_at = at
+        self.hear(data)
+
+    def _at(self, when: float, do: Callable[[bytes, float], None], data: bytes) -> None:
+        """To the tenth of a millisecond: a loop of asyncio alone may be one late."""
+        self.loop.call_at(when - LOOP_LATE_S, self._sleep_until, when, do, data)
+
+    def _sleep_until(self, when: float, do: Callable[[bytes, float], None], data: bytes) -> None:
+        time.sleep(max(0.0, when - self.loop.time()))
+        do(data, when)
 
     def hear(self, data: bytes) -> None:
         if self.is_deaf:
             return
         wait = self.line.drive.stalled_until - time.monotonic()
         if wait > 0.0:
-            self.loop.call_later(wait, self.hear, data)
+            self.loop.call_later(wait, self.turn, data, self.loop.time() + wait)
             return
         super().data_received(data)
 
@@ -115,33 +130,33 @@ class Handler(ServerRequestHandler):
         fault = next((f for f in self.hits if f.name in WIRE), None)
         self.recv_buffer = b""
         if fault is None:
-            self._put(data)
+            self._put(data, self.turned_at)
             if self.held:
                 held, self.held = self.held, b""
-                self._put(held)
+                self._put(held, self.turned_at)
             return
         delivery = deliver(fault, data, self.line.is_rtu, self._rebuild(data))
         self.held += delivery.held
         for delay, piece in delivery.pieces:
             if delay:
-                self.loop.call_later(delay, self._put, piece)
+                self.loop.call_later(delay, self._put, piece, self.loop.time() + delay)
             else:
-                self._put(piece)
+                self._put(piece, self.turned_at)
 
     def _rebuild(self, frame: bytes) -> Callable[[bytes], bytes]:
         if not self.line.is_rtu:
             return lambda body: frame[:4] + len(body).to_bytes(2, "big") + body
         return lambda body: body + _crc_bytes(body)
 
-    def _put(self, data: bytes) -> None:
+    def _put(self, data: bytes, begin: float) -> None:
         pace = self.line.pace
         if pace.is_free:
             self._write(data)
             return
-        self.said_until = max(self.loop.time(), self.said_until) + pace.bytes_s(len(data))
-        self.loop.call_at(self.said_until, self._write, data)
+        self.said_until = max(begin, self.said_until) + pace.bytes_s(len(data))
+        self._at(self.said_until, self._write, data)
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes, _at: float = 0.0) -> None:
         if self.transport and not self.transport.is_closing():
             self.transport.write(data)
 
