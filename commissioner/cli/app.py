@@ -32,7 +32,10 @@ app.add_typer(accounts_app, name="accounts")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Diagnosed = Annotated[
-    bool, typer.Option("--diagnosis/--no-diagnosis", help="End with a diagnosis of the run's own samples.")
+    bool, typer.Option("--diagnosis/--no-diagnosis", help="Diagnose the run's own samples afterwards.")
+]
+Waits = Annotated[
+    bool, typer.Option("--wait", help="End only when the diagnosis is ready; otherwise it joins the archive later.")
 ]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
 Trust = Annotated[
@@ -164,6 +167,7 @@ def run(
     procedure: Procedure = None,
     runs: Runs = RUNS,
     diagnosis: Diagnosed = True,
+    wait: Waits = False,
     seal: Seal = None,
     strict: Strict = False,
     tag: Annotated[str, typer.Option("--tag", help="Which motor this is: its tag, kept with the run.")] = "",
@@ -187,10 +191,11 @@ def run(
     """Commission a drive. Asks before it energises; writes only with --write-back."""
     from commissioner.cli.angles import parse_axes
     from commissioner.cli.verbs.run import run as verb
-    from commissioner.operations.commission import DIAGNOSIS_S, CommissionRequest
+    from commissioner.operations.closing import DIAGNOSIS_S
+    from commissioner.operations.commission import CommissionRequest
 
     request = CommissionRequest(
-        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, seal,
+        drive, profile, motor, runs, procedure, parse_axes(axes), write_back, DIAGNOSIS_S if diagnosis else 0.0, wait, seal,
         strict, tag, motor_serial, place, cable,
     )  # fmt: skip
     verb(request, yes=yes, as_json=json, dead_man=dead_man)
@@ -562,6 +567,20 @@ def runs_pull(
     from commissioner.cli.verbs.archived.moving import pull
 
     pull(runs, source, run or (), as_json=json)
+
+
+@runs_app.command("diagnose")
+def runs_diagnose(
+    run: Run = "last",
+    seconds: Annotated[float, typer.Option(min=0.0, help="Given up, unfinished, after so long.")] = 180.0,
+    seal: Seal = None,
+    runs: Runs = RUNS,
+    json: Json = False,
+) -> None:
+    """What a plain simulation gets wrong about a run's own samples: into its result and report. `run` begins this by itself."""
+    from commissioner.cli.verbs.archived.deciding import diagnose_run
+
+    diagnose_run(runs, run, seconds, seal=seal, as_json=json)
 
 
 @runs_app.command("verify")

@@ -47,7 +47,7 @@ class ReplayedRun:
 
 def report_run(runs: Path, run: str) -> Reported:
     """The path of the run's report, made from its archive where the run could not make it."""
-    from commissioner.run.archive.late_report import make_report
+    from commissioner.run.archive.report import make_report
 
     summary = find_run(runs, run)
     report = Path(summary.folder) / "report.html"

@@ -9,7 +9,7 @@ from commissioner.link.drive.facts import WriteReport
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.identify import Identified
 from commissioner.run.archive.catalogue import RunSummary, find_run
-from commissioner.run.archive.late_report import mark_restored, mark_written
+from commissioner.run.archive.report import mark_restored, mark_written
 from commissioner.run.commission import Commissioned
 from commissioner.run.restore import Restored
 from commissioner.run.restore import restore as write_snapshot

@@ -96,9 +96,18 @@ def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
     return Picture(head + rest.partition("</metadata>")[2], caption)
 
 
+_NOTICE, _NOTICE_ENDS = '<section class="notice"><p>', "</p></section>"
+
+
 def with_notice(page: str, sentence: str) -> str:
     """A rendered page with a sentence above its headline, for what has happened since."""
-    return page.replace("<main>", f'<main><section class="notice"><p>{escape(sentence)}</p></section>', 1)
+    return page.replace("<main>", f"<main>{_NOTICE}{escape(sentence)}{_NOTICE_ENDS}", 1)
+
+
+def with_notices_of(before: str, page: str) -> str:
+    """A rendered page that takes another's place, with what stood above that one's headline."""
+    notices = "".join(f"{_NOTICE}{part.partition(_NOTICE_ENDS)[0]}{_NOTICE_ENDS}" for part in before.split(_NOTICE)[1:])
+    return page.replace("<main>", f"<main>{notices}", 1)
 
 
 def render(page: Page) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -20,15 +18,13 @@ from commissioner.link.wire.url import parse_url, without_secrets
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.course import Findings, Job, course
 from commissioner.procedure.energised.excite import warm_up
-from commissioner.procedure.findings import Diagnosing, RunEnded, WarmingUp
+from commissioner.procedure.findings import RunEnded, WarmingUp
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import RunDocument
-from commissioner.report.run.page import run_page
-from commissioner.report.run.summary import diagnosis_sentences, summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost, read_journal
-from commissioner.run.archive.summary import read_file
-from commissioner.run.diagnosed import diagnose_run
+from commissioner.report.run.summary import summarise
+from commissioner.run.archive.folder import RunFolder, archive_lost
+from commissioner.run.archive.report import write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery
@@ -81,6 +77,8 @@ class Commissioned:
     ended: RunEnded
     folder: Path
     result: RunDocument
+    is_being_diagnosed: bool = False
+    """By a process of its own, whose result joins the archive when it is ready."""
 
 
 def commission(
@@ -92,13 +90,11 @@ def commission(
     write_back: bool,
     runs: Path,
     present: Present,
-    diagnosis_s: float = 0.0,
     key: bytes | None = None,
     origin: Origin | None = None,
 ) -> Commissioned:
     """The whole job. Configuration errors are raised, and DriveInUse where another run has the drive; from the first request on, every end is a run with a folder.
 
-    `diagnosis_s` > 0: once everything is saved and the drive is let go, the run's samples are diagnosed for so long at the most.
     `key`: seals the folder (`archive.seal`).
     """
     profile = load_profile(profile_name)
@@ -117,14 +113,10 @@ def commission(
             ended = carry_out(order, folder, findings, present, course, "job", asked, lock)
             lock.release()  # the drive is let go: what follows is the archive's
             result = close_run(order, folder, findings, ended)
-            if diagnosis_s > 0.0 and findings.identification is not None and not asked.asked:
-                _tell(folder, present, Diagnosing(diagnosis_s))
-                result = _with_diagnosis(folder, result, findings, _time_left(diagnosis_s, asked))
-                note(folder, "diagnosed", {"verdict": (result["diagnosis"] or {})["verdict"]})
     return Commissioned(ended, folder.path, result)
 
 
-def _tell(folder: RunFolder, present: Present, state: WarmingUp | Diagnosing) -> None:
+def _tell(folder: RunFolder, present: Present, state: WarmingUp) -> None:
     """A state in which nothing is energised: to the journal, which others follow, and to the screen."""
     note(folder, kind_of(state), state)
     with suppress(Exception):
@@ -199,27 +191,3 @@ def _saved(order: Order, folder: RunFolder, findings: Findings, ended: RunEnded)
     write_report(folder, result, findings)
     folder.cover()
     return result
-
-
-def _time_left(seconds: float, stop: OperatorStop) -> Callable[[], bool]:
-    """Says no once so many seconds have gone by, or the operator stops."""
-    end = time.monotonic() + seconds
-    return lambda: time.monotonic() < end and not stop.asked
-
-
-def _with_diagnosis(
-    folder: RunFolder, result: RunDocument, findings: Findings, go_on: Callable[[], bool]
-) -> RunDocument:
-    """Result and report once more, with what a four-parameter simulation would have got wrong."""
-    diagnosis = diagnose_run(folder, go_on)
-    remarks = [*(result.get("remarks") or ()), *diagnosis_sentences(diagnosis, result["parameters"])]
-    completed: RunDocument = {**result, "diagnosis": diagnosis, "remarks": remarks}
-    write_report(folder, completed, findings)
-    return completed
-
-
-def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
-    """`result.json`, and the page that names its digest."""
-    digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
-    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
-    folder.save_text("report.html", run_page(result, journal, findings, request, digest))

@@ -1,24 +1,44 @@
-"""A run ends with a diagnosis of its own samples: the inverter's loss is named, and what it would have done to R_s."""
+"""A run is followed by a diagnosis of its own samples, which joins the archive: the inverter's loss is named, and what it would have
+done to R_s."""
+
+import json
+import shutil
+from pathlib import Path
 
 import pytest
 
 from commissioner.diagnose.diagnosis import diagnose
 from commissioner.diagnose.document import as_document
+from commissioner.operations.closing import await_diagnosis, begin_diagnosis, diagnose_archived
 from commissioner.recordings.table import read_table, to_standstill
+from commissioner.report.page import with_notice
 from commissioner.report.run.summary import diagnosis_sentences
+from commissioner.run.archive.verify import verify
+from commissioner.run.stopping.operator_stop import OperatorStop
+from tests.replay.golden import SEED, short_run
 from tests.support.command_line import call
 from tests.support.sim_process import SimProcess
 
 
 @pytest.fixture(scope="module")
-def ended(tmp_path_factory):
-    runs = tmp_path_factory.mktemp("archive")
-    with SimProcess("--scenario", "default", "--tcp", "0", "--seed", "1") as sim:
-        answer = call(
-            "run", "--drive", sim.url, "--motor", "motor_2kw2", "--axes", "0", "--yes", "--json", "--diagnosis",
-            "--runs", str(runs),
-        )  # fmt: skip
-    return answer, runs
+def undiagnosed(tmp_path_factory):
+    with SimProcess("--tcp", "0", "--seed", SEED) as sim:
+        return short_run(sim.url, tmp_path_factory.mktemp("runs"))
+
+
+@pytest.fixture(scope="module")
+def ended(undiagnosed, tmp_path_factory):
+    folder = copy_of(undiagnosed, tmp_path_factory.mktemp("archive"))
+    return call("runs", "diagnose", "last", "--runs", str(folder.parent), "--json", timeout_s=300.0), folder
+
+
+@pytest.fixture
+def run(undiagnosed, tmp_path):
+    return copy_of(undiagnosed, tmp_path)
+
+
+def copy_of(run, root):
+    return Path(shutil.copytree(run, root / run.name))
 
 
 def test_the_loss_of_the_legs_is_named_in_the_result(ended):
@@ -35,20 +55,54 @@ def test_the_result_says_what_a_plain_fit_would_have_made_of_the_resistance(ende
     assert moved["with_causes"] == pytest.approx(answer.json["parameters"]["stator_resistance_ohm"]["value"], rel=0.1)
 
 
-def test_the_whole_diagnosis_and_the_sentence_are_in_the_run_folder(ended):
-    answer, runs = ended
-    (folder,) = (path.parent for path in runs.glob("*/diagnosis.json"))
+def test_it_joins_the_archive_whose_chain_stays_whole(ended):
+    answer, folder = ended
     assert any("would have come out" in remark for remark in answer.json["remarks"])
-    assert "would have come out" in (folder / "report.html").read_text()
+    assert json.loads((folder / "result.json").read_text("utf-8")) == answer.json
+    assert "would have come out" in (folder / "report.html").read_text("utf-8")
+    seen = verify(folder)
+    assert (seen.state, seen.losses) == ("intact", ())
+    assert json.loads((folder / "diagnosis.json").read_text("utf-8"))["verdict"] == answer.json["diagnosis"]["verdict"]
 
 
 def test_a_diagnosis_whose_time_is_over_does_not_say_that_nothing_fits(ended):
-    answer, runs = ended
-    (path,) = runs.glob("*/recording.parquet")
-    document = as_document(diagnose([to_standstill(read_table(path))], go_on=lambda: False), None)
+    answer, folder = ended
+    document = as_document(
+        diagnose([to_standstill(read_table(folder / "recording.parquet"))], go_on=lambda: False), None
+    )
     assert not document["is_complete"]
     assert document["reason"].startswith("Not finished")
     assert (
         "stopped before every cause was tried"
         in diagnosis_sentences(document | {"moved": []}, answer.json["parameters"])[0]
     )
+
+
+def test_a_process_of_its_own_makes_it_and_a_later_one_takes_its_place(run):
+    page, stop = run / "report.html", OperatorStop()
+    page.write_text(with_notice(page.read_text("utf-8"), "Restored & <kept>"), encoding="utf-8")
+    await_diagnosis(begin_diagnosis(run, 0.0, None), run, stop)
+    first = json.loads((run / "result.json").read_text("utf-8"))
+    assert diagnose_archived(run.parent, run.name, 0.0) == first
+    assert first["diagnosis"]["is_complete"] is False
+    assert sum("stopped before every cause was tried" in remark for remark in first["remarks"]) == 1
+    assert page.read_text("utf-8").count("<p>Restored &amp; &lt;kept&gt;</p>") == 1
+    assert verify(run).state == "intact"
+
+
+def test_a_stop_ends_it_and_leaves_the_run_as_it_was(run):
+    before, stop = (run / "result.json").read_bytes(), OperatorStop()
+    stop.ask("otto", "STOP")
+    process = begin_diagnosis(run, 100.0, None)
+    await_diagnosis(process, run, stop)
+    assert process.wait(10.0) != 0
+    assert (run / "result.json").read_bytes() == before
+    assert verify(run).state == "intact"
+
+
+def test_a_run_that_identified_nothing_is_refused(run):
+    result = json.loads((run / "result.json").read_text("utf-8")) | {"parameters": {}}
+    (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    answer = call("runs", "diagnose", "last", "--runs", str(run.parent))
+    assert answer.code == 3
+    assert "identified nothing" in answer.stderr

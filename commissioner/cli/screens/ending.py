@@ -17,5 +17,11 @@ def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
         for what, name in (("report", "report.html"), ("samples", "recording.parquet")):
             if (done.folder / name).is_file():
                 screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
+        if done.is_being_diagnosed:
+            screen.out.print(
+                "[dim]diagnosis of the samples: a process of its own makes it, in minutes; then "
+                f"`commissioner runs show {done.folder.name}` and the report have it[/]",
+                soft_wrap=True,
+            )
     if code := EXIT_CODES[done.ended.outcome]:
         raise SystemExit(code)

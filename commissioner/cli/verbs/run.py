@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rich.markup import escape
 
 from commissioner.cli.held import held_by_a_service
@@ -35,7 +37,7 @@ def hold_and_commission(request: CommissionRequest) -> None:
     """A run that a service holds: two JSON documents, the folder and the result."""
     check_request(request)
     with held_by_a_service() as (_, _, origin):
-        done = commission(request, origin=origin)
+        done = commission(replace(request, waits=True), origin=origin)
     show_and_exit(done, as_json=True)
 
 

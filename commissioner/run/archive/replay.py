@@ -73,8 +73,9 @@ def replay(folder: Path, *, salvage: bool = False) -> Replayed:
     if is_by_itself:
         archived += [_end(line["record"]) for line in journal if line["kind"] == "run_ended"]
     findings = Findings()
-    replayed = list(_decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself))
-    if is_by_itself and (folder / "result.json").is_file():
+    again = _decide_again(job, findings, journal, folder, announcer, with_end=is_by_itself)
+    replayed, is_alike = _up_to_a_difference(archived, again)
+    if is_alike and is_by_itself and (folder / "result.json").is_file():
         ended = _ended(folder, next(line["record"] for line in journal if line["kind"] == "run_ended"))
         formed = summarise(findings, ended, folder.name, job.parameter_names, job.parameter_factors)
         archived += _result(read_saved(folder, "result.json"), formed)
@@ -214,6 +215,18 @@ def _answer(command: ask.Command, replies: Iterator[dict[str, Any]], blocks: Ite
         return _READ[held["command"]](held["reply"])
     except (TypeError, KeyError, ValueError):  # cut short or changed: it is compared up to here
         raise _ArchiveEnds from None
+
+
+def _up_to_a_difference(
+    archived: list[dict[str, Any]], again: Iterator[dict[str, Any]]
+) -> tuple[list[dict[str, Any]], bool]:
+    """What is decided again, up to the first that differs: what comes behind that costs a minute and tells nothing."""
+    replayed: list[dict[str, Any]] = []
+    for decision in again:
+        replayed.append(decision)
+        if archived[len(replayed) - 1 : len(replayed)] != [decision]:
+            return replayed, False
+    return replayed, True
 
 
 def _first_difference(

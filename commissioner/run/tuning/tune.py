@@ -28,7 +28,8 @@ from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
 from commissioner.report.run.summary import summarise
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.commission import Commissioned, Order, Origin, write_report
+from commissioner.run.archive.report import write_report
+from commissioner.run.commission import Commissioned, Order, Origin
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.holding.mastery import Mastery

@@ -1,4 +1,4 @@
-"""`commissioner restore`, `write` and `replay`: what an archived run is good for afterwards."""
+"""`commissioner restore`, `write`, `replay` and `runs diagnose`: what an archived run is good for afterwards."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused
-from commissioner.operations import archive, write
+from commissioner.operations import archive, closing, write
 from commissioner.records import drive_words
 from commissioner.run.archive.seal import read_key
 from commissioner.run.write_accepted import Plan, as_document
@@ -83,6 +83,17 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
     screen.out.print(f"[bold]{screen.text(drive_words(plan.drive_type, plan.serial_number))}[/]")
     header = ("register", "parameter", "now", "will be", "unit", "convention")
     screen.out.print(screen.table("", header, rows, right=(2, 3)))
+
+
+def diagnose_run(runs: Path, run: str, seconds: float, *, seal: Path | None, as_json: bool) -> None:
+    """The closing diagnosis of a run; every other program of this computer goes first."""
+    closing.step_back()
+    with screen.busy("diagnosing the samples"):
+        result = closing.diagnose_archived(runs, run, seconds, read_key(seal) if seal is not None else None)
+    if as_json:
+        screen.emit(result)
+    else:
+        screen.result(result)
 
 
 def replay_run(runs: Path, run: str, *, as_json: bool, salvage: bool) -> None:

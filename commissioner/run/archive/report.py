@@ -1,20 +1,33 @@
-"""The report of a run that was cut off before it could make its own, from what its archive holds."""
+"""The report of a run: as it ends, made later from what its archive holds, and marked with what has happened since."""
 
 from __future__ import annotations
 
+import hashlib
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 from commissioner.encoding import plain
 from commissioner.procedure.findings import RunEnded
-from commissioner.report.page import with_notice
+from commissioner.procedure.steps import Findings
+from commissioner.report.page import with_notice, with_notices_of
+from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import summarise
 from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.replay import learn_again
 from commissioner.run.archive.summary import read_file
+
+
+def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
+    """`result.json`, and the page that names its digest; what an earlier page says on top stays."""
+    digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
+    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
+    page, before = run_page(result, journal, findings, request, digest), folder.path / "report.html"
+    if before.is_file():
+        page = with_notices_of(before.read_text("utf-8"), page)
+    folder.save_text("report.html", page)
 
 
 def mark_restored(run: RunSummary) -> None:
