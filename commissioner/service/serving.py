@@ -32,6 +32,7 @@ def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> Non
         ssl_certfile=tls.certificate if tls else None,
         ssl_keyfile=tls.key if tls else None,
         ws_ping_interval=1.0,
+        ws_per_message_deflate=False,  # a message is a few hundred bytes
         ws_ping_timeout=2.0,
         ws_max_size=65536,
         timeout_graceful_shutdown=8,

@@ -160,8 +160,22 @@ def holder_of(url: DriveUrl, profile: DriveProfile) -> Holder | None:
 
 def runs_holding() -> frozenset[str]:
     """The runs whose process has its drive now, whoever of this computer started them: a lock, unlike a record, dies with it."""
-    records = ((path, _holder(path)) for path in locks_folder().glob("*.json"))
-    return frozenset(held.run for path, held in records if held is not None and held.run and _is_held(path))
+    holding = set[str]()
+    for path in locks_folder().glob("*.json"):
+        with suppress(OSError):
+            changed = path.stat().st_mtime_ns
+            if _free.get(path) == changed:
+                continue
+            held = _holder(path)
+            if held is not None and held.run and _is_held(path):
+                holding.add(held.run)
+            else:
+                _free[path] = changed
+    return frozenset(holding)
+
+
+_free: dict[Path, int] = {}
+"""Records whose lock was seen free, by their time of change: whoever takes it writes the record anew."""
 
 
 def in_use(held: Holder | None, drive: str) -> DriveInUse:

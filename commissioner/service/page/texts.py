@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from babel.messages.pofile import read_po
-from babel.numbers import format_decimal
 from starlette.requests import HTTPConnection
 
 from commissioner.service.problems import Refusal
@@ -94,10 +93,9 @@ class Texts:
         if value is None or not math.isfinite(value):
             return self.gettext("no value")
         shown = 0.0 if round(value, digits) == 0 else value
-        pattern = "0" + ("." + "0" * digits if digits else "")
-        text = format_decimal(shown, format=pattern, locale=self.language, decimal_quantization=True).replace(
-            "-", "\u2212"
-        )
+        text = f"{shown:.{digits}f}".replace("-", "\u2212")
+        if self.language == "de":
+            text = text.replace(".", ",")
         return text + (NBSP + unit if unit else "")
 
     def signed(self, value: float | None, digits: int, unit: str = "") -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
@@ -22,12 +23,13 @@ from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.desk import LiveRun, Stopped
-from commissioner.service.runs.feed import Feed
+from commissioner.service.runs.feed import Feed, Message
 
 router = APIRouter()
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
-BAND_S = 0.4
-"""The band is sent anew so often: its age must not be older than a second."""
+BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
+"""The band is sent anew so often: its age must not be older than a second, and a page hears of its service by it where no run's numbers
+come."""
 UNKNOWN = "somebody at a page"
 
 
@@ -160,6 +162,22 @@ async def page_socket(socket: WebSocket) -> None:
     await _Socket(socket, "", socket.query_params.get("drive", "")).serve()
 
 
+def _together(messages: list[Message]) -> Iterator[str]:
+    """As few documents as hold them in their order, each kind once in one."""
+    parts = dict[str, str]()
+    for message in messages:
+        if message.event in parts:
+            yield _document(parts)
+            parts = {}
+        parts[message.event] = message.text
+    if parts:
+        yield _document(parts)
+
+
+def _document(parts: dict[str, str]) -> str:
+    return "{" + ",".join(f'"{event}":{text}' for event, text in parts.items()) + "}"
+
+
 class _Socket:
     """One page's line to the service: the band and the numbers out, STOP and control in."""
 
@@ -168,7 +186,7 @@ class _Socket:
         self._parts = parts_of(socket)
         self._who = visitor_of(socket)
         self._sending = asyncio.Lock()
-        self._last = ""
+        self._has_numbers = False
 
     async def serve(self) -> None:
         await self._socket.accept()
@@ -230,7 +248,7 @@ class _Socket:
             who = visitor_of(self._socket)
             band = band_of(self._parts, who, Place(self._run, self._drive), texts)
             await self._send({"band": asdict(band)})
-            await asyncio.sleep(BAND_S)
+            await asyncio.sleep(BAND_BESIDE_NUMBERS_S if self._has_numbers else BAND_S)
 
     async def _send_numbers(self) -> None:
         feed = await self._feed()
@@ -238,8 +256,13 @@ class _Socket:
             return
         await self._send({"history": feed.state.history})
         with feed.watch(is_page=True) as watcher:
-            while not watcher.is_lost and (message := await watcher.queue.get()) is not None:
-                await self._send(f'{{"{message.event}":{message.text}}}')
+            is_over, self._has_numbers = False, True
+            while not watcher.is_lost and not is_over:
+                taken = await watcher.take()
+                is_over = taken[-1] is None
+                for text in _together([message for message in taken if message is not None]):
+                    await self._send(text)
+        self._has_numbers = False
         await self._send({"over": True})
 
     async def _feed(self) -> Feed | None:

@@ -12,7 +12,7 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.parts import Parts
-from commissioner.service.runs.feed import Feed
+from commissioner.service.runs.feed import Feed, Message
 
 router = APIRouter()
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
@@ -38,21 +38,26 @@ def _archived(parts: Parts, run: str) -> Feed:
     return feed
 
 
-async def _stream(parts: Parts, feed: Feed, after: int) -> AsyncIterator[ServerSentEvent]:
+async def _stream(parts: Parts, feed: Feed, after: int) -> AsyncIterator[bytes]:
     closing = asyncio.create_task(parts.closing.wait())
     try:
         with feed.watch(after) as watcher:
             while not watcher.is_lost:
-                taking = asyncio.create_task(watcher.queue.get())
+                taking = asyncio.create_task(watcher.take())
                 await asyncio.wait([taking, closing], return_when=asyncio.FIRST_COMPLETED)
                 if closing.done():
                     taking.cancel()
                     return
-                message = taking.result()
-                if message is None:
-                    yield ServerSentEvent(data="{}", event="end")
+                taken = taking.result()
+                yield b"".join(map(_encoded, taken))
+                if taken[-1] is None:
                     return
-                number = None if message.number is None else str(message.number)
-                yield ServerSentEvent(data=message.text, event=message.event, id=number)
     finally:
         closing.cancel()
+
+
+def _encoded(message: Message | None) -> bytes:
+    if message is None:
+        return ServerSentEvent(data="{}", event="end").encode()
+    number = None if message.number is None else str(message.number)
+    return ServerSentEvent(data=message.text, event=message.event, id=number).encode()

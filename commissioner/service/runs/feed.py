@@ -10,11 +10,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from commissioner.run.archive.blocks import Placed
 from commissioner.run.archive.follow import BlocksFollower, JournalFollower
 from commissioner.service.runs.live import live_document
 from commissioner.service.runs.samples import Envelope
 from commissioner.service.runs.state import RunState
 
+TOGETHER_S = 0.09
+"""Samples are shown, and whatever a page is sent goes out, so long together, twice as long for a script: a write to a socket costs
+half a millisecond of processor time."""
 BACKLOG = 2000
 """Messages that one watcher may be behind (some 100 s); then it is let go and can resume from where it was."""
 
@@ -44,6 +48,15 @@ class Watcher:
         except asyncio.QueueFull:
             self.is_lost = True
 
+    async def take(self) -> list[Message | None]:
+        """What came since the last call, once something has. None last: nothing more will come."""
+        taken = [await self.queue.get()]
+        if taken[0] is not None:
+            await asyncio.sleep(TOGETHER_S if self.is_page else 2.0 * TOGETHER_S)
+        while not self.queue.empty():
+            taken.append(self.queue.get_nowait())
+        return taken
+
 
 class Feed:
     """Follows the folder of one run. `poll` is called many times a second while the run lives."""
@@ -54,6 +67,8 @@ class Feed:
         self._journal = JournalFollower(folder / "journal.jsonl")
         self._blocks = BlocksFollower(folder / "blocks.bin")
         self._envelope = Envelope()
+        self._held: list[Placed] = []
+        self._shown_s = 0.0
         self._watchers: set[Watcher] = set()
         self.is_closed = self.is_news = False
         self.current_now_a = 0.0
@@ -76,8 +91,22 @@ class Feed:
     def poll(self) -> bool:
         """Read what is new; whether there was anything."""
         blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
-        before = self._envelope.energised_s
-        events = self._envelope.of(blocks)
+        self._held += blocks
+        lines = self._journal.new()
+        if lines or not blocks or time.monotonic() - self._shown_s > TOGETHER_S:
+            self._show_samples()
+        for line in lines:
+            self.state.take(line)
+            self._publish(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
+        if lines or blocks:
+            self.heard_s = time.monotonic()
+            self.is_news = True
+        return bool(lines or blocks)
+
+    def _show_samples(self) -> None:
+        """What was read since the last time, in one piece."""
+        before, self._shown_s = self._envelope.energised_s, time.monotonic()
+        events, self._held = self._envelope.of(self._held), []
         if events:
             self.state.energised(self._envelope.energised_s - before)
             self.state.current_high_a = max(
@@ -86,14 +115,6 @@ class Feed:
             self.current_now_a = max(max(abs(x) for x in (*e["low_a"], *e["high_a"])) for e in events)
         for event in events:
             self._publish(Message("samples", None, json.dumps(event, separators=(",", ":"))))
-        lines = self._journal.new()
-        for line in lines:
-            self.state.take(line)
-            self._publish(Message(line["kind"], line["n"], json.dumps(line, separators=(",", ":"))))
-        if lines or blocks:
-            self.heard_s = time.monotonic()
-            self.is_news = True
-        return bool(lines or blocks)
 
     def summarise(self) -> None:
         """To the pages: what there is to show now. Called ten times a second; silent where nothing is new."""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.records import SampleBlock
+from commissioner.run.archive.blocks import Placed
 
 BIN_S = 0.01
 
@@ -20,13 +23,11 @@ class Envelope:
         self._segment, self._time_s, self.blocks = -1, 0.0, 0
         self.energised_s = 0.0
 
-    def of(self, blocks: Sequence[tuple[int, SampleBlock]]) -> list[dict[str, Any]]:
+    def of(self, blocks: Sequence[Placed]) -> list[dict[str, Any]]:
         """One event for each segment among the blocks; `t_s` runs on over all segments of the run."""
         events: list[dict[str, Any]] = []
-        for segment, block in blocks:
-            self.blocks += 1
-            if block.count == 0:
-                continue
+        self.blocks += len(blocks)
+        for segment, block in _joined(blocks):
             is_new = segment != self._segment
             if is_new or not events:
                 events.append(
@@ -49,3 +50,25 @@ class Envelope:
         seconds = (block.count + block.lost_before) * block.sample_period_s
         self._time_s += block.count * block.sample_period_s
         self.energised_s += seconds
+
+
+def _joined(blocks: Sequence[Placed]) -> Iterator[Placed]:
+    """Blocks that follow one another without a gap, as one: a window of the stream is a quarter of a bin."""
+    for (segment, axis_deg, _), group in itertools.groupby(_with_run(blocks), key=lambda one: one[0]):
+        parts = [block for _, block in group]
+        w = (
+            None
+            if parts[0].current_w_a is None
+            else np.concatenate([p.current_w_a for p in parts if p.current_w_a is not None])
+        )
+        u, v = (np.concatenate([getattr(p, name) for p in parts]) for name in ("current_u_a", "current_v_a"))
+        yield segment, replace(parts[0], axis_deg=axis_deg, current_u_a=u, current_v_a=v, current_w_a=w)
+
+
+def _with_run(blocks: Sequence[Placed]) -> Iterator[tuple[tuple[int, float, int], SampleBlock]]:
+    """Each block that holds samples with its segment, axis, and the number of its run without a gap."""
+    run = 0
+    for segment, block in blocks:
+        if block.count:
+            run += block.lost_before > 0
+            yield (segment, block.axis_deg, run), block

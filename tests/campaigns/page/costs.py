@@ -100,10 +100,9 @@ def viewers(service: ServiceProcess, count: int) -> dict[str, object]:
     before_s, began = cpu_s(service.process.pid), time.monotonic()
     for thread in threads:
         thread.start()
-    service.wait_over(run, 600)
-    seconds, used_s = time.monotonic() - began, cpu_s(service.process.pid) - before_s
     for thread in threads:
-        thread.join(60)
+        thread.join(600)
+    seconds, used_s = time.monotonic() - began, cpu_s(service.process.pid) - before_s
     lines = len((service.runs / run / "journal.jsonl").read_text("utf-8").splitlines())
     return {
         "viewers": count,
@@ -198,7 +197,7 @@ def main() -> int:
         memory, through_page = [round(resident_mb(pid), 1)], []
         for _ in range(asked.runs):
             before = cpu_s(pid, with_children=True)
-            service.wait_over(service.start_run(), 600)
+            page(service, service.start_run())
             time.sleep(0.5)
             through_page.append(round(cpu_s(pid, with_children=True) - before, 2))
             memory.append(round(resident_mb(pid), 1))
