@@ -18,8 +18,8 @@ from commissioner.run.stopping.stop_file import stopped_by_file
 if TYPE_CHECKING:
     from commissioner.report.run.contract import RunDocument
 
-DIAGNOSIS_S = 180.0
-"""Four tests with five causes in them take 40 s on two quiet cores, 106 s with other work beside: then it is given up, wherever it is."""
+DIAGNOSIS_S = 600.0
+"""Four tests with five causes in them take 40 s on two quiet cores, three minutes behind other work; then it is given up, wherever it is."""
 LOOK_S, END_S = 0.05, 5.0
 NICER = 10
 """Steps of POSIX's nice value."""

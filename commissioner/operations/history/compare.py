@@ -12,8 +12,8 @@ from commissioner.history.explain import Array, Explanation, explain
 from commissioner.identify.estimate.axes import Combined, Comparison, compare
 from commissioner.identify.estimate.common_ground import CommonGround, Result, brought_together
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.operations.history.results import result_from, result_of
 from commissioner.run.archive.catalogue import find_run
+from commissioner.run.index.results import result_from, result_of
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from dataclasses import dataclass
 from pathlib import Path
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.history.motor import Measured, Trends, indicator_trends, motor_trends
+from commissioner.history.motor import Trends, indicator_trends, motor_trends
 from commissioner.monitor.trend.trend import is_same_point
 from commissioner.operations.history.motors import runs_of
-from commissioner.operations.history.results import has_result, result_of
 from commissioner.operations.history.runs import Archive
 from commissioner.recordings.baseline import read
 from commissioner.run.archive.catalogue import read_run
+from commissioner.run.index.results import has_result
+from commissioner.run.index.years import measured_in, seconds
 
 PICTURES = (".svg", ".png")
 UNITS = {"rad_per_s": "rad/s", "nm": "N m", "percent": "%"}
@@ -36,7 +36,7 @@ def trend(archive: Archive, motor: str, picture: Path | None = None) -> MotorTre
     for row in reversed(runs_of(archive, motor)):
         summary = read_run(Path(row.folder))
         if has_result(summary):
-            measured.append(Measured(row.run, _seconds(row.started_utc), result_of(summary)))
+            measured.append(measured_in(summary))
         else:
             left_out.append(f"{row.run}: {summary.outcome}, without parameters")
     if not measured:
@@ -64,7 +64,7 @@ def trend_of_indicators(baseline: Path, picture: Path | None = None) -> MotorTre
     names = [name for name in newest.indicators if all(name in entry.indicators for entry in alike)]
     series = {
         name: [
-            (entry.source, _seconds(entry.utc) if entry.utc else float(k), *entry.indicators[name])
+            (entry.source, seconds(entry.utc) if entry.utc else float(k), *entry.indicators[name])
             for k, entry in enumerate(alike)
         ]
         for name in names
@@ -91,10 +91,3 @@ def _check(picture: Path | None) -> None:
             "the picture's format is not known", step="trend", value=picture.name, limit=" or ".join(PICTURES),
             remedy="give --out a name that ends so",
         )  # fmt: skip
-
-
-def _seconds(utc: str) -> float:
-    try:
-        return dt.datetime.fromisoformat(utc).timestamp()
-    except ValueError:
-        return 0.0

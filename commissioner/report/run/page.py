@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
+from commissioner.history.motor import Trends
 from commissioner.procedure.steps import Findings
 from commissioner.report.run.appendix import checks_and_course, registers_and_record, uncertainty
 from commissioner.report.run.certificate import certificate
@@ -13,6 +14,7 @@ from commissioner.report.run.evidence import evidence
 from commissioner.report.run.plain_simulation import plain_simulation
 from commissioner.report.run.subject import Subject
 from commissioner.report.run.tuned import tuned_sheet
+from commissioner.report.run.years import years_sheet
 from commissioner.report.sheet.document import Margins, Page, document
 
 
@@ -22,8 +24,10 @@ def run_page(
     findings: Findings,
     request: Mapping[str, Any] | None = None,
     digest: str | None = None,
+    years: Trends | None = None,
 ) -> str:
-    """The whole report as one self-contained HTML text, for every way a run can end. `digest`: SHA-256 of result.json."""
+    """The whole report as one self-contained HTML text, for every way a run can end. `digest`: SHA-256 of result.json; `years`: of the
+    motor it was made on."""
     subject = Subject(result, journal, findings, request or {})
     first = tuned_sheet(subject) if result.get("tune") else certificate(subject)
     pages = [
@@ -33,6 +37,7 @@ def run_page(
         Page("a", "A Checks", checks_and_course(subject), is_appendix=True),
         Page("b", "B Registers", registers_and_record(subject), is_appendix=True),
         Page("c", "C Uncertainty", uncertainty(subject), is_appendix=True),
+        Page("d", "D The motor over the years", years_sheet(years), is_appendix=True),
     ]
     return document(f"Report {subject.run}", _margins(subject, digest), [page for page in pages if page.body])
 

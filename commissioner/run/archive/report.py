@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from commissioner.encoding import plain
+from commissioner.errors import CommissionerError
 from commissioner.procedure.findings import RunEnded
 from commissioner.procedure.steps import Findings
 from commissioner.report.page import with_notice, with_notices_of
@@ -18,13 +19,13 @@ from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, read_journal
 from commissioner.run.archive.replay import learn_again
 from commissioner.run.archive.summary import read_file
+from commissioner.run.index.years import over_years
 
 
 def write_report(folder: RunFolder, result: RunDocument, findings: Findings) -> None:
     """`result.json`, and the page that names its digest; what an earlier page says on top stays."""
     digest = hashlib.sha256(folder.save("result.json", result).read_bytes()).hexdigest()
-    journal, request = read_journal(folder.path / "journal.jsonl"), read_file(folder.path / "request.json")
-    page, before = run_page(result, journal, findings, request, digest), folder.path / "report.html"
+    page, before = _page(folder.path, result, findings, digest), folder.path / "report.html"
     if before.is_file():
         page = with_notices_of(before.read_text("utf-8"), page)
     folder.save_text("report.html", page)
@@ -54,6 +55,13 @@ def make_report(run: RunSummary) -> None:
     job, findings = learn_again(path)
     ended = RunEnded(run.outcome, f"{run.reason}; parameters in the drive: {run.written}", run.energised_s)
     result = plain(summarise(findings, ended, run.run, job.parameter_names, job.parameter_factors))
-    journal = read_journal(path / "journal.jsonl")
+    page = _page(path, result, findings, None)
     with closing(RunFolder(path)) as folder:
-        folder.save_text("report.html", run_page(result, journal, findings, read_file(path / "request.json")))
+        folder.save_text("report.html", page)
+
+
+def _page(path: Path, result: RunDocument, findings: Findings, digest: str | None) -> str:
+    journal, request, years = read_journal(path / "journal.jsonl"), read_file(path / "request.json"), None
+    with suppress(CommissionerError, OSError):  # an archive that cannot be looked through spoils no report
+        years = over_years(path)
+    return run_page(result, journal, findings, request, digest, years)

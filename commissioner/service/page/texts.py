@@ -16,7 +16,7 @@ from starlette.requests import HTTPConnection
 from commissioner.service.problems import Refusal
 
 LANGUAGES = ("en", "de")
-UNIT_SIGNS = {"ohm": "Ω", "degC": "°C"}
+UNIT_SIGNS = {"ohm": "Ω", "degC": "°C", "us": "µs", "1": ""}
 NBSP = "\u00a0"
 
 

@@ -16,6 +16,7 @@ from commissioner.operations.history.motors import judge_motor, list_motors, nam
 from commissioner.operations.history.runs import Archive, Wanted, find_runs
 from commissioner.operations.history.trend import trend, trend_of_indicators
 from commissioner.run.archive.verify import verify
+from commissioner.run.index.years import over_years
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 from tests.unit.cli.test_failures import leave
 
@@ -186,3 +187,13 @@ def test_what_moved_is_explained_by_what_moved_it(tmp_path, factors, facts, caus
 def test_the_same_motor_needs_no_explanation(tmp_path):
     before, after = add(tmp_path, 0, noisy(1)), add(tmp_path, 1, noisy(2))
     assert compare_runs(tmp_path, before, after).explained_by == ()
+
+
+def test_a_runs_report_knows_the_earlier_runs_of_its_motor_and_no_later_or_other_ones(tmp_path):
+    runs = [add(tmp_path, k, noisy(k), tag="PUMP-3") for k in range(4)]
+    add(tmp_path, 1.5, tag="FAN-1")
+    unnamed = add(tmp_path, 5)
+    found = over_years(tmp_path / runs[2])
+    assert [point.run for point in found.trends[0].points] == runs[:3]
+    assert over_years(tmp_path / runs[0]) is None
+    assert over_years(tmp_path / unnamed) is None

@@ -3,8 +3,13 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
+from commissioner.history.motor import Measured, motor_trends
+from commissioner.identify.estimate.axes import Combined
+from commissioner.identify.estimate.common_ground import Result
+from commissioner.motor.circuit import InverseGamma
 from commissioner.procedure.steps import Findings
 from commissioner.report.run.page import run_page
 
@@ -199,3 +204,29 @@ def test_text_from_drive_plate_and_person_is_escaped():
     page = run_page(document, JOURNAL, Findings(), {"origin": {"motor_tag": evil, "place": evil, "cable": evil}})
     assert "<img" not in page
     assert json.dumps(evil)[1:-1] not in page
+
+
+def history(points, degc=24.0):
+    """A motor whose rotor resistance changed by 8 % in between."""
+    measured = []
+    for k in range(points):
+        r_r = 2.18 * (1.08 if k >= points // 2 else 1.0)
+        combined = Combined(
+            InverseGamma(3.716, r_r, 0.02146, 0.3091), np.diag([1e-3, 1e-3, 1e-6, 1e-4]) ** 2, (0.0,) * 4, (), ()
+        )
+        measured.append(Measured(f"2019{k:02d}01", 3.15e7 * k, Result(f"2019{k:02d}01", combined, 0.716, (), degc)))
+    return motor_trends(measured)
+
+
+def test_a_motor_with_earlier_runs_has_them_drawn_with_what_moved():
+    page = run_page(result(), JOURNAL, Findings(), years=history(8))
+    text = words(page)
+    assert "8 runs of this motor, at a stator flux of 0.716 Wb and 24.0 °C" in text
+    assert "Rotor resistance has moved by +8 ±" in text
+    assert page.count('aria-label="rotor resistance over 8 runs, in Ω"') == 1
+    assert "2.354 ±" in text
+
+
+def test_two_runs_have_no_change_a_year_and_none_no_sheet():
+    assert "too few runs" in words(run_page(result(), JOURNAL, Findings(), years=history(2)))
+    assert "over the years" not in words(run_page(result(), JOURNAL, Findings()))
