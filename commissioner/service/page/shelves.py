@@ -37,7 +37,7 @@ async def archive(request: Request, motor: str = "", outcome: str = "", since: s
     found = await asyncio.to_thread(
         lambda: parts.archive.entries(motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit)
     )
-    live = {run.id for run in parts.desk.live()}
+    live = {run.id for run in parts.desk.without_result()}
     return render(
         request, ARCHIVE, found=found, live=live, motor=motor[:80], outcome=outcome[:40], since=since[:32], limit=limit
     )

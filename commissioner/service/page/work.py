@@ -58,7 +58,7 @@ async def start(request: Request) -> Response:
     parts = parts_of(request)
     drives = [drive for drive in parts.library.drives() if drive.id != SIMULATOR]
     newest = await asyncio.to_thread(lambda: parts.archive.entries(limit=8))
-    live = parts.desk.live()
+    live = parts.desk.without_result()
     cut = [entry for entry in newest if entry.outcome == "cut off" and entry.run not in {run.id for run in live}]
     return render(
         request,

@@ -97,6 +97,10 @@ class Desk:
     def live(self) -> list[LiveRun]:
         return [run for run in self.runs.values() if not run.is_over]
 
+    def without_result(self) -> list[LiveRun]:
+        """Those for whom there is nothing yet to look at; a run that is only diagnosed has its result."""
+        return [run for run in self.live() if not run.has_result]
+
     def live_on(self, drive: str) -> LiveRun | None:
         """The run that holds this drive."""
         return next((run for run in self.live() if run.drive == drive and not run.has_freed_drive), None)
