@@ -6,22 +6,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from commissioner.diagnose.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.causes import CATALOGUE, LINEAR
 from commissioner.diagnose.causes.inverter.legs import tail_of_legs
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
 from commissioner.diagnose.fit.gauss_newton import Fit, inverse
 from commissioner.diagnose.intake.audit import Audit, prepare
+from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.intake.line_classes import Split, split_lines
 from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_share
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
-from commissioner.diagnose.search.journal import Said, Step, followed, replayed
+from commissioner.diagnose.search.journal import Said, Step, followed, replayed, written
 from commissioner.diagnose.search.search import Found, search
 from commissioner.diagnose.verdict.causes import (
     Cause,
@@ -80,6 +81,11 @@ class Diagnosis:
     """False: given up before nothing more passed the rules, and nothing is named."""
     steps: tuple[Step, ...] = ()
     """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
+
+    @property
+    def written_steps(self) -> list[dict[str, Any]]:
+        """The same as a document holds them."""
+        return written(self.steps)
 
 
 def diagnose(

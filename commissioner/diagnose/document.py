@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from commissioner.diagnose.contract import CauseDocument, DiagnosisDocument, Measured
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.points.diagnosis import PointsDiagnosis
-from commissioner.diagnose.search.journal import written
 from commissioner.diagnose.verdict.causes import Cause
 from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.errors import DataRefused
@@ -54,7 +53,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
         "audit": list(seen.audit.sentences),
         "remarks": list(seen.remarks),
         "is_complete": seen.is_complete,
-        "search": written(seen.steps),
+        "search": seen.written_steps,
         "next_experiment": dict(seen.next_experiment) if seen.next_experiment else None,
         "model_file": model_file,
     }

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
-from commissioner.diagnose.cancelling import ask_for_time
 from commissioner.diagnose.intake.audit import excited_lines
+from commissioner.diagnose.intake.cancelling import ask_for_time
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import TO_PHASES, Named, Record, Segment, each_segment
 from commissioner.diagnose.plant.model import Layout, Model, impedance

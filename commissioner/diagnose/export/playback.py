@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.causes.regressors import FINE_SPEED_SPLINE, with_fine_speed_splines, with_known
 from commissioner.diagnose.intake.record import Facts, Record, Segment
+from commissioner.diagnose.plant.flux_before import with_flux_before
 from commissioner.diagnose.plant.model import NO_DICTIONARY, Layout, Model, impedance
 from commissioner.diagnose.plant.prediction import predict
-from commissioner.diagnose.search.nominal import with_flux_before
 
 Array = NDArray[np.float64]
 TONES_HZ = (0.5, 2.3, 9.7, 41.9, 113.3, 331.7)

@@ -13,7 +13,6 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 
-from commissioner.diagnose.kernels.memory import replayed
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
@@ -89,17 +88,9 @@ class Segment:
         kept = (0.0, 0.0) if self.iron_before_wb is None else self.iron_before_wb[:, -1]
         return np.array([*self.flux_before_wb, *kept])
 
-    def memory(self, radius_wb: Signal) -> NDArray[np.float64]:
-        """(s, 2) what memory operators of these radii have kept of the segments before."""
-        if self.iron_before_wb is None:
-            return np.zeros((radius_wb.size, 2))
-        key = radius_wb.tobytes()
-        if key not in self._memories:
-            self._memories[key] = np.asarray(replayed(self.iron_before_wb, radius_wb))
-        return self._memories[key]
-
     @cached_property
-    def _memories(self) -> dict[bytes, NDArray[np.float64]]:
+    def memories(self) -> dict[bytes, NDArray[np.float64]]:
+        """(s, 2) what memory operators of some radii have kept of the segments before, by the radii's bytes, as far as it was asked for."""
         return {}
 
     def first(self, samples: int) -> Segment:

@@ -12,6 +12,7 @@ from commissioner.diagnose.intake.record import Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.decay import LEAST_SHARE, decayed
 from commissioner.diagnose.kernels.forcing import tilted
+from commissioner.diagnose.kernels.memory import replayed
 from commissioner.diagnose.kernels.spline import cells_of
 from commissioner.diagnose.kernels.structures import Machine
 from commissioner.diagnose.plant.model import Layout, Model, Term
@@ -105,9 +106,13 @@ def slopes_of_start(model: Model, segment: Segment, machine: Machine, layout: La
 
 def _memory(model: Model, segment: Segment, radius: Array) -> Array:
     """(s, 2) what operators of `radius` (s, 2) remember of the segments before; nothing where the pause wipes it out."""
-    if not model.total(kinds.MEMORY):
+    if not model.total(kinds.MEMORY) or segment.iron_before_wb is None:
         return np.zeros((len(radius), 2))
-    return segment.memory(np.ascontiguousarray(radius[:, 0]))
+    radii = np.ascontiguousarray(radius[:, 0])
+    key = radii.tobytes()
+    if key not in segment.memories:
+        segment.memories[key] = np.asarray(replayed(segment.iron_before_wb, radii))
+    return segment.memories[key]
 
 
 def _magnetized(machine: Machine, memory: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from commissioner.diagnose.cancelling import ask_for_time
+from commissioner.diagnose.intake.cancelling import ask_for_time
 from commissioner.diagnose.intake.record import TO_PHASES, Record, Segment
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.kernels.spline import cells_of

@@ -12,6 +12,7 @@ from commissioner.diagnose.causes.mains_lines import with_clearer_lines
 from commissioner.diagnose.causes.regressors import FINE_SPEED_SPLINE
 from commissioner.diagnose.fit.gauss_newton import fit
 from commissioner.diagnose.kernels import kinds
+from commissioner.diagnose.plant.flux_before import with_flux_before
 from commissioner.diagnose.plant.impedance import impedance_starts
 from commissioner.diagnose.search.acceptance import effects_of, is_plausible, meets_tones
 from commissioner.diagnose.search.dictionaries import (
@@ -23,7 +24,7 @@ from commissioner.diagnose.search.dictionaries import (
 )
 from commissioner.diagnose.search.exchanges import exchanged
 from commissioner.diagnose.search.journal import Refined, Said, Step
-from commissioner.diagnose.search.nominal import is_outside_the_box, with_flux_before
+from commissioner.diagnose.search.nominal import is_outside_the_box
 from commissioner.diagnose.search.refinement import leakage_side
 from commissioner.diagnose.search.state import (
     Problem,

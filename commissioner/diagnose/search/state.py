@@ -14,11 +14,11 @@ from commissioner.diagnose.fit.gauss_newton import Fit, fit
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.kernels import kinds
+from commissioner.diagnose.plant.flux_before import with_flux_before
 from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.diagnose.rules import RULES, Rules
 from commissioner.diagnose.search.acceptance import losses_of, meets_tones
 from commissioner.diagnose.search.journal import Beside, RuledOut, Step
-from commissioner.diagnose.search.nominal import with_flux_before
 from commissioner.diagnose.search.screening import Screening
 
 

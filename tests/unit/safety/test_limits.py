@@ -18,6 +18,7 @@ from commissioner.safety.commands import (
     SetBias,
     SetDriveLimits,
     SetScale,
+    Supervise,
     TakeSnapshot,
     Tell,
     Wait,
@@ -260,3 +261,18 @@ def test_a_command_that_proves_nothing_changes_no_fact(command):
 def test_nobody_can_change_bounds_facts_or_a_refusal(record):
     with pytest.raises(FrozenInstanceError):
         setattr(record, next(iter(record.__dataclass_fields__)), 99.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "facts", "says"),
+    [
+        (0.0, RUNNING, None),
+        (20.0, RUNNING, None),
+        (20.001, RUNNING, "time without samples is outside its limits"),
+        (-0.001, RUNNING, "time without samples is outside its limits"),
+        (1.0, READY, "nothing is energised"),
+    ],
+)
+def test_only_an_energised_motor_is_supervised_without_samples_and_no_longer_than_a_test(seconds, facts, says):
+    refusal = permit(Supervise(seconds), facts, BOUNDS)
+    assert (None if refusal is None else refusal.what) == says

@@ -11,10 +11,11 @@ from scipy.linalg import expm
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.causes.iron.magnetic_hysteresis import CARRIED
 from commissioner.diagnose.kernels import kinds
+from commissioner.diagnose.plant.flux_before import with_flux_before
 from commissioner.diagnose.plant.initial_state import per_ampere, slopes_of_start
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict, trajectory
-from commissioner.diagnose.search.nominal import CARRY, with_flux_before
+from commissioner.diagnose.search.nominal import CARRY
 from tests.unit.diagnose.causes.test_effects import central_slope
 
 BEFORE_WB = np.array([0.4, -0.3])

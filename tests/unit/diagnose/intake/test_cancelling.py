@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from commissioner.diagnose.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Verdict, diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.diagnose.fit.gauss_newton import fit
+from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
 from commissioner.diagnose.intake.record import THREADS
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
