@@ -169,7 +169,8 @@ def _procedure(subject: Subject) -> Markup:
     plan = subject.plan
     if plan:
         axes = ", ".join(f"{axis:g}°" for axis in plan["axes_deg"])
-        rows.append(("axes", f"{axes}{', the first again' if plan.get('repeat_first') else ''}"))
+        is_repeated = len(subject.planned_deg) > len(plan["axes_deg"])
+        rows.append(("axes", f"{axes}{', the first again' if is_repeated else ''}"))
     for group in ("limits", "excitation", "supervision"):
         rows += [(key, f"{value:g}") for key, value in (plan.get(group) or {}).items()]
     for key, value in (plan.get("acceptance") or {}).items():

@@ -391,7 +391,7 @@ def _unchecked(subject: Subject) -> Iterator[Text]:
             yield Markup("{} above {} Wb ({} % of rated flux)").format(
                 marks.L_M, digits(top, 3), f"{100 * top / rated:.0f}"
             )
-    done, planned = len(subject.tests), _planned(subject)
+    done, planned = len(subject.tests), len(subject.planned_deg)
     if planned > done:
         yield f"{planned - done} of {planned} tests: the run ended before"
     yield "anything that turns: iron loss at speed, phase order, encoder"
@@ -402,11 +402,6 @@ def _unchecked(subject: Subject) -> Iterator[Text]:
     for row in subject.result.get("checks") or ():
         if row["value"] is None and row["has_passed"]:
             yield f"{row['name']}: the drive does not tell"
-
-
-def _planned(subject: Subject) -> int:
-    axes = subject.plan.get("axes_deg") or ()
-    return len(axes) + (1 if subject.plan.get("repeat_first") and len(axes) > 0 else 0)
 
 
 def _signatures(subject: Subject) -> Markup:

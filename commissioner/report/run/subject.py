@@ -119,6 +119,12 @@ class Subject:
         return self.job.get("plan") or {}
 
     @property
+    def planned_deg(self) -> tuple[float, ...]:
+        """The axis of each test of the plan: one axis alone is not repeated."""
+        axes = tuple(self.plan.get("axes_deg") or ())
+        return (*axes, axes[0]) if self.plan.get("repeat_first") and len(axes) > 1 else axes
+
+    @property
     def origin(self) -> Record:
         """Who made the run, where, by which version."""
         return self.first("run_started")

@@ -230,3 +230,11 @@ def test_a_motor_with_earlier_runs_has_them_drawn_with_what_moved():
 def test_two_runs_have_no_change_a_year_and_none_no_sheet():
     assert "too few runs" in words(run_page(result(), JOURNAL, Findings(), years=history(2)))
     assert "over the years" not in words(run_page(result(), JOURNAL, Findings()))
+
+
+@pytest.mark.parametrize(("axes", "tests"), [([0.0], 1), ([0.0, 60.0], 3)])
+def test_one_axis_alone_is_not_repeated(axes, tests):
+    journal = [JOURNAL[0], line("job", {"plan": PLAN | {"axes_deg": axes}, "nameplate": PLATE}), *JOURNAL[2:]]
+    text = words(run_page(result(), journal, Findings()))
+    assert f"{tests} of {tests} tests: the run ended before" in text
+    assert ("the first again" in text) is (tests > 1)
