@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.causes.iron.magnetic_hysteresis import CARRIED
 from commissioner.diagnose.kernels import kinds
+from commissioner.diagnose.kernels.memory import replayed
 from commissioner.diagnose.plant.flux_before import with_flux_before
 from commissioner.diagnose.plant.initial_state import per_ampere, slopes_of_start
 from commissioner.diagnose.plant.model import Model
@@ -191,7 +192,8 @@ def test_the_flux_that_stays_is_where_the_memory_and_the_magnetizing_current_can
     told = with_flux_before(remembering.record, model, remembering.layout)
     radius = remembering.layout.stop_radius_wb
     for segment in told.segments[1:]:
-        kept, z = segment.iron_before_wb[:, -1], segment.memory(np.ascontiguousarray(radius[:, 0]))
+        kept = segment.iron_before_wb[:, -1]
+        z = replayed(segment.iron_before_wb, np.ascontiguousarray(radius[:, 0]))
         memory_a = (model.sum_kind(kinds.STOP, len(radius)) * per_ampere(radius)) @ z
         assert kept / model.nominal[3] + memory_a == pytest.approx(0.0, abs=1e-4 * np.abs(memory_a).max())
         assert np.abs(memory_a).max() > 1e-3
