@@ -23,6 +23,14 @@ def test_nothing_is_named_where_nothing_is_hidden(seed):
     assert not row["causes"]
 
 
+@pytest.mark.parametrize("seed", [5004, 5019])
+def test_a_healthy_motor_in_steady_state_has_no_name(seed):
+    """There the voltage's noise meets the resistances alone: weighted wrongly, it made a shorted loop or a bad line."""
+    row = run(Case(seed, "null", "steady"))
+    assert row["verdict"] == "nothing_significant"
+    assert not row["causes"]
+
+
 SHORT = ("magnetizing_saturation", "iron_loss", "rotor_asymmetry", "stator_asymmetry", "voltage_gain_mismatch")
 """In the default run; the others under the mark `campaign`."""
 
