@@ -22,7 +22,14 @@ from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
-from commissioner.recordings.reading.mend import require_seconds, with_time, with_whole_time, without_doubled_rows
+from commissioner.recordings.reading.mend import (
+    against_interval,
+    require_seconds,
+    require_stamps,
+    with_time,
+    with_whole_time,
+    without_doubled_rows,
+)
 from commissioner.recordings.reading.preface import Clock, clock_in
 from commissioner.recordings.reading.recognise import Recognised, recognise
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
@@ -217,6 +224,8 @@ def _table(
     made = with_time(columns, clock)
     if not made:
         require_seconds(columns, found.readings, source)
+        require_stamps(columns, source)
+        made = against_interval(columns, clock, found.readings, source)
     if clock.interval_s is not None and "sample_period_s" not in metadata and made:
         metadata["sample_period_s"] = clock.interval_s
     _with_constants(columns, metadata)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from commissioner.recordings.units import IN_NAME, read_unit, unit_in
+from commissioner.recordings.units import IN_NAME, read_unit, unbracketed, unit_in
 
 PHASES = {
     "a": "u",
@@ -29,7 +29,9 @@ TRANSLATED = {
     "电压": "voltage", "電圧": "voltage", "電壓": "voltage", "tensión": "voltage", "tensão": "voltage",
     "tensione": "voltage", "voltaje": "voltage", "spanning": "voltage", "напряжение": "voltage", "spänning": "voltage",
     "napiecie": "voltage", "napięcie": "voltage", "转速": "speed", "速度": "speed", "vitesse": "speed", "velocidad": "speed",
-    "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
+    "leiterstrom": "strom", "außenleiterstrom": "strom", "netzstrom": "strom", "motorstrom": "strom", "leiterspannung": "spannung",
+    "außenleiterspannung": "spannung", "netzspannung": "spannung", "motorspannung": "spannung", "intensité": "current",
+    "composée": " ", "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
 }  # fmt: skip
 """Words of other languages, as the words below; what only joins names in Chinese as a space."""
 SAME_KIND = {"tension": "uv", "spannung": "u", "voltage": "uv", "strom": "i", "courant": "i", "current": "i"}
@@ -57,8 +59,28 @@ FILLING = frozenset(
         "last",
         "ave",
         "instantaneous",
+        "abc",
+        "uvw",
+        "rst",
     }
 )
+REMARKS = FILLING | {
+    "ll",
+    "avg",
+    "mean",
+    "rms",
+    "eff",
+    "total",
+    "in",
+    "inst",
+    "probe",
+    "sensor",
+    "utc",
+    "local",
+    "relative",
+    "absolute",
+}
+"""Words that describe a channel in brackets, where its unit might stand."""
 CURRENT = r"i|is|il|iph|cur|curr|current|currents|strom|courant|amps"
 VOLTAGE = r"u|v|vs|vl|ul|vph|uph|vll|ull|vol|volt|volts|voltage|voltages|spannung|tension"
 TIME = frozenset(
@@ -70,11 +92,11 @@ SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 SHEET = {
     "frequency_hz": re.compile(r"f|freq(?:uency)?|frequenz|frequence|supplyfrequency|frequencia|fs"),
     "voltage_line_v": re.compile(
-        r"(?:v|u|e|voltage|volts?|spannung|tension)(?:l|ll|line|linetoline|linevoltage)?|line(?:toline)?voltage|lltvoltage|terminalvoltage"
+        r"(?:v|u|e|voltage|volts?|spannung|tension)(?:l|ll|line|linetoline|linevoltage|rms|eff)?|line(?:toline)?voltage|lltvoltage|terminalvoltage"
         r"|appliedvoltage|vline|uline"
     ),
     "current_line_a": re.compile(
-        r"(?:i|current|amps?|strom|courant)(?:l|line|avg|mean)?|line(?:current|amps)|(?:mean|average)(?:line)?current"
+        r"(?:i|current|amps?|strom|courant)(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current"
     ),
     "power_w": re.compile(
         r"(?:p|w|power|watts?|leistung|puissance)(?:in|tot|total|input|3ph|el)?|(?:input|total|three(?:phase)?|3ph(?:ase)?)power|powerinput"
@@ -85,7 +107,11 @@ SHEET = {
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
+_NUMBERED = re.compile(r"([a-z]+)([0-9])(?:a|v|ma|mv|kv)?")
+_ONE_PHASE = re.compile(r"[abcuvwrst123]|l[123]")
 _PAIR = re.compile(r"l?([abcuvwrst123])l?([abcuvwrst123])")
+_CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?", re.IGNORECASE)
+"""`hh:mm:ss.fff`, in brackets behind a time of day."""
 _PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
 """Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
 _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
@@ -105,6 +131,23 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
     return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
 
 
+def unit_of(name: str, with_s: bool = False) -> str:
+    """The text of the unit at the end of a name; nothing where what stands there is part of the name (`V(a,b)`, `voltage_A`)
+    or describes the channel (`Ia (phase A)`)."""
+    text, bare = unit_in(name), IN_NAME.sub("", name).strip()
+    known = read_unit(text)
+    is_part = bare and meaning_of(bare, with_s) is None and meaning_of(name, with_s) is not None
+    return "" if is_remark(text) or (is_part and (known is None or known.scale == 1.0)) else text
+
+
+def is_remark(text: str) -> bool:
+    """Whether a text in brackets describes a channel: words for it, with a phase or without, or how a time of day is written."""
+    words = re.findall(r"[^\W\d_]+|\d+", unbracketed(text).lower())
+    described = [word for word in words if word in REMARKS]
+    is_description = described and all(word in REMARKS or _ONE_PHASE.fullmatch(word) for word in words)
+    return bool(is_description) or _CLOCK_FORM.fullmatch(unbracketed(text)) is not None
+
+
 def translated(name: str) -> str:
     """The name with words of other languages replaced by those that are looked for."""
     lower = name.lower()
@@ -114,6 +157,12 @@ def translated(name: str) -> str:
         pattern = re.escape(word) if not word.isascii() else rf"(?<![a-z]){word}(?![a-z])"
         name = re.sub(pattern, f" {ours} ", name, flags=re.IGNORECASE)
     return name.strip()
+
+
+def turned(name: str) -> str:
+    """What a name with a minus before it (`-Ia`) is the negative of; nothing of any other name."""
+    found = re.fullmatch(r"[-\u2212\u2013](?=[^\W\d])(.+)", name.strip())
+    return found[1] if found else ""
 
 
 def reversed_pair(name: str) -> str | None:
@@ -131,6 +180,15 @@ def uses_rst(names: Iterable[str]) -> bool:
     return any({f"{kind}r", f"{kind}t"} <= keys for kind in ("i", "u", "v", "il", "ul", "vl"))
 
 
+def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
+    """Names whose phases are 0, 1, 2 (`i_abc[0]` ...): which of them is u is not what their numbers say elsewhere."""
+    stems: dict[str, dict[str, str]] = {}
+    for name in names:
+        if found := _NUMBERED.fullmatch(re.sub(r"[^a-z0-9]", "", name.lower())):
+            stems.setdefault(found[1], {})[found[2]] = name
+    return frozenset(name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values())
+
+
 def key_of(name: str) -> str:
     """Letters and digits of a name, without its unit in brackets and its path."""
     return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1]).lower())
@@ -138,7 +196,8 @@ def key_of(name: str) -> str:
 
 def sheet_meaning(name: str) -> str | None:
     """The column of a test sheet (`Voltage (V)`, `I_line [A]`, `P_in/kW`) that a name means, or None."""
-    bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE)
+    said = unit_in(name) if is_remark(unit_in(name)) else ""
+    bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE) + said
     return next((column for column, names in SHEET.items() if names.fullmatch(key_of(bare))), None)
 
 

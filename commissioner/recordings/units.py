@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "K": 1e3}
 BASE = {
-    "s": "time", "sec": "time", "secs": "time", "second": "time", "seconds": "time", "sekunden": "time",
+    "s": "time", "sec": "time", "secs": "time", "second": "time", "seconds": "time", "sekunde": "time", "sekunden": "time",
+    "seconde": "time", "secondes": "time", "segundos": "time", "secondi": "time",
     "a": "current", "amp": "current", "amps": "current", "ampere": "current", "amperes": "current", "ampère": "current",
     "v": "voltage", "volt": "voltage", "volts": "voltage", "w": "power", "watt": "power", "watts": "power",
     "ohm": "resistance", "ohms": "resistance", "ω": "resistance", "hz": "frequency", "hertz": "frequency",
-    "nm": "torque", "va": "apparent", "var": "apparent",
+    "nm": "torque", "va": "apparent", "var": "apparent", "arms": "current", "aeff": "current", "vrms": "voltage", "veff": "voltage",
 }  # fmt: skip
 """Unit without prefix, in lower case, and what it measures."""
 WHOLE = {
@@ -20,20 +21,22 @@ WHOLE = {
     "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
     "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
-    "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0), "milliseconds": ("time", 1e-3),
-    "microseconds": ("time", 1e-6), "milliampere": ("current", 1e-3), "millivolt": ("voltage", 1e-3), "msec": ("time", 1e-3),
-    "usec": ("time", 1e-6), "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
+    "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
+    "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
     "微秒": ("time", 1e-6), "安": ("current", 1.0), "毫安": ("current", 1e-3), "伏": ("voltage", 1.0),
     "с": ("time", 1.0), "мс": ("time", 1e-3), "мкс": ("time", 1e-6), "а": ("current", 1.0), "ма": ("current", 1e-3),
     "в": ("voltage", 1.0), "кв": ("voltage", 1e3), "ka": ("current", 1e3), "kv": ("voltage", 1e3),
 }  # fmt: skip
+PREFIX_WORD = {"milli": 1e-3, "mili": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9, "kilo": 1e3}
+NO_UNIT = frozenset({"", "-", "none", "sequence", "unit", "units"})
+"""What stands in a row of units where a column has none."""
 FOREIGN = frozenset({"%", "pu", "p.u.", "counts", "count", "lsb", "digits", "raw", "bit", "bits", "db", "div", "dbv"})
 """Units that stand for something only with a factor which the file does not give."""
 IN_NAME = re.compile(
-    r"[\[(（【]\s*([^\])）】]*)\s*[\])）】]\s*$|(?:^|\s+)(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
-    r"|(?<!_per)_(ms|us|s|mA|A|mV|V|kV|rpm)$"
+    r"[\[(（【{<]\s*([^\])）】}>]*)\s*[\])）】}>]\s*$|(?:^|\s+)(?:in|en)\s+(\S{1,8})\s*$|\s*/\s*(\S{1,6})\s*$"
+    r"|(?:(?<!_per)_|[,:]\s+)(ms|us|µs|ns|s|ma|mA|A|mv|mV|V|kv|kV|rpm)$"
 )
-"""A unit at the end of a name: in brackets, after `in`, after a slash, or after an underscore."""
+"""A unit at the end of a name: in brackets, after `in`, after a slash, an underscore, a comma or a colon."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +54,22 @@ def unit_in(name: str) -> str:
     return next((g for g in found.groups() if g), "") if found else ""
 
 
+def unbracketed(text: str) -> str:
+    """A unit's text out of its brackets."""
+    return text.strip().strip("[]()（）【】{}<>").strip()
+
+
 def read_unit(text: str) -> Unit | None:
     """The unit that a text means, in or out of brackets; None where it is none."""
-    bare = text.strip().strip("[]()（）【】").strip()
+    bare = unbracketed(text)
     whole = WHOLE.get(bare.lower())
     if whole:
         return Unit(*whole)
     if bare.lower() in BASE:
         return Unit(BASE[bare.lower()], 1.0)
+    for word, scale in PREFIX_WORD.items():
+        if bare.lower().startswith(word) and (measures := BASE.get(bare.lower()[len(word) :].strip())):
+            return Unit(measures, scale)
     prefix, base = bare[:1], bare[1:].lower()
     if base not in BASE:
         return None
@@ -75,7 +86,5 @@ def _upper(prefix: str, base: str) -> Unit | None:
 
 def is_unit(text: str) -> bool:
     """Whether a cell of a row of units is one: nothing, a unit, or a unit that says nothing by itself."""
-    bare = text.strip().strip("[]()（）【】").strip().lower()
-    return (
-        not bare or read_unit(text) is not None or bare in FOREIGN or bare in {"-", "none", "sequence", "unit", "units"}
-    )
+    bare = unbracketed(text).lower()
+    return bare in NO_UNIT or read_unit(text) is not None or bare in FOREIGN

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,11 +13,13 @@ import pyarrow.csv as pa_csv
 
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
+from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to_numbers
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
-from commissioner.recordings.reading.preface import Clock, clock_in, metadata_of, pairs, probes_in
+from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
+from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
 MOST_FOOTER_ROWS = 20
@@ -63,8 +65,18 @@ def parse_csv(text: str, encoding: str, source: str) -> RawTable:
     if probes := probes_in(layout.preface):
         notes.append(ReadingNote("probes", f"probes of {probes} are named above the columns: numbers are taken as they are printed; "
                                  "where the instrument did not multiply them yet, map the channels with a factor"))  # fmt: skip
+    if factors := factors_in(layout.preface):
+        notes.append(ReadingNote("factors", f"{factors} stands above the columns: numbers are taken as they are printed; where they do not "
+                                 "hold this factor yet, map the channels with it"))  # fmt: skip
     names, units, clock = _start_and_increment(layout, clock_in(said))
+    units = tuple(unit or _said_once(name, units_in(said)) for name, unit in zip(names, units, strict=True))
     return RawTable(names, units, tuple(columns), dict(metadata_of(said)), clock, tuple(notes))
+
+
+def _said_once(name: str, units: Mapping[str, str]) -> str:
+    """The unit that stands once above the columns for all that measure the same; nothing of other columns."""
+    meaning = meaning_of(name) if units and name not in CONTRACT_COLUMNS else None
+    return next((unit for kind, unit in units.items() if meaning and meaning.startswith(kind)), "")
 
 
 def _sample(body: str, layout: Layout) -> list[str]:

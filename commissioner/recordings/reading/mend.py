@@ -17,6 +17,7 @@ from commissioner.records import ReadingNote, Signal
 
 LEAST_ROWS = 16
 _COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", "samples", "sequence"}
+SAME_INTERVAL = 0.02
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
 
@@ -52,6 +53,40 @@ def require_seconds(columns: Mapping[str, Signal], readings: Sequence[ColumnRead
                 value=f"{reading.name} {unit}".strip(), limit="seconds, or a sample interval or rate above the columns",
                 remedy="give `# sample_period_s: 0.000125` as the first line, with the period of your recording",
             )  # fmt: skip
+
+
+def require_stamps(columns: Mapping[str, Signal], source: str) -> None:
+    """DataRefused: there is a column of time, and no cell of it is a time."""
+    time = columns.get("time_s")
+    if time is not None and time.size and not np.isfinite(time).any():
+        raise DataRefused(
+            f"{source}: no cell of the time column is a time", step="read the time", value=f"{time.size} rows",
+            limit="seconds, or a time of day as 10:11:12.345", remedy="export the time in seconds, or leave it out and give "
+            "`# sample_period_s: 0.000125` as the first line, with the period of your recording",
+        )  # fmt: skip
+
+
+def against_interval(
+    columns: Mapping[str, Signal], clock: Clock, readings: Sequence[ColumnReading], source: str
+) -> list[ReadingNote]:
+    """A note where the stamps step by another interval than the preface says. DataRefused: by thousands, and nothing says in which
+    unit the stamps are."""
+    time, interval = columns.get("time_s"), clock.interval_s
+    if time is None or time.size < LEAST_ROWS or interval is None or clock.said_by == "sample_period_s":
+        return []
+    steps = np.diff(time[np.isfinite(time)])
+    ratios = np.array([np.median(steps), np.mean(steps)]) / interval
+    if not np.all(ratios > 0.0) or np.any(np.abs(ratios - 1.0) < SAME_INTERVAL):
+        return []
+    said = f"{clock.said_by} stands above the columns, the stamps step by {interval * ratios[0]:.6g} s"
+    thousands = np.log10(ratios[0]) / 3.0
+    is_by_thousands = round(thousands) != 0 and abs(thousands - round(thousands)) < SAME_INTERVAL
+    if is_by_thousands and not any(r.meaning == "time_s" and read_unit(r.unit) for r in readings):
+        raise DataRefused(
+            f"{source}: {said}: milli or micro", step="read the time", value=f"{interval * ratios[0]:.6g} s a row",
+            limit=f"{interval:.6g} s", remedy="name the unit of the time behind its name, as Time (ms)",
+        )  # fmt: skip
+    return [ReadingNote("interval", f"{said}: the stamps are used")]
 
 
 def without_doubled_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:

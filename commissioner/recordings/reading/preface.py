@@ -12,11 +12,12 @@ from commissioner.recordings.units import read_unit
 INTERVAL = frozenset(
     {"sampleinterval", "samplinginterval", "samplingperiod", "sampleperiod", "sampleperiods", "dt", "deltat", "deltatime",
      "tinc", "xincr", "xincrement", "increment", "hresolution", "resolution", "deltax", "tsample", "ts", "timestep",
-     "abtastintervall", "abtastzeit", "periodeechantillonnage", "采样周期", "采样间隔", "timeinterval", "hinterval", "interval"}
+     "abtastintervall", "abtastzeit", "periodeechantillonnage", "采样周期", "采样间隔", "timeinterval", "hinterval", "interval",
+     "sampletime", "abtastperiode", "zykluszeit", "cycletime", "périodedéchantillonnage", "pasdetemps"}
 )  # fmt: skip
 RATE = frozenset(
     {"samplerate", "samplingrate", "samplingfrequency", "samplefrequency", "fs", "samplespersecond", "abtastrate",
-     "abtastfrequenz", "采样率", "采样频率", "frequenceechantillonnage", "samplerateinhz", "sampleratehz", "samplingratehz",
+     "abtastfrequenz", "采样率", "采样频率", "frequenceechantillonnage", "fréquencedéchantillonnage", "samplerateinhz", "sampleratehz", "samplingratehz",
      "fshz", "samplessec", "srate"}
 )  # fmt: skip
 START = frozenset({"start", "t0", "starttime", "xzero", "xorigin", "x0", "hoffset"})
@@ -103,12 +104,45 @@ def metadata_of(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
 
 def probes_in(preface: Sequence[Sequence[str]]) -> str:
     """Ratios of probes other than one that a row of the preface names, as `200:1, 10:1`; empty where there is none."""
-    rows = [
-        row for row in preface if row and re.fullmatch(r"(?:probe|(?:probe)?(?:attenuation|ratio))\d*", key(row[0]))
-    ]
-    found = [_RATIO.fullmatch(cell.strip()) for row in rows for cell in row[1:]]
+    found = [_RATIO.fullmatch(cell) for _, cells in _keyed(preface, _PROBE) for cell in cells]
     ratios = [float(one[1]) for one in found if one]
     return ", ".join(f"{ratio:g}:1" for ratio in dict.fromkeys(ratios) if ratio != 1.0)
 
 
+def factors_in(preface: Sequence[Sequence[str]]) -> str:
+    """Scales and transformers' ratios other than one that a row of the preface names, as `CT ratio 100/5`; empty where there
+    is none."""
+    found = [
+        (name, [c for c in dict.fromkeys(cells) if c and not _ONE.fullmatch(c)])
+        for name, cells in _keyed(preface, _SCALE)
+    ]
+    return "; ".join(f"{name} {', '.join(cells)}" for name, cells in found if any(re.search(r"\d", c) for c in cells))
+
+
+def units_in(said: Iterable[tuple[str, str, str]]) -> Mapping[str, str]:
+    """The unit of all times, currents or voltages that a preface names once (`Time unit: ms`), by what it measures."""
+    found = [(_UNIT_OF.fullmatch(key(name)), value) for name, value, _ in said]
+    return {_MEASURES[one[1] or one[2]]: value for one, value in reversed(found) if one}
+
+
+def _keyed(preface: Sequence[Sequence[str]], names: re.Pattern[str]) -> list[tuple[str, list[str]]]:
+    """(key, cells behind it) of rows `key,cell,...` and of cells `key: value` whose key is one of these names."""
+    signs = [said for row in preface for cell in row if (said := SIGNS.match(cell.strip()))]
+    rows = [(row[0], list(row[1:])) for row in preface if len(row) > 1] + [
+        (s[1].strip().lstrip("# "), [s[2]]) for s in signs
+    ]
+    return [(name.strip(), [c.strip() for c in cells]) for name, cells in rows if names.fullmatch(key(name))]
+
+
+_PROBE = re.compile(r"(?:probe|(?:probe)?(?:attenuation|ratio))\d*")
+_KIND = r"(?:current|voltage|strom|spannungs?|courant|tension|transformer|transducer|sensor|ct|pt|vt)"
+_SCALE = re.compile(
+    rf"(?:{_KIND}*(?:ratio|scale|scal(?:e|ing)factor|multiplier|gain|factor|faktor|skalierung|übersetzung){_KIND}*)\d*"
+)
+_ONE = re.compile(r"1(?:[.,]0*)?(?:\s*[:/]\s*1|\s*x)?")
+_MEASURES = {"time": "time", "zeit": "time", "temps": "time", "horizontal": "time", "x": "time", "current": "current", "strom": "current",
+             "courant": "current", "voltage": "voltage", "spannung": "voltage", "spannungs": "voltage", "tension": "voltage"}  # fmt: skip
+_UNIT_OF = re.compile(
+    rf"({'|'.join(_MEASURES)})(?:axis)?(?:units?|einheit|unitlabel)|unité(?:de)?({'|'.join(_MEASURES)})"
+)
 _RATIO = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?)\s*(?::\s*1|x)?", re.IGNORECASE)

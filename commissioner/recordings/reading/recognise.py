@@ -10,10 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import DataRefused
-from commissioner.recordings.names import is_per_minute, is_sheet, meaning_of, reversed_pair, sheet_meaning, uses_rst
+from commissioner.recordings.names import (
+    counted_from_zero,
+    is_per_minute,
+    is_remark,
+    is_sheet,
+    meaning_of,
+    reversed_pair,
+    sheet_meaning,
+    turned,
+    unit_of,
+    uses_rst,
+)
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
-from commissioner.recordings.units import FOREIGN, IN_NAME, read_unit, unit_in
+from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in
 from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
@@ -38,16 +49,18 @@ def recognise(
 ) -> Recognised:
     """The columns by the contract's names where they mean one, else by their own; see the module."""
     with_s = uses_rst([n for n in names if n])
-    of_sheet = is_sheet(names)
+    of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
     columns: dict[str, Signal] = {}
     readings, notes, unnamed = [], [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
-        name, unit = names[k], units[k] or unit_in(names[k])
+        name = names[k]
+        unit = units[k] if units[k] not in ("", unit_in(name)) else unit_of(name, with_s)
         if not name:
             continue
         target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
-        meaning, factor = _meaning(name, unit, target, with_s, source)
+        is_asked = name in from_zero and target is None
+        meaning, factor = (None, 1.0) if is_asked else _meaning(name, unit, target, with_s, source)
         if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_meaning(name)):
             unit = unit or _power_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
@@ -55,7 +68,7 @@ def recognise(
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
         if meaning is None:
-            unnamed += [name] if CHANNEL.fullmatch(IN_NAME.sub("", name).strip()) else []
+            unnamed += [name] if is_asked or CHANNEL.fullmatch(IN_NAME.sub("", name).strip()) else []
             columns.setdefault(name, values[k])
         else:
             with np.errstate(invalid="ignore", over="ignore"):
@@ -93,9 +106,12 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
     bare = _bare(name)
     if bare in CONTRACT_COLUMNS:
         return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
+    if of := turned(name):
+        meaning, factor = _meaning(of, unit, None, with_s, source)
+        return meaning, -factor
     meaning, sign = meaning_of(name, with_s), 1.0
-    if meaning is None and (turned := reversed_pair(name)):
-        meaning, sign = turned, -1.0
+    if meaning is None and (pair := reversed_pair(name)):
+        meaning, sign = pair, -1.0
     if meaning is None:
         return None, 1.0
     if meaning == "speed_rad_per_s" and is_per_minute(name) and read_unit(unit) is None:
@@ -104,12 +120,15 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
 
 
 def _factor(name: str, unit: str, meaning: str, source: str) -> float:
-    """To SI. DataRefused: mega or milli, a unit of something else, or one that needs a factor which is not given."""
-    known = read_unit(unit)
-    if known is None:
-        if unit.strip().strip("[]()").lower() in FOREIGN:
-            raise _refused(name, unit, meaning, source, "a unit that needs a factor")
+    """To SI. DataRefused: mega or milli, a unit of something else, one that needs a factor which is not given, or none that is
+    known."""
+    known, bare = read_unit(unit), unbracketed(unit).lower()
+    if known is None and bare in FOREIGN:
+        raise _refused(name, unit, meaning, source, "a unit that needs a factor")
+    if known is None and (bare in NO_UNIT or is_remark(bare)):
         return 1.0
+    if known is None:
+        raise _refused(name, unit, meaning, source, "none that is known")
     expected = next((m for ending, m in MEASURES.items() if meaning.endswith(ending)), None)
     if meaning == "speed_rad_per_s":
         expected = "speed"

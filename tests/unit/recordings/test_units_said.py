@@ -1,0 +1,141 @@
+"""What a unit, a preface or a sign says of a value: taken, asked for, or said; a factor is never guessed."""
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.recordings.importers import contract_table
+from commissioner.recordings.names import unit_of
+from commissioner.recordings.units import read_unit
+
+TIME = np.arange(40) * 2e-4
+ONE, TWO = np.cos(2 * np.pi * 50 * TIME), np.sin(2 * np.pi * 50 * TIME)
+
+
+def written(path, head, time, i=1.0, u=1.0):
+    """A recording of two currents and two line voltages of 3 A and 300 V peak, printed times the factors."""
+    rows = zip(time, 3 * i * ONE, 3 * i * TWO, 300 * u * ONE, 300 * u * TWO, strict=True)
+    path.write_text(
+        "\n".join([*head, *(",".join(c if isinstance(c, str) else f"{c:.9g}" for c in row) for row in rows)]) + "\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+NAMED = "t,ia,ib,uab,ubc"
+READ = {
+    "words": (["Zeit (Millisekunden),Ia (milliamps),Ib (Milliampere),Uab (kilovolts),Ubc (kV)"], 1e3, 1e3, 1e-3),
+    "words of French": (["Temps (microsecondes),ia (A),ib (A),uab (V),ubc (V)"], 1e6, 1.0, 1.0),
+    "behind a comma": (['"t, ms","Ia, mA","Ib, mA","Uab, V","Ubc, V"'], 1e3, 1e3, 1.0),
+    "behind a colon": (["t: ms,ia: mA,ib: mA,uab: V,ubc: V"], 1e3, 1e3, 1.0),
+    "in braces": (["t {us},ia {mA},ib {mA},uab {mV},ubc {mV}"], 1e6, 1e3, 1e3),
+    "small letters": (["time_ns,ia_ma,ib_ma,uab_kv,ubc_kv"], 1e9, 1e3, 1e-3),
+    "once above the columns": (["Time unit: ms", "Current unit: mA", NAMED], 1e3, 1e3, 1.0),
+    "of the horizontal axis": (["Horizontal Units,ms", NAMED], 1e3, 1.0, 1.0),
+    "a remark in brackets": (["t (relative),Ia (phase A),Ib (phase B),Uab (line to line),Ubc (rms)"], 1.0, 1.0, 1.0),
+    "an index that is part of the name": (['t,i_abc(1),i_abc(2),"V(a,b)","V(b,c)"'], 1.0, 1.0, 1.0),
+    "a minus before the name": (["t,-Ia,\u2212Ib,Uab,Ubc"], 1.0, -1.0, 1.0),
+    "German lines": (
+        ["Zeit,Leiterstrom L1,Außenleiterstrom L2,Leiterspannung U12,Außenleiterspannung U23"], 1.0, 1.0, 1.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_unit_that_is_said_is_taken(tmp_path, name):
+    head, t, i, u = READ[name]
+    columns = contract_table(written(tmp_path / "x.csv", head, t * TIME, i, u)).columns
+    np.testing.assert_allclose(columns["time_s"], TIME, atol=1e-9)
+    np.testing.assert_allclose(columns["current_u_a"], 3 * ONE, atol=1e-6)
+    np.testing.assert_allclose(columns["current_v_a"], 3 * TWO, atol=1e-6)
+    np.testing.assert_allclose(columns["voltage_uv_v"], 300 * ONE, atol=1e-4)
+    np.testing.assert_allclose(columns["voltage_vw_v"], 300 * TWO, atol=1e-4)
+
+
+@pytest.mark.parametrize("unit", ["dA", "10 A/V", "x10 A", "A/10", "m A", "inverted", "ampieri"])
+def test_a_unit_that_is_not_known_is_asked_for(tmp_path, unit):
+    path = written(tmp_path / "x.csv", [f"t,Ia ({unit}),Ib ({unit}),uab,ubc"], TIME)
+    with pytest.raises(DataRefused, match="is none that is known") as refused:
+        contract_table(path)
+    assert unit in str(refused.value.value) and "--map" in refused.value.remedy
+    head = [
+        f"# Ia ({unit}): current_u_a * 10",
+        f"# Ib ({unit}): current_v_a * 10",
+        f"t,Ia ({unit}),Ib ({unit}),uab,ubc",
+    ]
+    np.testing.assert_allclose(contract_table(written(path, head, TIME)).columns["current_u_a"], 30 * ONE, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "said", ["CT ratio: 100/5", "Scale,1,10,10,1,1", "Scaling factor current: 10", "Übersetzung;20"]
+)
+def test_a_factor_above_the_columns_is_said_and_not_applied(tmp_path, said):
+    table = contract_table(written(tmp_path / "x.csv", [said.replace(";", ","), NAMED], TIME))
+    (note,) = (n for n in table.notes if n.code == "factors")
+    assert "taken as they are printed" in note.what and "map" in note.what
+    np.testing.assert_allclose(table.columns["current_u_a"], 3 * ONE, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "said", ["CT ratio: 1", "Scale,1,1.0,1,1,1", "Vertical Scale,2,2,2,200,200", "Time scale: linear"]
+)
+def test_a_factor_of_one_and_a_scopes_divisions_are_no_factor(tmp_path, said):
+    table = contract_table(written(tmp_path / "x.csv", [said, NAMED], TIME))
+    assert not any(n.code == "factors" for n in table.notes)
+
+
+def test_stamps_and_an_interval_by_thousands_apart_are_asked_for(tmp_path):
+    path = written(tmp_path / "x.csv", ["Sample Interval,0.0002", NAMED], 1e3 * TIME)
+    with pytest.raises(DataRefused, match="milli or micro") as refused:
+        contract_table(path)
+    assert refused.value.value == "0.2 s a row" and refused.value.limit == "0.0002 s"
+
+
+def test_stamps_of_every_fourth_sample_are_used_and_the_interval_said(tmp_path):
+    table = contract_table(written(tmp_path / "x.csv", ["Sample Interval,0.00005", NAMED], TIME))
+    (note,) = (n for n in table.notes if n.code == "interval")
+    assert "step by 0.0002 s: the stamps are used" in note.what
+    table = contract_table(written(tmp_path / "y.csv", ["Sample Interval,0.0002", NAMED], TIME))
+    assert not any(n.code == "interval" for n in table.notes)
+
+
+def test_a_time_of_day_with_its_zone_is_read_and_one_that_is_none_is_refused(tmp_path):
+    stamps = [f"2024-03-05T10:11:{12 + t:09.6f}+01:00" for t in TIME]
+    time = contract_table(written(tmp_path / "x.csv", ["timestamp,ia,ib,uab,ubc"], stamps)).columns["time_s"]
+    np.testing.assert_allclose(np.diff(time), 2e-4, atol=1e-6)
+    never = [f"shot {k} of forty" for k in range(TIME.size)]
+    with pytest.raises(DataRefused, match="no cell of the time column is a time"):
+        contract_table(written(tmp_path / "y.csv", ["timestamp,ia,ib,uab,ubc"], never))
+
+
+def test_phases_counted_from_zero_are_asked_for(tmp_path):
+    path = tmp_path / "x.csv"
+    rows = "\n".join(f"{t:.6f},{a:.5f},{b:.5f},{-a - b:.5f}" for t, a, b in zip(TIME, ONE, TWO, strict=True))
+    path.write_text(f"t,i[0],i[1],i[2]\n{rows}\n")
+    table = contract_table(path)
+    assert not any(name.startswith("current_") for name in table.columns)
+    assert sum(n.code == "unnamed_channel" for n in table.notes) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("Ia (mA)", "mA"),
+        ("V(a,b)", ""),
+        ("Ia (phase A)", ""),
+        ("Time (hh:mm:ss.fff)", ""),
+        ("U [kV]", "kV"),
+        ("n in s", "s"),
+    ],
+)
+def test_the_unit_of_a_name(name, unit):
+    assert unit_of(name) == unit
+
+
+def test_units_in_words():
+    assert [read_unit(t).scale for t in ("milliseconds", "Mikrosekunden", "kilovolt", "Nanosekunden")] == [
+        1e-3,
+        1e-6,
+        1e3,
+        1e-9,
+    ]
