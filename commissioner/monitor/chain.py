@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor.intake.against_plate import against_plate, of_contradiction, over_currents, volts_per_hertz
+from commissioner.monitor.intake.against_plate import (
+    against_plate,
+    doubt_of,
+    of_contradiction,
+    over_currents,
+    volts_per_hertz,
+)
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.loads.mean_speed import whole_record_speed
@@ -127,7 +133,10 @@ def observe(
         audited = replace(audited, findings=(*audited.findings, poles))
         if poles.stops:
             return Refused(audited, poles, audited.findings)
-    against = against_plate(audited, None if found.shaft is None else found.shaft.frequency_hz, plate)
+    shaft_hz = None if found.shaft is None else found.shaft.frequency_hz
+    against, said = against_plate(audited, shaft_hz, plate), doubt_of(audited, shaft_hz, plate)
+    if said is not None:
+        audited = replace(audited, findings=(*audited.findings, said))
     if against is not None:
         if wishes.trust == "plate" and against.likely is not None:
             return observe(over_currents(recording, against.likely), plate, replace(wishes, trust=None), lag_deg)

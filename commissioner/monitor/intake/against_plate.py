@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction
+from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, doubt
 from commissioner.records import ReadingNote, RunningRecording
 
 VOLTS_PER_HERTZ = (0.1, 4.0)
@@ -16,17 +16,29 @@ VOLTS_PER_HERTZ = (0.1, 4.0)
 
 def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Contradiction | None:
     """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen."""
+    point = _point(audited, shaft_hz, plate)
+    return None if point is None else contradiction(point, plate)
+
+
+def doubt_of(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Finding | None:
+    """A note of a factor that lies between the usual and a contradiction."""
+    point = _point(audited, shaft_hz, plate)
+    said = "" if point is None else doubt(point, plate)
+    return Finding("plate_doubt", "note", said) if said else None
+
+
+def _point(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> OperatingPoint | None:
+    """What was measured at the shaft's slip; None where the shaft, or a slip of a motor, is not seen."""
     seen = audited.fundamental
     if seen is None or shaft_hz is None:
         return None
     slip = 1.0 - plate.pole_pairs * shaft_hz / seen.frequency_hz
     if not 0.0 < slip < 0.5:
         return None
-    point = OperatingPoint(
+    return OperatingPoint(
         abs(seen.voltage_v) / math.sqrt(2.0), seen.frequency_hz, slip, abs(seen.current_a) / math.sqrt(2.0), seen.power_w,
         seen.reactive_var,
     )  # fmt: skip
-    return contradiction(point, plate)
 
 
 def volts_per_hertz(audited: Audited, plate: Nameplate) -> Finding | None:

@@ -14,6 +14,10 @@ LARGEST_CLIPPED = 0.002
 NOTED_GAIN = 0.01
 LEAST_CURRENT, LARGEST_CURRENT = 0.12, 3.0
 """Of the rated current: no motor idles on less, none runs in a steady state on more."""
+LARGEST_VOLTS_PER_HERTZ = 1.45
+LARGEST_FROM_HALF = 1.37
+"""Of the rated volts per hertz; from half the rated frequency on, where no resistance asks for more, less: 50 Hz at the voltage of
+60 with a tenth of overvoltage is 1.32, a peak value taken for an rms one 1.41."""
 LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
 
@@ -137,18 +141,20 @@ def plausible_size(fundamental: Fundamental, plate: Nameplate, findings: list[Fi
                 "refused",
                 "the voltages are root three too small for this motor: phase voltages under the names of line-to-line ones?",
                 float(per_hertz / rated),
-                "0.61 ... 1.45",
+                f"0.61 ... {LARGEST_FROM_HALF:g}",
                 "name the columns voltage_u_v, voltage_v_v, voltage_w_v, or correct the plate",
             )
         )
-    if per_hertz > 1.45 * rated:
+    is_slow = fundamental.frequency_hz < 0.5 * plate.rated_frequency_hz
+    largest = LARGEST_VOLTS_PER_HERTZ if is_slow else LARGEST_FROM_HALF
+    if per_hertz > largest * rated:
         findings.append(
             Finding(
                 "voltage_level",
                 "refused",
-                "the voltages are too large for this motor: line-to-line under the names of phase voltages?",
+                "the voltages are too large for this motor: line-to-line under the names of phase voltages, or peak for rms?",
                 float(per_hertz / rated),
-                1.45,
+                largest,
                 "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
             )
         )

@@ -20,6 +20,8 @@ Vector = NDArray[np.complex128]
 Instants = NDArray[np.floating[Any]]
 
 KNOT_SPACING_S = 1.5
+LEAST_SAMPLES = 64
+"""For a first look at the supply, however far the samples are apart."""
 """Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 BAND_IN_SUPPLY_FREQUENCIES = 14.0
 """Kept either side of the supply frequency: shaft harmonics up to 28 of a four-pole motor, supply lines up to 13."""
@@ -79,7 +81,7 @@ def phase_voltages(uv: Signal, vw: Signal, wu: Signal) -> tuple[Signal, Signal, 
 
 def dominant_frequency_hz(vector: Vector, sample_period_s: float) -> float:
     """Signed frequency of the strongest line: negative means the phases follow each other backwards."""
-    count = min(vector.size, int(4.0 / sample_period_s))
+    count = min(vector.size, max(int(4.0 / sample_period_s), LEAST_SAMPLES))
     padded = fft.next_fast_len(4 * count)
     window = np.hanning(count)
     spectrum = np.abs(fft.fft((vector[:count] - vector[:count].mean()) * window, padded))

@@ -22,7 +22,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
-from commissioner.motor.plate_match import contradiction, rated_point
+from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
@@ -141,11 +141,10 @@ def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str]
     if any(key not in plate for key in NAMEPLATE_KEYS) or any(name not in values for name in PARAMETERS):
         return []
     nameplate = nameplate_from(plate)
-    found = contradiction(
-        rated_point(InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS)), nameplate), nameplate
-    )
+    rated = rated_point(InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS)), nameplate)
+    found, said = contradiction(rated, nameplate), doubt(rated, nameplate)
     if found is None:
-        return []
+        return [said] if said else []
     if trust != "data":
         raise refused(found)
     return [trusted_data(found)]

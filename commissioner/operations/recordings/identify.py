@@ -19,7 +19,7 @@ from commissioner.identify.document import document as identification_document
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import contradiction, mismatch, plate_match, rated_point
+from commissioner.motor.plate_match import contradiction, doubt, mismatch, plate_match, rated_point
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.trust import (
     Trust,
@@ -132,10 +132,11 @@ def _with_the_plate(
 ) -> tuple[Identification, list[str]]:
     """What was identified, and what was decided where it contradicts the plate. DataRefused: nobody decided."""
     found = analyse(recording, plate, estimator)
-    against = contradiction(rated_point(found.parameters, plate), plate)
+    rated = rated_point(found.parameters, plate)
+    against, said = contradiction(rated, plate), doubt(rated, plate)
     other = mismatch(plate_match(found.parameters, plate), plate)
     if against is None and other is None:
-        return found, []
+        return found, [said] if said else []
     if trust == "data":
         return found, [trusted_data(against) if against else f"{other.what}: the data were trusted" if other else ""]
     if trust == "plate" and against is not None and against.likely is not None:

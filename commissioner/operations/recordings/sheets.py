@@ -14,7 +14,7 @@ from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.motor.plate_match import contradiction, rated_point
+from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
 from commissioner.operations.recordings.trust import Trust, refused, trusted_data
 from commissioner.recordings.table import Table
@@ -84,9 +84,10 @@ def _against_plate(found: ThreeTests, plate: Mapping[str, float | str], trust: T
     if any(not isinstance(plate.get(key), float | int) for key in NAMEPLATE_KEYS):
         return []
     nameplate = nameplate_from(plate)
-    against = contradiction(rated_point(found.circuit, nameplate), nameplate)
+    rated = rated_point(found.circuit, nameplate)
+    against, said = contradiction(rated, nameplate), doubt(rated, nameplate)
     if against is None:
-        return []
+        return [said] if said else []
     if trust != "data":
         raise refused(against)
     return [trusted_data(against)]

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commissioner.monitor.chain import observe
+from commissioner.monitor.chain import Refused, Wishes, observe
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.levels import clipped_share
 from commissioner.motor.running import from_nameplate
+from commissioner.operations.recordings.stretches import in_its_states
 from commissioner.records import RunningRecording
 from tests.support.running import refused_in, rewired, seen_in, taken, taken_with, without
 
@@ -206,6 +207,28 @@ def test_line_to_line_voltages_under_phase_names_are_refused() -> None:
         "voltage_level",
         "pairing",
     }
+
+
+def test_peak_values_for_rms_ones_are_refused_of_voltages_and_said_of_currents() -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    u, v, w = (np.sqrt(2.0) * x for x in recording.voltages_v)
+    reason = refused_in(replace(recording, voltages_v=(u, v, w)), plate).reason
+    assert reason.code == "voltage_level" and "peak for rms" in reason.what
+    u, v, w = (np.sqrt(2.0) * x for x in recording.currents_a)
+    said = {f.code: f.what for f in seen_in(replace(recording, currents_a=(u, v, w)), plate).audited.findings}
+    assert "a peak value taken for an rms one" in said["plate_doubt"]
+    assert ("note", "plate_doubt") not in codes(seen_in(recording, plate).audited)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_times_in_other_units_are_refused_however_far_apart_the_samples_are(factor) -> None:
+    recording, plate, _ = taken("running_compressor", 1, SHORT)
+    slow = replace(
+        recording, time_s=factor * np.asarray(recording.time_s), sample_period_s=factor * recording.sample_period_s,
+        metadata={},
+    )  # fmt: skip
+    seen, _, _ = in_its_states(slow, plate, Wishes())
+    assert isinstance(seen, Refused) and seen.reason.code == "sample_rate"
 
 
 def test_noise_without_a_motor_is_refused_not_answered() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, check
-from commissioner.motor.plate_match import contradiction, plate_point, rated_point
+from commissioner.motor.plate_match import contradiction, doubt, plate_point, rated_point
 from tests.campaigns.intake.plate import FACTORS, case, scaled
 from tests.support.standstill import usable_motors
 
@@ -42,6 +42,17 @@ def test_a_campaign_of_scale_errors_and_honest_points():
              for point, plate in (case(random) for _ in range(200))]  # fmt: skip
     assert sum(c is not None for c in honest) <= 1
     assert sum(c is not None for c in wrong) >= 198
+
+
+def test_a_peak_value_for_an_rms_one_is_said_and_seldom_of_honest_points():
+    random = np.random.default_rng(11)
+    points = [case(random) for _ in range(200)]
+    told = [contradiction(*p) is not None or doubt(*p) != "" for p in points]
+    assert sum(told) <= 4
+    for factor in (math.sqrt(2.0), math.sqrt(0.5)):
+        wrong = [(scaled(point, factor), plate) for point, plate in points]
+        assert sum(contradiction(*p) is not None or "peak" in doubt(*p) for p in wrong) >= 170
+    assert not any(doubt(scaled(point, 2.0), plate) for point, plate in points[:20])
 
 
 def test_at_the_rated_point_the_plates_motor_draws_the_plates_values():
