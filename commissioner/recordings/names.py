@@ -209,6 +209,15 @@ def is_sheet(names: Iterable[str]) -> bool:
     return is_whole and found.count("frequency_hz") < 2 and not any(meaning_of(n) == "time_s" for n in names)
 
 
+def missing_of_sheet(names: Iterable[str]) -> list[str]:
+    """What names of a test sheet lack of its columns: two of them at least are there, or the frequency; nothing of other names."""
+    names = [n for n in names if n]
+    found = {m for n in names if (m := sheet_meaning(n))}
+    if any(meaning_of(n) == "time_s" for n in names) or not ("frequency_hz" in found or len(found) > 1):
+        return []
+    return [column for column in SHEET if column not in found and column != "frequency_hz"]
+
+
 def is_per_minute(name: str) -> bool:
     """A speed column whose name alone says 1/min."""
     return key_of(name) in SPEED_PER_MINUTE

@@ -26,7 +26,7 @@ from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
-from commissioner.operations.recordings.sheets import are_sheets, are_three
+from commissioner.operations.recordings.sheets import are_sheets, are_three, require_whole_sheets
 from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.importers import contract_table
@@ -88,6 +88,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
         folder_to_write(request.out)
     if are_sheets(tables):
         return _points(tables, request)
+    require_whole_sheets(tables)
     if any(is_running(t) for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)

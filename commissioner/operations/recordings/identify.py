@@ -85,7 +85,7 @@ def identify_any(
     """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine, test sheets
     by their three tests."""
     from commissioner.operations.recordings.running import identified, is_running
-    from commissioner.operations.recordings.sheets import are_sheets
+    from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
@@ -94,6 +94,7 @@ def identify_any(
         folder_to_write(request.out)
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
+    require_whole_sheets(tables)
     if not any(is_running(t) for t in tables):
         return identify(request, observe)
     observe(Began("identifying"))

@@ -17,6 +17,7 @@ from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
 from commissioner.operations.recordings.trust import Trust, refused, trusted_data
+from commissioner.recordings.names import missing_of_sheet
 from commissioner.recordings.table import Table
 
 NOTHING_LEFT = (
@@ -28,6 +29,20 @@ NOTHING_LEFT = (
 def are_sheets(tables: Sequence[Table]) -> bool:
     """Whether all files are tables of test points."""
     return all(is_points_table(list(t.columns)) for t in tables)
+
+
+def require_whole_sheets(tables: Sequence[Table]) -> None:
+    """DataRefused: a table without a time has columns of a test sheet and lacks others."""
+    for table in tables:
+        missing = missing_of_sheet(r.name for r in table.readings) if "time_s" not in table.columns else []
+        if missing:
+            raise DataRefused(
+                f"{table.source}: this looks like a test sheet and lacks {', '.join(missing)}", step="recognise columns",
+                value=", ".join(r.name for r in table.readings)[:200],
+                limit="one column each of line-to-line volts, line amperes and the watts of all three phases (rms)",
+                remedy="name the columns frequency_hz, voltage_line_v, current_line_a, power_w; take means of the three meters, the sum of "
+                "two wattmeters, and line values of phase ones (sqrt 3)",
+            )  # fmt: skip
 
 
 def are_three(tables: Sequence[Table]) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
 
@@ -40,3 +41,23 @@ def test_a_diagnosis_of_three_tests_says_that_nothing_is_left_over(tmp_path: Pat
     assert np.isclose(done.document["parameters_after"]["rotor_resistance_ohm"]["value"] or 0.0, 0.1514, rtol=1e-3)
     page = (tmp_path / "out" / "report_sheet.html").read_text(encoding="utf-8")
     assert "three tests" in page and "0.2429" in page
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "lacks"),
+    [
+        ("f,U,I,W1,W2", "50,400,3,900,-300", "power_w"),
+        ("f [Hz],U [V],I [A],cos phi", "50,400,3,0.2", "power_w"),
+        ("f,U phase,I,P", "50,231,3,400", "voltage_line_v"),
+        ("f,U12,U23,U31,I1,I2,I3,P", "50,400,400,400,3,3,3,400", "voltage_line_v, current_line_a"),
+        ("f,U (phase),I,P", "50,231,3,400", "voltage_line_v"),
+    ],
+)
+@pytest.mark.parametrize("verb", [identify_any, diagnose])
+def test_a_sheet_that_lacks_a_column_is_told_which(tmp_path, verb, head, row, lacks):
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"{head}\n{row}\n{row.replace('50', '25', 1)}\n")
+    request = IdentifyRequest((path,)) if verb is identify_any else DiagnoseRequest((path,))
+    with pytest.raises(DataRefused, match=f"looks like a test sheet and lacks {lacks}$") as refused:
+        verb(request)
+    assert "sum of two wattmeters" in refused.value.remedy
