@@ -74,10 +74,13 @@ class Written:
 
 
 def drive_values(profile: DriveProfile, circuit: InverseGamma, nameplate: Nameplate | None = None) -> Written:
-    """The circuit as the drive wants it. Items the file does not know are refused by its own sentence."""
+    """The circuit as the drive wants it. Items the file does not know are refused by its own sentence; what stands for no
+    quantity of the circuit (the kind of a tuning) stays as it is."""
     order = profile.parameters.order if profile.parameters else ()
     refused = {name: profile.unknown[name] for name in QUANTITIES if name in profile.unknown}
-    values = {name: drive_value(profile.item(name), circuit, nameplate) for name in order}
+    items = [profile.item(name) for name in order]
+    meant = [item for item in items if item.convention or (item.quantity or item.name) in QUANTITIES]
+    values = {item.name: drive_value(item, circuit, nameplate) for item in meant}
     return Written(values, refused)
 
 

@@ -100,6 +100,14 @@ class Item:
     maximum: float | None = None
     word_order: str = "big"
     source: str = ""
+    parameter: int | None = None
+    """Its number, where it stands behind the drive's mailbox and in no register; `address` is then beyond every register."""
+    index: int = 0
+
+    @property
+    def place(self) -> int:
+        """What a person looks it up by: its register on the wire, or the number of its parameter."""
+        return self.address if self.parameter is None else self.parameter
 
     @property
     def words(self) -> int:
@@ -125,6 +133,8 @@ class LinkLimits:
     """Modbus functions by which the drive takes registers: 6 one, 16 several."""
     reply_s: float | None = None
     """How long this drive may take to answer; None: the caller's own time."""
+    busy_exceptions: tuple[int, ...] = ()
+    """Exceptions of the vendor's own by which the drive says that it is at work and has not carried the request out."""
 
     @property
     def longest_write(self) -> int:
@@ -203,8 +213,34 @@ class Store:
 
 
 @dataclass(frozen=True)
+class Unlock:
+    """Raw (address, value) writes after which the drive takes parameters, and those that lock it again."""
+
+    writes: tuple[tuple[int, int], ...]
+    locks: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Mailbox:
+    """Registers through which PROFIdrive's parameter requests go: `registers` of them from `address` on. `data_set`: the
+    function code in the second; `errors`: what the drive's error values mean. An answer is there after at most `within_s`."""
+
+    address: int
+    registers: int
+    data_set: int
+    drive_object: int
+    within_s: float
+    errors: Mapping[int, str]
+
+    @property
+    def end(self) -> int:
+        return self.address + self.registers
+
+
+@dataclass(frozen=True)
 class Worked:
-    """An example from the cited document: these words on the wire are this value, which is so much per phase in SI."""
+    """An example from the cited document: these words on the wire are this value, which is so much per phase in SI; to
+    write it through the mailbox `request` goes out."""
 
     item: str
     source: str
@@ -212,6 +248,7 @@ class Worked:
     words: tuple[int, ...] = ()
     value: float | None = None
     per_phase: float | None = None
+    request: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -249,6 +286,8 @@ class DriveProfile:
     unknown: Mapping[str, str] = field(default_factory=dict)
     worked: tuple[Worked, ...] = ()
     tuning: Tuning | None = None
+    unlock: Unlock | None = None
+    mailbox: Mailbox | None = None
 
     def item(self, name: str) -> Item:
         """The item; UsageError says why where the file does not know it."""
@@ -309,6 +348,7 @@ def check_consistency(profile: DriveProfile) -> DriveProfile:
     _check_overlaps(profile)
     _check_sizes(profile)
     _check_references(profile)
+    _check_mailbox(profile)
     if profile.kind == "commercial":
         _check_sources(profile)
     if profile.kind == "commissioning_map":
@@ -324,16 +364,19 @@ def _check_overlaps(profile: DriveProfile) -> None:
     spans = [(i.address, i.end, f"items.{i.name}") for i in profile.items.values()]
     if profile.window is not None:
         spans.append((profile.window.address, profile.window.address + profile.window.words, "window"))
+    if profile.mailbox is not None:
+        spans.append((profile.mailbox.address, profile.mailbox.end, "mailbox"))
     for (_, end, earlier), (start, _, later) in pairwise(sorted(spans)):
         if start < end:
             raise _refuse(profile, f"{later}.address", start, f"at least {end}: {earlier} reaches to {end - 1}")
-    last = max(spans, default=(0, 0, ""), key=lambda span: span[1])
+    in_registers = (span for span in spans if span[0] < 0x10000)
+    last = max(in_registers, default=(0, 0, ""), key=lambda span: span[1])
     if last[1] > 0x10000:
         raise _refuse(profile, f"{last[2]}.address", last[0], "registers inside 0 ... 65535")
 
 
 def _check_sizes(profile: DriveProfile) -> None:
-    for item in profile.items.values():
+    for item in (i for i in profile.items.values() if i.parameter is None):
         room = profile.link.max_read_registers
         if item.words > room:
             raise _refuse(profile, f"items.{item.name}.length", item.length, f"at most {room} registers per read")
@@ -343,6 +386,21 @@ def _check_sizes(profile: DriveProfile) -> None:
     if profile.window is not None and profile.window.words > profile.link.max_read_registers:
         room = profile.link.max_read_registers - profile.window.header_words
         raise _refuse(profile, "window.data_registers", profile.window.data_registers, f"at most {room}")
+
+
+def _check_mailbox(profile: DriveProfile) -> None:
+    """What stands behind a mailbox is one number of one or two words, asked for by function 16."""
+    behind = [item for item in profile.items.values() if item.parameter is not None]
+    for item in behind:
+        key = f"items.{item.name}"
+        if profile.mailbox is None:
+            raise _refuse(profile, f"{key}.parameter", item.parameter, "a table [mailbox] through which it is reached")
+        if item.length != 1 or item.type == "ascii":
+            raise _refuse(profile, f"{key}.length", item.length, "one number: no text and no array through the mailbox")
+        if item.word_order != "big":
+            raise _refuse(profile, f"{key}.word_order", item.word_order, "big, as PROFIdrive has it")
+    if profile.mailbox is not None and 16 not in profile.link.write_functions:
+        raise _refuse(profile, "link.write_functions", list(profile.link.write_functions), "16: the mailbox needs it")
 
 
 def is_a_lead(source: str) -> bool:

@@ -7,17 +7,21 @@ from collections.abc import Iterator
 from commissioner.errors import ConfigurationError, ReplyMismatch, UsageError
 from commissioner.registers.codec import decode_item, encode_item
 from commissioner.registers.convention import our_values
+from commissioner.registers.mailbox import request
 from commissioner.registers.profile import DriveProfile, Worked
 
 DIGITS = 12
 """Compared after rounding to so many significant digits: scales like 0.0001 have no exact binary form."""
+FLOAT_DIGITS = 7
+"""Of a 32-bit float, which holds no more."""
 
 
 def check_worked(profile: DriveProfile) -> DriveProfile:
     """The profile itself. ConfigurationError where an example does not come out, or a parameter that can be written has none."""
     for index, example in enumerate(profile.worked):
         for key, seen, wanted in _compared(profile, example, index):
-            if not _same(seen, wanted):
+            digits = FLOAT_DIGITS if profile.item(example.item).type == "f32" else DIGITS
+            if not _same(seen, wanted, digits):
                 raise ConfigurationError(
                     file=profile.file, key=f"worked[{index}].{key}", value=wanted, expected=f"{seen!r} by this file"
                 )
@@ -56,12 +60,22 @@ def _compared(profile: DriveProfile, example: Worked, index: int) -> Iterator[tu
             raise ConfigurationError(
                 file=profile.file, key=f"worked[{index}].words", value=list(example.words), expected=str(error.limit)
             ) from error
+    if example.request:
+        yield "request", _as_written(profile, example), example.request
     if example.per_phase is not None and example.value is not None:
         ours = our_values(profile, {example.item: example.value}, None).get(example.item)
         yield "per_phase", ours.value if ours else None, example.per_phase
 
 
-def _same(seen: object, wanted: object) -> bool:
+def _as_written(profile: DriveProfile, example: Worked) -> tuple[int, ...] | None:
+    """The request by which this file writes the example's words, with the reference of the printed one; None without mailbox."""
+    item = profile.item(example.item)
+    if profile.mailbox is None or item.parameter is None or len(example.request) < 3:
+        return None
+    return request(profile.mailbox, item, example.request[2] >> 8, example.words)
+
+
+def _same(seen: object, wanted: object, digits: int) -> bool:
     if isinstance(seen, float) and isinstance(wanted, int | float):
-        return f"{seen:.{DIGITS}g}" == f"{float(wanted):.{DIGITS}g}"
+        return f"{seen:.{digits}g}" == f"{float(wanted):.{digits}g}"
     return seen == wanted

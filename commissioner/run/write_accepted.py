@@ -231,7 +231,7 @@ def _require_the_runs_drive(inverter: Inverter, ready: _Ready, step: str) -> Dri
 
 def _row(profile: DriveProfile, name: str, now: float, will_be: float) -> PlannedRow:
     item = profile.item(name)
-    return PlannedRow(name, item.address, now, will_be, item.unit, item.convention)
+    return PlannedRow(name, item.place, now, will_be, item.unit, item.convention)
 
 
 def as_document(plan: Plan) -> dict[str, Any]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import random
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from sim.vendors.face import Cell, Face
+from sim.vendors.mailbox import Mailbox
 from sim.vendors.motor import HEATING_K, Motor
 
 BAD_FUNCTION, BAD_ADDRESS, BAD_VALUE, FAILURE, BUSY = 1, 2, 3, 4, 6
@@ -29,6 +30,10 @@ class Habits:
     watchdog_s: float = 0.0
     loses_start_answer: bool = False
     stores: bool = True
+    ignores_when_locked: bool = False
+    """Takes a write without its unlock in silence, instead of refusing it."""
+    busy_s: float = 0.0
+    """So long after each write it refuses the next as busy."""
 
 
 @dataclass
@@ -64,7 +69,12 @@ class VendorDrive:
         self.turned = self.was_energised_s = 0.0
         self.is_local = self.habits.is_local
         self._heard_s = self._seen_s = clock()
-        self._store_until = 0.0
+        self._store_until = self._busy_until = 0.0
+        self.is_locked = bool(face.unlocks)
+        self.mailbox: Mailbox | None = None
+        if face.mailbox is not None:
+            behind = {name: cell for name, cell in face.cells.items() if cell.parameter is not None}
+            self.mailbox = Mailbox(face.mailbox, behind, clock, self._words_of, self._put_from_outside)
         self._factory()
 
     # --- memory -------------------------------------------------------------------------------------------------------
@@ -77,9 +87,8 @@ class VendorDrive:
             if cell.name == "dc_link_v":
                 value = 565.0
             self._put(cell, value)
-        for address, value in (*self.face.stores, *self.face.enters):
+        for address, _ in (*self.face.stores, *self.face.enters, *self.face.unlocks, *self.face.locks):
             self.words.setdefault(address, 0)
-            _ = value
         if self.face.store_done is not None:
             self.words[self.face.store_done[0]] = self.face.store_done[1]
         self.stored = dict(self.words)
@@ -126,6 +135,7 @@ class VendorDrive:
         self.entered.clear()
         self.coils = dict.fromkeys(self.coils, False)
         self.state, self.speed = REST, 0
+        self.is_locked = bool(self.face.unlocks)
         self._heard_s = self._clock()
 
     # --- the wire -----------------------------------------------------------------------------------------------------
@@ -156,6 +166,8 @@ class VendorDrive:
         return bytes((1, 1, self.coils[address]))
 
     def _read(self, address: int, count: int) -> bytes:
+        if self.mailbox is not None and self.mailbox.covers(address, count):
+            return struct.pack(f">BB{count}H", 3, 2 * count, *self.mailbox.read(address, count))
         if not 1 <= count <= self.face.longest_read:
             return bytes((0x83, BAD_VALUE))
         if any(address + k not in self.words for k in range(count)):
@@ -165,24 +177,49 @@ class VendorDrive:
 
     def _write(self, address: int, words: list[int], longest: int) -> int:
         """0 taken; an exception's number; -1 taken in silence."""
+        if self._clock() < self._busy_until:
+            return self.face.busy_code or BUSY
+        if self.mailbox is not None and self.mailbox.covers(address, len(words)):
+            self.mailbox.write(address, words)
+            return 0
         cells = [c for c in self.face.cells.values() if c.address <= address < c.address + c.width]
         if len(words) > longest:
             return BAD_VALUE
+        if (address, words[0]) in self.face.unlocks or (address, words[0]) in self.face.locks:
+            self.is_locked = (address, words[0]) in self.face.locks
+            return 0
         if (address, words[0]) in self.face.stores or (address, words[0]) in self.face.enters:
             return self._action(address, words[0])
         if not cells or not cells[0].is_writable:
             return BAD_ADDRESS
         if len(words) != cells[0].width:
             return BAD_VALUE
-        if (cells[0].needs_stop and self.is_energised) or self.is_local:
+        return self._put_from_outside(cells[0], words)
+
+    def _words_of(self, cell: Cell) -> list[int]:
+        self._refresh()
+        return [self.words[cell.address + k] for k in range(cell.width)]
+
+    def _put_from_outside(self, cell: Cell, words: Sequence[int]) -> int:
+        """As `_write`: what the drive's state has to say to it, and whether it is locked."""
+        if (cell.needs_stop and self.is_energised) or self.is_local:
             return FAILURE
-        return self._take(cells[0], words)
+        if self.is_locked and not self._is_command(cell):
+            return 0 if self.habits.ignores_when_locked else FAILURE
+        code = self._take(cell, words)
+        if not code and not self._is_command(cell):
+            self._busy_until = self._clock() + self.habits.busy_s
+        return code
+
+    def _is_command(self, cell: Cell) -> bool:
+        """Control words are taken whether locked or not."""
+        return cell.name == (self.face.tune or {}).get("facts", {}).get("stop", {}).get("item")
 
     def _action(self, address: int, value: int) -> int:
         if (address, value) in self.face.stores or (address, value) in self.face.enters:
             self.words |= self.entered
             self.entered.clear()
-        if (address, value) in self.face.stores:
+        if (address, value) in self.face.stores and not self.is_locked:
             if self.habits.stores:
                 self._keep()
             if self.face.store_done is not None:
@@ -193,7 +230,7 @@ class VendorDrive:
     def _keep(self) -> None:
         self.stored = dict(self.words)
 
-    def _take(self, cell: Cell, words: list[int]) -> int:
+    def _take(self, cell: Cell, words: Sequence[int]) -> int:
         facts = (self.face.tune or {}).get("facts", {})
         new = {cell.address + k: word for k, word in enumerate(words)}
         if cell.name == facts.get("stop", {}).get("item"):

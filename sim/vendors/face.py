@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parents[2] / "config" / "drives"
+OWN = 1 << 20
+"""Addresses from here on are no registers: what stands behind a mailbox."""
 CODES = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f"}
 
 
@@ -25,6 +27,9 @@ class Cell:
     needs_stop: bool
     convention: str
     unit: str
+    parameter: int | None = None
+    """Its number where it stands behind the mailbox; `address` is then of this emulation's own, beyond every register."""
+    index: int = 0
 
     @property
     def width(self) -> int:
@@ -48,6 +53,15 @@ class Cell:
 
 
 @dataclass(frozen=True)
+class MailboxFace:
+    """The registers through which parameters are asked for, and the data set that stands in the second."""
+
+    address: int
+    registers: int
+    data_set: int
+
+
+@dataclass(frozen=True)
 class Face:
     """Everything of the file that shows on the wire. `tune`: its raw table, None where it has none."""
 
@@ -67,21 +81,28 @@ class Face:
     enters: tuple[tuple[int, int], ...]
     parameters: tuple[str, ...]
     tune: dict[str, Any] | None
+    unlocks: tuple[tuple[int, int], ...] = ()
+    locks: tuple[tuple[int, int], ...] = ()
+    busy_code: int | None = None
+    mailbox: MailboxFace | None = None
 
 
 def read_face(name: str) -> Face:
-    """The face of `config/drives/NAME.toml`. FileNotFoundError: no such drive."""
-    document = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    """The face of `config/drives/NAME.toml`, or of a file by its path. FileNotFoundError: no such drive."""
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    document = tomllib.loads(path.read_text(encoding="utf-8"))
     link, store, group = document["link"], document.get("store", {}), document.get("parameters", {})
     base = link["address_base"]
     cells = {}
     for key, entry in document.get("items", {}).items():
         order = entry.get("word_order", link["word_order"])
+        parameter, index = entry.get("parameter"), entry.get("index", 0)
+        address = entry["address"] - base if parameter is None else OWN + 4 * (parameter * 1000 + index)
         cells[key] = Cell(
-            key, entry["address"] - base, CODES[entry["type"]], entry.get("scale", 1.0), order == "little",
-            "w" in entry["access"], entry.get("needs_stop", False), entry.get("convention", ""), entry.get("unit", ""),
+            key, address, CODES[entry["type"]], entry.get("scale", 1.0), order == "little",
+            "w" in entry["access"], entry.get("needs_stop", False), entry.get("convention", ""), entry.get("unit", ""), parameter, index,
         )  # fmt: skip
-    done = store.get("done")
+    done, unlock, box = store.get("done"), document.get("unlock", {}), document.get("mailbox")
     return Face(
         name=name,
         title=document["drive"]["name"],
@@ -99,6 +120,10 @@ def read_face(name: str) -> Face:
         enters=tuple((a, v) for a, v in group.get("enter", [])),
         parameters=tuple(group.get("order", [])),
         tune=document.get("tune"),
+        unlocks=tuple((a, v) for a, v in unlock.get("writes", [])),
+        locks=tuple((a, v) for a, v in unlock.get("locks", [])),
+        busy_code=next(iter(link.get("busy_exceptions", [])), None),
+        mailbox=MailboxFace(box["address"] - base, box["registers"], box["data_set"]) if box else None,
     )
 
 

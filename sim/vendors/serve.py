@@ -21,17 +21,21 @@ from sim.vendors.face import faces, read_face
 def main(arguments: list[str] | None = None) -> int:
     """Exit code 0; 2 for a name there is no file of."""
     parser = argparse.ArgumentParser(prog="python -m sim.vendors.serve", description=__doc__)
-    parser.add_argument("name", choices=faces())
+    parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(faces())}, or the path of a file")
     parser.add_argument("--tcp", type=int, default=0, metavar="PORT", help="0 = any free port")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--tuning", action="append", choices=TUNINGS, help="how the tunings go, in turn")
     parser.add_argument("--tuning-s", type=float, default=4.0)
     parser.add_argument("--enter", action="store_true", help="values are in use after an Enter only")
-    parser.add_argument("--turnaround", type=float, default=0.0, help="seconds before each answer")
+    parser.add_argument("--turnaround", type=float, help="seconds before each answer; unless given, the file's")
+    parser.add_argument("--busy-s", type=float, default=0.0, help="so long after a write it refuses the next")
     options = parser.parse_args(arguments)
-    habits = Habits(tuple(options.tuning or ["good"]), options.tuning_s, options.enter)
-    drive = VendorDrive(read_face(options.name), time.monotonic, habits=habits, seed=options.seed)
-    _serve(drive, options.tcp, options.turnaround)
+    if options.name not in faces() and not options.name.endswith(".toml"):
+        parser.error(f"there is no drive named {options.name}")
+    habits = Habits(tuple(options.tuning or ["good"]), options.tuning_s, options.enter, busy_s=options.busy_s)
+    face = read_face(options.name)
+    drive = VendorDrive(face, time.monotonic, habits=habits, seed=options.seed)
+    _serve(drive, options.tcp, face.turnaround_s if options.turnaround is None else options.turnaround)
     sys.stdout.write(json.dumps(drive.truth()) + "\n")
     return 0
 

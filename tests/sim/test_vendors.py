@@ -1,11 +1,16 @@
 """The emulated vendors: each wears the face of its file, and behaves behind it as its family does."""
 
+import socket
 import struct
+import time
 
 import pytest
 
 from sim.vendors.drive import BAD_ADDRESS, BAD_FUNCTION, BAD_VALUE, Habits, VendorDrive
 from sim.vendors.face import faces, read_face
+from tests.support.vendor_process import MADE_UP, Vendor
+
+MAILBOX, LOCKED = MADE_UP
 
 
 class Clock:
@@ -29,16 +34,17 @@ def write(drive, address, *words):
     return drive.answer(struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words))
 
 
-@pytest.mark.parametrize("name", faces())
+@pytest.mark.parametrize("name", [*faces(), *MADE_UP], ids=lambda name: name.rpartition("/")[2])
 def test_every_face_answers_for_its_registers_and_for_no_others(name):
     from commissioner.link.drive.items import Items
     from commissioner.link.files.drive_file import load_profile
     from tests.campaigns.tunings.bench import JumpingClock, VendorPort
 
-    drive, _ = drive_of(name)
+    clock = JumpingClock()
+    drive = VendorDrive(read_face(name), clock.now)
     profile = load_profile(name)
     assert set(profile.items) == set(drive.face.cells)
-    seen = Items(VendorPort(drive, JumpingClock()), profile).read(profile.items)
+    seen = Items(VendorPort(drive, clock), profile, clock.sleep, clock.now).read(profile.items)
     for item, value in seen.items():
         assert value == pytest.approx(drive.value(item)), item
     assert read(drive, 0xFFF0) == BAD_ADDRESS
@@ -123,3 +129,81 @@ def test_repeats_warm_the_winding_and_a_pause_cools_it():
     hot.press_tune()
     clock.t += 5.0
     assert hot.truth()["tunings"][-1]["found"]["stator_resistance"] < 1.02 * values[0]
+
+
+def ask(drive, clock, *words):
+    """A request through the mailbox at 600, waited for; the whole answer."""
+    assert write(drive, 600, *words)[0] == 16
+    assert read(drive, 600, 3) == [1, 0x2F00, 4]
+    clock.t += 0.1
+    return read(drive, 600, 8)
+
+
+def test_a_mailbox_answers_once_it_is_ready_with_the_frames_that_the_manual_prints():
+    drive, clock = drive_of("siemens_g120")
+    seen = ask(drive, clock, 1, 0x2F0A, 0x8001, 0x0101, 0x1001, 1121, 0)
+    assert seen[:5] == [2, 0x2F0A, 0x8001, 0x0101, 0x0801]
+    assert struct.unpack(">f", struct.pack(">2H", *seen[5:7]))[0] == drive.value("ramp_down")
+    assert ask(drive, clock, 1, 0x2F0A, 0x8101, 0x0101, 0x1001, 1120, 0)[:6] == [2, 0x2F08, 0x8181, 0x0101, 0x4401, 0]
+    assert ask(drive, clock, 1, 0x2F0A, 0x8201, 0x0101, 0x1001, 1121, 7)[5] == 3
+    assert ask(drive, clock, 1, 0x2F0C, 0x8301, 0x0101, 0x1001, 1121, 0)[:3] == [2, 0x2F00, 1]
+    assert ask(drive, clock, 1, 0x2E0A, 0x8401, 0x0101, 0x1001, 1121, 0)[:3] == [2, 0x2F00, 3]
+
+
+def test_what_stands_behind_a_mailbox_is_written_there_in_its_own_format_and_is_volatile():
+    drive, clock = drive_of(MAILBOX)
+    new = struct.unpack(">2H", struct.pack(">f", 3.9))
+    assert ask(drive, clock, 1, 0x2F10, 0x0102, 0x0101, 0x1001, 1350, 0, 0x0801, *new)[:4] == [
+        2,
+        0x2F04,
+        0x0102,
+        0x0101,
+    ]
+    assert drive.value("stator_resistance") == pytest.approx(3.9)
+    assert ask(drive, clock, 1, 0x2F10, 0x0202, 0x0101, 0x1001, 1350, 0, 0x4301, *new)[2:6] == [
+        0x0282,
+        0x0101,
+        0x4401,
+        5,
+    ]
+    assert ask(drive, clock, 1, 0x2F0E, 0x0302, 0x0101, 0x1001, 1304, 0, 0x0601, 400)[5] == 1
+    drive.power_cycle()
+    assert drive.value("stator_resistance") != pytest.approx(3.9)
+
+
+@pytest.mark.parametrize("ignores", [False, True])
+def test_a_locked_drive_takes_parameters_only_between_its_unlock_and_its_lock(ignores):
+    drive, _ = drive_of(LOCKED, ignores_when_locked=ignores)
+    before = drive.value("stator_resistance")
+    assert (write(drive, 9642, 0x0D9C, 1)[0] == 16) is ignores
+    assert drive.value("stator_resistance") == before
+    write(drive, 0x4001, 0x55AA)
+    write(drive, 9642, 0x0D9C, 1)
+    assert drive.value("stator_resistance") == pytest.approx(6.902), "low word first"
+    write(drive, 0x4001, 0)
+    write(drive, 9642, 0x0001, 1)
+    assert drive.value("stator_resistance") == pytest.approx(6.902)
+    drive.power_cycle()
+    assert drive.is_locked
+
+
+def test_a_drive_that_is_busy_after_a_write_says_so_by_the_code_of_its_file():
+    drive, clock = drive_of("yaskawa_a1000", busy_s=0.1)
+    assert write(drive, 0x312, 8000)[0] == 16
+    assert write(drive, 0x312, 8100)[1] == 0x24
+    clock.t += 0.2
+    assert write(drive, 0x312, 8100)[0] == 16
+
+
+def test_an_answer_takes_the_turnaround_of_the_file_unless_told_otherwise():
+    def took(*options):
+        with Vendor("yaskawa_a1000", *options) as drive:
+            host, port = drive.url.removeprefix("tcp://").split(":")
+            with socket.create_connection((host, int(port))) as line:
+                began = time.monotonic()
+                line.sendall(bytes.fromhex("000100000006010300200001"))
+                line.recv(64)
+                return time.monotonic() - began
+
+    assert took() >= read_face("yaskawa_a1000").turnaround_s
+    assert took("--turnaround", "0") < 0.05

@@ -6,8 +6,13 @@ import json
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from types import TracebackType
 from typing import Any
+
+FOLDER = Path(__file__).parents[1] / "data" / "vendors"
+MADE_UP = tuple(str(FOLDER / f"{name}.toml") for name in ("behind_a_mailbox", "needs_an_unlock"))
+"""Drives that nobody sells, which wear what no file of config/drives has a source for."""
 
 
 class Vendor:

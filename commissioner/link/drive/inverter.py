@@ -25,7 +25,7 @@ from commissioner.link.drive.items import Items, number
 from commissioner.link.drive.ordinary.found import Implausible, implausible
 from commissioner.link.drive.ordinary.tuning import Operator, Tuner
 from commissioner.link.drive.readiness import check_ready, not_ready
-from commissioner.link.drive.reading import read_identity, read_nameplate, read_status
+from commissioner.link.drive.reading import read_identity, read_nameplate, read_others, read_status
 from commissioner.link.drive.write_back import WriteBack
 from commissioner.link.wire.port import Port
 from commissioner.motor.circuit import InverseGamma
@@ -68,7 +68,7 @@ class Inverter:
         self.port = port
         self.profile = profile
         self.journal = journal
-        self._items = Items(port, profile)
+        self._items = Items(port, profile, sleep, clock)
         self.claim = Claim(self._items)
         self.sleep, self.now_s = sleep, clock
         """Whoever waits for this drive, or asks how old its samples are, asks here: a drive in motor time has a clock of its own."""
@@ -95,6 +95,10 @@ class Inverter:
     def read_nameplate(self) -> dict[str, float]:
         """The nameplate the drive holds, by the contract's keys; what its file does not describe is left out."""
         return read_nameplate(self._items)
+
+    def read_others(self) -> dict[str, Value | RequestRefused]:
+        """What the drive file describes and nothing else asks for; for an item that the drive refuses its refusal."""
+        return read_others(self._items)
 
     def snapshot(self) -> ParameterSnapshot:
         """The motor parameters in use and stored, with the identity of the drive that holds them."""

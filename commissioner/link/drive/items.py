@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 
 from commissioner.errors import DriveFault, LinkError, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.foreign import Watched
+from commissioner.link.drive.ordinary.mailbox import behind_mailbox
 from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, Port, Words
 from commissioner.registers.codec import Value, decode_item, decode_span, encode_item, encode_span
 from commissioner.registers.profile import DriveProfile, Span, plan_spans
@@ -14,8 +16,14 @@ from commissioner.registers.profile import DriveProfile, Span, plan_spans
 class Items:
     """The drive's items over a port. A value that was written is believed when it has been read back."""
 
-    def __init__(self, port: Port, profile: DriveProfile) -> None:
-        self.port = port
+    def __init__(
+        self,
+        port: Port,
+        profile: DriveProfile,
+        sleep: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.port = behind_mailbox(port, profile, sleep, clock)
         self.profile = profile
         self.watched = Watched(profile)
 
@@ -86,7 +94,7 @@ class Items:
             self.port.write(span.address, encode_span(span, values))
         except RequestRefused as refused:
             self.watched.look_again()
-            if refused.value not in MAY_BE_CARRIED_OUT:
+            if refused.value not in MAY_BE_CARRIED_OUT or refused.value in self.profile.exceptions:
                 raise
         except BaseException:  # it may have arrived all the same
             self.watched.look_again()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from commissioner.errors import DriveFault, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.drive.facts import Action, Intent, Journal
+from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.parameter_sets import ParameterSets, Values
 from commissioner.registers.codec import Value
 from commissioner.registers.convention import staged_words_crc
@@ -108,20 +109,22 @@ class Direct:
     def put_in_use(self, target: Values, *, store: bool) -> None:
         differing: dict[str, Value] = dict(self._sets.differing(target, self._sets.in_use()))
         self._journal(Intent(Action.COMMIT, differing))
-        with self._store_mode(store):
-            for name in self._sets.group.order:
-                if name in differing:
-                    self._write(name, differing[name])
-        for address, value in self._sets.group.enter:
-            self._items.port.write(address, [value])
+        with self._unlocked():
+            with self._store_mode(store):
+                for name in self._sets.group.order:
+                    if name in differing:
+                        self._write(name, differing[name])
+            for address, value in self._sets.group.enter:
+                self._items.port.write(address, [value])
 
     def put_in_memory(self, target: Values) -> None:
         store = self._sets.store
         if not store.writes:
             return
         self._journal(Intent(Action.STORE, {f"register {address}": value for address, value in store.writes}))
-        for address, value in store.writes:
-            self._items.port.write(address, [value])
+        with self._unlocked():
+            for address, value in store.writes:
+                self._items.port.write(address, [value])
         if store.done is not None:
             self._await_stored(*store.done, store.within_s)
 
@@ -132,6 +135,9 @@ class Direct:
         except (ReplyTimeout, ReplyMismatch):
             if self._sets.group.enter or not self._items.same_words(name, self._items.read([name])[name], value):
                 raise
+
+    def _unlocked(self) -> AbstractContextManager[None]:
+        return unlocked(self._items.port, self._sets.profile)
 
     @contextmanager
     def _store_mode(self, store: bool) -> Iterator[None]:
@@ -164,7 +170,7 @@ class Direct:
         """What is in use becomes lasting, whoever wrote it: by the coil it is written once more, as it stands."""
         if self._sets.store.coil is not None:
             self._journal(Intent(Action.STORE, dict(target)))
-            with self._store_mode(True):
+            with self._unlocked(), self._store_mode(True):
                 for name in self._sets.group.order:
                     self._write(name, target[name])
         self.put_in_memory(target)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from commissioner.errors import IdentityMismatch
+from commissioner.errors import IdentityMismatch, RequestRefused
 from commissioner.link.drive.items import Items, number
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.codec import Value
@@ -100,6 +100,20 @@ def read_status(items: Items) -> DriveStatus:
         overruns=_whole(seen, "overruns"),
         settings_count=_whole(seen, "settings_count") if "settings_count" in seen else None,
     )
+
+
+def read_others(items: Items) -> dict[str, Value | RequestRefused]:
+    """What the drive file describes beside identity, status, plate and motor parameters, one item at a time; for an item that
+    the drive refuses its refusal."""
+    order = items.profile.parameters.order if items.profile.parameters else ()
+    asked = {*IDENTITY_ITEMS, *STATUS_ITEMS, *NAMEPLATE_ITEMS, *order}
+    out: dict[str, Value | RequestRefused] = {}
+    for name in (n for n, item in items.profile.items.items() if "r" in item.access and n not in asked):
+        try:
+            out |= items.read([name])
+        except RequestRefused as refused:
+            out[name] = refused
+    return out
 
 
 def read_state(items: Items) -> DriveState:

@@ -215,7 +215,7 @@ class WriteBack:
         after = self._sets.in_use()
         rows = tuple(
             WrittenParameter(
-                name, self._profile.item(name).address, before.in_use[name],
+                name, self._profile.item(name).place, before.in_use[name],
                 number(self._items.as_held(name, target[name])), after[name],
             )
             for name in self._sets.differing(target, before.in_use)

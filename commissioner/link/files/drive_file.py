@@ -15,15 +15,19 @@ from commissioner.link.files.schema import (
     DriveFile,
     ItemTable,
     LinkTable,
+    MailboxTable,
     ParametersTable,
     StepTable,
     StoreTable,
     TuneTable,
+    UnlockTable,
     WatchdogTable,
     WindowTable,
+    WorkedTable,
     explained,
 )
 from commissioner.registers.convention import CONVENTIONS, QUANTITIES, UNITS, unit_of
+from commissioner.registers.mailbox import address_of
 from commissioner.registers.profile import (
     WINDOW_FLAGS,
     DriveLimits,
@@ -31,18 +35,37 @@ from commissioner.registers.profile import (
     Identity,
     Item,
     LinkLimits,
+    Mailbox,
     ParameterGroup,
     Store,
+    Unlock,
     Watchdog,
     WindowLayout,
     Worked,
     check_consistency,
+    is_a_lead,
 )
 from commissioner.registers.status import STATUS_BITS
 from commissioner.registers.tuning import Fact, Limit, Step, Tuning, check_tuning
 from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
 
+AS_WRITTEN = {
+    *(
+        "type",
+        "length",
+        "scale",
+        "unit",
+        "convention",
+        "quantity",
+        "access",
+        "needs_stop",
+        "source",
+        "parameter",
+        "index",
+    )
+}
+"""Keys of an item's table that say the same in the profile."""
 DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"
 
 
@@ -119,21 +142,47 @@ def _profile(model: DriveFile, file: str) -> DriveProfile:
         exceptions=_by_code(model.exceptions, "exceptions", file),
         limits=DriveLimits(**model.limits.model_dump()),
         unknown=model.unknown,
-        worked=tuple(Worked(**table.model_dump(exclude={"words"}), words=tuple(table.words)) for table in model.worked),
+        worked=tuple(_worked(table) for table in model.worked),
+        unlock=_unlock(model.unlock, file) if model.unlock else None,
+        mailbox=_mailbox(model.mailbox, model.link.address_base, file) if model.mailbox else None,
     )
 
 
 def _link(table: LinkTable) -> LinkLimits:
-    functions = tuple(table.write_functions)
+    lists = {"write_functions", "busy_exceptions"}
     return LinkLimits(
-        **table.model_dump(exclude={"address_base", "word_order", "write_functions"}), write_functions=functions
+        **table.model_dump(exclude={"address_base", "word_order", *lists}),
+        write_functions=tuple(table.write_functions),
+        busy_exceptions=tuple(table.busy_exceptions),
     )
+
+
+def _worked(table: WorkedTable) -> Worked:
+    values = table.model_dump(exclude={"words", "request"})
+    return Worked(**values, words=tuple(table.words), request=tuple(table.request))
+
+
+def _unlock(table: UnlockTable, file: str) -> Unlock:
+    _refuse_lead("unlock.source", table.source, file)
+    return Unlock(tuple((a, v) for a, v in table.writes), tuple((a, v) for a, v in table.locks))
+
+
+def _mailbox(table: MailboxTable, base: int, file: str) -> Mailbox:
+    _refuse_lead("mailbox.source", table.source, file)
+    values = table.model_dump(include={"registers", "data_set", "drive_object", "within_s"})
+    return Mailbox(address=table.address - base, errors=_by_code(table.errors, "mailbox.errors", file), **values)
+
+
+def _refuse_lead(key: str, source: str, file: str) -> None:
+    if is_a_lead(source):
+        raise ConfigurationError(
+            file=file, key=key, value=source, expected="a source; what is a lead goes into [unknown]"
+        )
 
 
 def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     key = f"items.{name}"
-    if table.address < link.address_base:
-        raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
+    address = _address(table, link.address_base, key, file)
     for what, value, known in (
         ("convention", table.convention, CONVENTIONS),
         ("quantity", table.quantity, QUANTITIES),
@@ -150,15 +199,27 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
         )
     return Item(
         name=name,
-        address=table.address - link.address_base,
+        address=address,
         is_volatile=table.volatile,
         minimum=table.min,
         maximum=table.max,
         word_order=table.word_order or link.word_order,
-        **table.model_dump(
-            include={"type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop", "source"}
-        ),
+        **table.model_dump(include=AS_WRITTEN),
     )
+
+
+def _address(table: ItemTable, base: int, key: str, file: str) -> int:
+    """On the wire; beyond every register for what stands behind a mailbox."""
+    if (table.address is None) == (table.parameter is None):
+        raise ConfigurationError(
+            file=file, key=f"{key}.address", value=table.address, expected="either an address or a parameter's number"
+        )
+    if table.parameter is not None:
+        return address_of(table.parameter, table.index)
+    assert table.address is not None
+    if table.address < base:
+        raise ConfigurationError(file=file, key=f"{key}.address", value=table.address, expected="1 or more: base is 1")
+    return table.address - base
 
 
 def _watchdog(table: WatchdogTable) -> Watchdog:

@@ -44,6 +44,7 @@ class LinkTable(Table):
     write_pause_s: Seconds = 0.0
     write_functions: Annotated[list[Literal[6, 16]], Field(min_length=1)] = [16]
     reply_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)] | None = None
+    busy_exceptions: list[Annotated[int, Field(ge=1, le=255)]] = []
 
 
 class IdentityTable(Table):
@@ -72,7 +73,11 @@ class StoreTable(Table):
 
 
 class ItemTable(Table):
-    address: Word
+    """Where it stands: `address`, or `parameter` and `index` behind the mailbox."""
+
+    address: Word | None = None
+    parameter: Annotated[int, Field(ge=1, le=0xFFFF)] | None = None
+    index: Word = 0
     type: Literal["u16", "i16", "u32", "i32", "f32", "ascii"]
     length: Annotated[int, Field(ge=1, le=125)] = 1
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
@@ -86,6 +91,23 @@ class ItemTable(Table):
     max: Finite | None = None
     word_order: Literal["big", "little"] | None = None
     source: str = ""
+
+
+class UnlockTable(Table):
+    writes: Annotated[list[Pair], Field(min_length=1)]
+    locks: list[Pair] = []
+    source: Annotated[str, Field(min_length=1)]
+
+
+class MailboxTable(Table):
+    protocol: Literal["profidrive"]
+    address: Word
+    registers: Annotated[int, Field(ge=10, le=125)]
+    data_set: Annotated[int, Field(ge=1, le=255)]
+    drive_object: Annotated[int, Field(ge=0, le=255)]
+    within_s: Annotated[float, Field(gt=0, le=60, allow_inf_nan=False)]
+    errors: dict[str, str] = {}
+    source: Annotated[str, Field(min_length=1)]
 
 
 class WindowTable(Table):
@@ -128,6 +150,7 @@ class WorkedTable(Table):
     words: list[Word] = []
     value: Finite | None = None
     per_phase: Finite | None = None
+    request: list[Word] = []
 
 
 class FactTable(Table):
@@ -195,6 +218,8 @@ class DriveFile(Table):
     unknown: dict[str, str] = {}
     worked: list[WorkedTable] = []
     tune: TuneTable | None = None
+    unlock: UnlockTable | None = None
+    mailbox: MailboxTable | None = None
 
 
 def explained(error: ValidationError, file: str) -> ConfigurationError:

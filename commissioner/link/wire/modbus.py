@@ -74,6 +74,9 @@ class ModbusPort:
         self._connect_timeout_s = connect_timeout_s
         self._url, self._profile = url, profile
         self._exceptions = EXCEPTION_MEANINGS | dict(profile.exceptions)
+        self._own = frozenset(profile.exceptions)
+        """Exceptions that mean what the drive file says: none is waited for because the protocol means busy by its number."""
+        self._waited_for = NOT_CARRIED_OUT - self._own | frozenset(profile.link.busy_exceptions)
         self._device = profile.link.device_id if url.device is None else url.device
         self._client = make_client(url, self._device)
         self._has_exchange = profile.link.has_read_write_multiple
@@ -236,7 +239,7 @@ class ModbusPort:
     # --- trust --------------------------------------------------------------------------------------------------------
     def _trusted(self, ask: Callable[[], Result], needs_proof: bool = True, *, repeats: bool = False) -> Result:
         """`repeats`: it does no harm twice, so that it is asked again where it may have been carried out, too."""
-        waited_for = NOT_CARRIED_OUT | MAY_BE_CARRIED_OUT if repeats else NOT_CARRIED_OUT
+        waited_for = self._waited_for | MAY_BE_CARRIED_OUT - self._own if repeats else self._waited_for
         end = self._clock() + self.reply_timeout_s
         while True:
             if not self._client.connected:
@@ -286,7 +289,8 @@ class ModbusPort:
             self._ask_write_one(echo.address, token)
             self._expect("read the echo register", self._ask_read(echo.address, 1), (token,))
             return
-        by_words = {item.words: item for item in self._profile.items.values() if "r" in item.access}
+        readable = (i for i in self._profile.items.values() if "r" in i.access and i.parameter is None)
+        by_words = {item.words: item for item in readable}
         for item in by_words.values():
             self._ask_read(item.address, item.words)
 

@@ -73,6 +73,8 @@ def _reading(items: Items, item: Item, low: float, high: float) -> str:
 
 
 def _readings(item: Item) -> Iterator[Item]:
+    if item.parameter is not None:
+        return  # the mailbox's answer names its own format
     for kind, order in _OTHER_TYPES.get(item.type, ()):
         opposite = "little" if item.word_order == "big" else "big"
         yield replace(item, type=kind, word_order=opposite if order == "other" else order)

@@ -7,6 +7,7 @@ it. Every look at the status is a request, by which a drive whose watchdog count
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -21,6 +22,7 @@ from commissioner.errors import (
 )
 from commissioner.link.drive.facts import Action, Intent, Journal
 from commissioner.link.drive.items import Items, number
+from commissioner.link.drive.ordinary.unlocking import unlocked
 from commissioner.link.drive.reading import read_status
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.status import DriveState
@@ -125,6 +127,16 @@ class Tuner:
         began = self._clock()
         self._journal(Intent(Action.TUNE, dict.fromkeys(self._tuning.results, "by the drive itself")))
         self._check_no_fault()
+        with self._unlocked():
+            self._go_through_steps()
+        return Tuned(self._results(), self._clock() - began)
+
+    def _unlocked(self) -> AbstractContextManager[None]:
+        """The drive as it is where no step writes: a person at the keypad needs no unlock over the bus."""
+        writes = any(step.do == "write" for step in self._tuning.steps)
+        return unlocked(self._items.port, self.profile) if writes else nullcontext()
+
+    def _go_through_steps(self) -> None:
         error: BaseException | None = None
         try:
             for index, step in enumerate(self._tuning.steps):
@@ -135,7 +147,6 @@ class Tuner:
             raise
         finally:
             self._end(error)
-        return Tuned(self._results(), self._clock() - began)
 
     # --- steps ------------------------------------------------------------------------------------------------------
     def _perform(self, step: Step, index: int) -> None:
