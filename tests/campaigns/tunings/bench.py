@@ -15,7 +15,7 @@ from commissioner.link.wire.port import LinkStats, Words
 from commissioner.run.commission import Commissioned
 from commissioner.run.tuning.tune import Clock, TuneOrder, order_of, tune
 from commissioner.settings import load_motor, load_procedure
-from sim.vendors.drive import Habits, VendorDrive
+from sim.vendors.drive import BUSY, Habits, VendorDrive
 from sim.vendors.face import read_face
 
 REQUEST_S = 0.02
@@ -73,6 +73,18 @@ class VendorPort:
         pass
 
     def _ask(self, pdu: bytes) -> bytes:
+        """As the real port does: a drive that is busy is asked again for as long as a reply may take."""
+        end = self._clock.now() + self.reply_timeout_s
+        while True:
+            reply = self._ask_once(pdu)
+            if not reply[0] & 0x80:
+                return reply
+            if reply[1] not in (BUSY, self._drive.face.busy_code) or self._clock.now() > end:
+                raise RequestRefused(
+                    f"exception {reply[1]}", step="request", value=reply[1], limit="a reply", remedy="see the manual"
+                )
+
+    def _ask_once(self, pdu: bytes) -> bytes:
         self._clock.sleep(REQUEST_S)
         self.stats.requests += 1
         is_lost = self._lost_after is not None and self.stats.requests > self._lost_after
@@ -83,10 +95,6 @@ class VendorPort:
                 "no answer", step="request", value="silence", limit="an answer", remedy="check the cable"
             )
         self.stats.latencies_s.append(REQUEST_S)
-        if reply[0] & 0x80:
-            raise RequestRefused(
-                f"exception {reply[1]}", step="request", value=reply[1], limit="a reply", remedy="see the manual"
-            )
         return reply
 
 

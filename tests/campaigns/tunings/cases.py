@@ -18,6 +18,7 @@ from typing import Any
 from commissioner.link.files.drive_file import known_drives, load_profile
 from sim.vendors.drive import Habits
 from tests.campaigns.tunings.bench import Tried, try_tune
+from tests.support.vendor_process import MADE_UP
 
 SLOW = 4.0
 
@@ -45,6 +46,7 @@ def cases() -> tuple[Case, ...]:
         Case("slow", Habits(tuning_s=20.0), both("commissioned"), ("a tuned set is kept", "at rest")),
         Case("five times", Habits(), both("commissioned"), ("as often as asked", "at rest"), {"repeat": 5, "pause_s": 600.0}),
         Case("values need an Enter", Habits(needs_enter=True), both("commissioned"), ("a tuned set is kept", "at rest")),
+        Case("busy after each write", Habits(busy_s=0.1), both("commissioned"), ("a tuned set is kept", "at rest")),
         Case("the first fails", Habits(("fails",)), bad, ("as before", "at rest", "once")),
         Case("the second fails", Habits(("good", "fails")), bad, ("as before", "at rest")),
         Case("hangs", Habits(("hangs",)), bad, ("as before", "at rest", "once")),
@@ -64,8 +66,8 @@ def cases() -> tuple[Case, ...]:
 
 
 def names() -> list[str]:
-    """Every family whose file can tune."""
-    return [name for name in known_drives() if load_profile(name).tuning is not None]
+    """Every family whose file can tune, and the made-up drives."""
+    return [*(name for name in known_drives() if load_profile(name).tuning is not None), *MADE_UP]
 
 
 def applies(case: Case, name: str) -> bool:

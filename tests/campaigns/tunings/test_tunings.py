@@ -4,6 +4,7 @@ The whole campaign: python -m tests.campaigns.tunings.cases --seeds 4
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -23,7 +24,7 @@ def test_a_tuning_ends_in_the_right_outcome_on_every_family(case, tmp_path):
     wrong = {}
     for name in names():
         if applies(case, name):
-            tried = bench.try_tune(name, tmp_path / name, habits=case.habits, seed=1, **case.more)
+            tried = bench.try_tune(name, tmp_path / Path(name).stem, habits=case.habits, seed=1, **case.more)
             wrong[name] = judge(case, name, tried)
     assert {name: why for name, why in wrong.items() if why} == {}
     assert wrong
@@ -34,13 +35,13 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monke
     for name in names():
         if "restore" not in load_profile(name).capabilities:
             continue
-        tried = bench.try_tune(name, tmp_path / name)
+        tried = bench.try_tune(name, tmp_path / Path(name).stem)
         assert tried.done.ended.outcome == "commissioned", name
         assert "proved: the values outlasted a power-off" in tried.done.result["remarks"]
         assert tried.truth["held"] != tried.before
         clock = tried.person.clock
         monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
-        restoring.restore(find_run(tmp_path / name, "last"), None)
+        restoring.restore(find_run(tmp_path / Path(name).stem, "last"), None)
         assert tried.drive.truth()["held"] == tried.before, name
 
 
