@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from commissioner.errors import RequestRefused
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.modbus import ModbusPort
@@ -55,7 +56,7 @@ def inspect_drive(url: str, profile_name: str, nameplate: Nameplate, plan: Proce
         else:
             checks = judge_idle(_shown(profile, statuses[-1]), plate, nameplate)
         parameters = inverter.snapshot().in_use
-        checks += (*_found(inverter, parameters, nameplate), _answered(port))
+        checks += (*_found(inverter, parameters, nameplate), *_others(inverter), _answered(port))
     watchdog = profile.watchdog
     known = dataclasses.asdict(watchdog) if watchdog else {"none": "the drive file describes none"}
     return Inspection(identity, plate, parameters, known, checks, job, tuple(_not_checked(profile)))
@@ -82,6 +83,18 @@ def _found(inverter: Inverter, held: Mapping[str, float], nameplate: Nameplate) 
             yield CheckResult(f"{name} in the drive", True, seen, f"near {low:.4g} ... {high:.4g}", "")
         else:
             yield CheckResult(error.what, False, error.value, error.limit, error.remedy)
+
+
+def _others(inverter: Inverter) -> Iterator[CheckResult]:
+    """Every other register that an ordinary drive's file describes is there, and what it holds."""
+    if inverter.profile.kind == "commissioning_map":
+        return
+    for name, value in inverter.read_others().items():
+        unit = inverter.profile.item(name).unit
+        is_there = not isinstance(value, RequestRefused)
+        seen = f"{value} {'' if unit == 'raw' else unit}".rstrip() if is_there else str(value)
+        remedy = "" if is_there else "the drive refuses a register of its file: take the file of its model and firmware"
+        yield CheckResult(f"{name} in the drive", is_there, seen, "an answer", remedy)
 
 
 TELLING = ("serial_number", "drive_type", "magic")
