@@ -7,15 +7,25 @@ from contextlib import closing, contextmanager
 
 import pytest
 
-from commissioner.errors import CheckFailed, ConfigurationError, IdentityMismatch, UsageError, WriteBackFailed
+from commissioner.errors import (
+    CheckFailed,
+    ConfigurationError,
+    IdentityMismatch,
+    LinkError,
+    UsageError,
+    WriteBackFailed,
+)
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import DRIVES_FOLDER, build, load_profile
 from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.motor.circuit import InverseGamma
 from commissioner.operations.check import CheckRequest, check
+from commissioner.run.archive.catalogue import find_run
 from commissioner.run.job import names_of
+from commissioner.run.restore import restore
 from commissioner.settings import load_motor
+from tests.campaigns.tunings.bench import try_tune
 from tests.support.libmodbus.drive import LibmodbusDrive, needs_libmodbus
 
 pytestmark = needs_libmodbus
@@ -333,3 +343,52 @@ def test_an_ordinary_drive_is_checked_written_and_restored_over_a_serial_line():
         assert danfoss.write_circuit(NEW, PLATE, found).written
         danfoss.restore(found)
     assert drive.truth["registers"]["1300"] == 36000
+
+
+@pytest.mark.parametrize("code", [5, 6, 11])
+def test_a_busy_drive_is_waited_for_where_it_is_read(code):
+    with (
+        LibmodbusDrive(*YASKAWA, "--busy", f"{code}:3:32") as drive,
+        inverter(drive, load_profile("yaskawa_a1000")) as one,
+    ):
+        assert one.read_status().state == "ready to switch on"
+    assert len([r for r in drive.truth["requests"] if r[1] == 0x20]) == 4
+
+
+def test_a_drive_that_is_busy_where_it_is_written_is_written_once_it_is_free():
+    with LibmodbusDrive(*YASKAWA) as drive, inverter(drive, load_profile("yaskawa_a1000")) as yaskawa:
+        snapshot = yaskawa.snapshot()
+    options = (*YASKAWA, "--busy", f"6:6:{0x900}")
+    with LibmodbusDrive(*options) as drive, inverter(drive, load_profile("yaskawa_a1000")) as yaskawa:
+        yaskawa.write_circuit(NEW, PLATE, snapshot)
+    assert drive.truth["registers"][str(0x312)] == 7400
+    assert len([r for r in drive.truth["requests"] if r[1] == 0x900]) == 7
+
+
+@pytest.mark.parametrize("code", [5, 11])
+def test_a_write_that_may_be_under_way_is_looked_at_and_not_written_again(code):
+    options = (*YASKAWA, "--later", f"{code}:150:{0x312}")
+    with LibmodbusDrive(*options) as drive, inverter(drive, load_profile("yaskawa_a1000")) as yaskawa:
+        report = yaskawa.write_circuit(NEW, PLATE, yaskawa.snapshot())
+    assert [row.read_back for row in report.written] == pytest.approx([7.4])
+    assert len([r for r in drive.truth["requests"] if r[0] == 16 and r[1] == 0x312]) == 1
+
+
+def test_an_answer_from_another_unit_is_named_and_never_taken():
+    with (
+        LibmodbusDrive(*YASKAWA, "--unit", "7") as drive,
+        inverter(drive, load_profile("yaskawa_a1000"), reply_timeout_s=0.2) as yaskawa,
+        pytest.raises(LinkError) as refused,
+    ):
+        yaskawa.read_status()
+    assert "7" in f"{refused.value} {refused.value.value}"
+
+
+def test_restore_waits_as_long_as_the_address_says_and_not_a_time_of_its_own(tmp_path):
+    tried = try_tune("yaskawa_a1000", tmp_path, repeat=1)
+    held, before = (round(1000 * said["stator_resistance"]) for said in (tried.truth["held"], tried.before))
+    with LibmodbusDrive(*YASKAWA, "--set", f"0x312={held}", "--delay", "80") as slow:
+        with pytest.raises(LinkError):
+            restore(find_run(tmp_path, "last"), slow.url, reply_timeout_s=0.03)
+        restore(find_run(tmp_path, "last"), f"{slow.url}?reply=2", reply_timeout_s=0.03)
+    assert held != before and slow.truth["registers"][str(0x312)] == before

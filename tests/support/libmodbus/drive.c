@@ -9,6 +9,8 @@
  *   --coil A=V
  *   --watchdog MS:A:BIT         silence longer than MS sets BIT of register A, for good
  *   --busy CODE:N:A             the first N requests that touch A are answered with exception CODE
+ *   --later CODE:MS:A           a write to A is answered with exception CODE and carried out MS later
+ *   --unit N                    TCP answers come from unit N, whoever was asked
  *   --lose-write A              the first write to A is carried out, its answer lost
  *   --trip-on A:S:BIT           a write to A sets BIT of register S
  *
@@ -35,6 +37,9 @@ static uint16_t staged[WORDS];
 static unsigned char known[WORDS], is_staged[WORDS];
 static int functions[256], any_function = 1, max_read = 125, max_write = 123, delay_ms;
 static int enter[8], enters, busy_code, busy_left, busy_at = -1, lose_at = -1;
+static int later_code, later_ms, later_at = -1, later_address, later_count, unit = -1;
+static double later_s;
+static uint16_t later_words[128];
 static int watchdog_ms, watchdog_at, watchdog_bit, tripped, trip_on = -1, trip_at, trip_bit;
 static int log_of[REQUESTS][3], requests;
 static volatile sig_atomic_t stop;
@@ -98,6 +103,15 @@ static void answer(modbus_t *bus, const uint8_t *request, int length)
     if (requests < REQUESTS) { log_of[requests][0] = p[0]; log_of[requests][1] = address; log_of[requests++][2] = count; }
     if (delay_ms) usleep(1000 * delay_ms);
     int code = judge(p, write, address, count);
+    if (unit >= 0) ((uint8_t *)request)[6] = (uint8_t)unit;
+    if (code == 0 && write && touches(address, count, later_at)) {
+        later_s = now_s() + 1e-3 * later_ms;
+        later_address = address;
+        later_count = count;
+        for (int k = 0; k < count; k++)
+            later_words[k] = (uint16_t)(p[0] == 6 ? number : p[6 + 2 * k] << 8 | p[7 + 2 * k]);
+        code = later_code;
+    }
     if (code > 0) { modbus_reply_exception(bus, request, code); return; }
     if (write) {
         uint16_t before[128];
@@ -133,6 +147,10 @@ static double heard_s;
 
 static void starve(void)
 {
+    if (later_s > 0 && now_s() > later_s) {
+        later_s = 0;
+        for (int k = 0; k < later_count; k++) take(later_address + k, later_words[k]);
+    }
     if (watchdog_ms && heard_s > 0 && now_s() - heard_s > 1e-3 * watchdog_ms) {
         map->tab_registers[watchdog_at] |= (uint16_t)(1 << watchdog_bit);
         tripped = 1;
@@ -209,6 +227,8 @@ int main(int argc, char **argv)
         else if (!strcmp(name, "--delay")) delay_ms = atoi(text);
         else if (!strcmp(name, "--lose-write")) lose_at = atoi(text);
         else if (!strcmp(name, "--watchdog")) sscanf(text, "%d:%d:%d", &watchdog_ms, &watchdog_at, &watchdog_bit);
+        else if (!strcmp(name, "--later")) sscanf(text, "%d:%d:%i", &later_code, &later_ms, &later_at);
+        else if (!strcmp(name, "--unit")) unit = atoi(text);
         else if (!strcmp(name, "--busy")) sscanf(text, "%d:%d:%d", &busy_code, &busy_left, &busy_at);
         else if (!strcmp(name, "--trip-on")) sscanf(text, "%d:%d:%d", &trip_on, &trip_at, &trip_bit);
         else if (!strcmp(name, "--coil")) { int a, v; sscanf(text, "%d=%d", &a, &v); map->tab_bits[a] = (uint8_t)v; }
