@@ -17,6 +17,7 @@ TUNINGS = ("good", "fails", "hangs", "keypad", "turns", "wrong")
 """How a tuning goes: as it should; reports a failure; never ends; is ended at the keypad; turns the shaft; finds nonsense."""
 REST, READY, ON, ENABLED, TRIP = 0x40, 0x21, 0x23, 0x27, 0x08
 STORE_S, RECOMPUTE_S = 0.4, 0.3
+"""From a store or a plate written over the bus until the memory is written, until the circuit is computed anew."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class VendorDrive:
         self.turned = self.was_energised_s = 0.0
         self.is_local = self.habits.is_local
         self._heard_s = self._seen_s = clock()
-        self._store_until = self._busy_until = 0.0
+        self._store_until = self._busy_until = self._compute_at = 0.0
         self.is_locked = bool(face.unlocks)
         self.mailbox: Mailbox | None = None
         if face.mailbox is not None:
@@ -123,10 +124,13 @@ class VendorDrive:
     def set_plate(self, **plate: float) -> None:
         """Typed at the keypad: the drive computes its circuit anew from its own table."""
         self.motor.plate |= plate
+        for name, value in plate.items():
+            self._put(self.face.cells[name], value)
+        self._compute_circuit()
+
+    def _compute_circuit(self) -> None:
         for cell in self.face.cells.values():
-            if cell.name in plate:
-                self._put(cell, plate[cell.name])
-            elif cell.name in self._results():
+            if cell.name in self._results():
                 self._put(cell, 1.3 * self.motor.true(cell))
 
     def power_cycle(self) -> None:
@@ -244,6 +248,9 @@ class VendorDrive:
             self.words |= new
         if self.face.store_coil is not None and self.coils[self.face.store_coil]:
             self.stored |= new
+        if cell.name in self.motor.plate:
+            self.motor.plate[cell.name] = cell.to_value(words)
+            self._compute_at = self._clock() + RECOMPUTE_S
         return 0
 
     # --- states -------------------------------------------------------------------------------------------------------
@@ -301,6 +308,9 @@ class VendorDrive:
             self.state = TRIP
         if self.face.store_done is not None and self._store_until and now >= self._store_until:
             self.words[self.face.store_done[0]] = self.face.store_done[1]
+        if self._compute_at and now >= self._compute_at:
+            self._compute_at = 0.0
+            self._compute_circuit()
         running = next((t for t in self.tunings if t.end == "running"), None)
         if running is not None:
             self._go_on(running, now - running.began_s)

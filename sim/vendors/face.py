@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ class Cell:
         words = list(struct.unpack(f">{self.width}H", packed))
         return words[::-1] if self.is_low_word_first else words
 
-    def to_value(self, words: list[int]) -> float:
+    def to_value(self, words: Sequence[int]) -> float:
         ordered = words[::-1] if self.is_low_word_first else words
         raw = struct.unpack(">" + self.code, struct.pack(f">{self.width}H", *ordered))[0]
         return float(raw) * self.scale

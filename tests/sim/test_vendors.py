@@ -86,6 +86,17 @@ def test_a_plate_typed_in_makes_it_compute_its_circuit_anew():
     assert drive.value("stator_resistance") != before
 
 
+def test_a_plate_written_over_the_bus_makes_it_compute_its_circuit_anew_a_moment_later():
+    drive, clock = drive_of(LOCKED)
+    before = drive.value("stator_resistance")
+    write(drive, 0x4001, 0x55AA)
+    write(drive, 9630, 600, 0)
+    assert drive.value("rated_current_a") == 6.0 and drive.value("stator_resistance") == before
+    clock.t += 0.5
+    read(drive, 9642)
+    assert drive.value("stator_resistance") != before
+
+
 def test_half_a_value_of_two_registers_is_not_taken():
     drive, _ = drive_of("danfoss_fc302")
     assert write(drive, 1299, 5)[1] == BAD_VALUE

@@ -1,10 +1,12 @@
 """Drives whose parameters stand behind a mailbox, or are locked: checked, written, switched off and on, restored over TCP."""
 
+import time
 from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 
 import pytest
 
-from commissioner.errors import LinkError, RequestRefused, WriteBackFailed
+from commissioner.errors import IdentityMismatch, LinkError, RequestRefused, WriteBackFailed
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.drive.ordinary.mailbox import MailboxPort
 from commissioner.link.drive.ordinary.unlocking import unlocked
@@ -62,13 +64,26 @@ def test_a_shipped_family_is_asked_through_its_mailbox_by_check():
 
 
 def test_a_locked_drive_whose_file_knows_no_unlock_is_found_out_and_nothing_is_claimed():
-    from dataclasses import replace
-
     with Vendor(LOCKED) as drive, closing(open_port(parse_url(drive.url), load_profile(LOCKED))) as port:
         made_up = Inverter(port, replace(load_profile(LOCKED), unlock=None))
         with pytest.raises(WriteBackFailed):
             made_up.write_circuit(NEW, PLATE, made_up.snapshot())
     assert drive.truth["held"] == drive.truth["stored"]
+
+
+def test_a_circuit_that_the_drive_computed_anew_after_a_new_plate_is_not_written_over_unseen():
+    with Vendor(LOCKED) as drive, closing(open_port(parse_url(drive.url), load_profile(LOCKED))) as port:
+        made_up = Inverter(port, load_profile(LOCKED))
+        found = made_up.snapshot()
+        with unlocked(port, load_profile(LOCKED)):
+            port.write(9630, [600, 0])
+        with pytest.raises(IdentityMismatch, match="rated_current_a in the drive is not the one of the snapshot"):
+            made_up.restore(found)
+        time.sleep(0.4)
+        anew = made_up.snapshot()
+        assert anew.in_use["stator_resistance"] != found.in_use["stator_resistance"]
+        made_up.write_circuit(NEW, PLATE, anew)
+    assert drive.truth["held"]["stator_resistance"] == pytest.approx(7.4, rel=1e-4)
 
 
 class Recorded:
