@@ -86,9 +86,13 @@ def _decoded(data: bytes) -> str:
     return data.decode("utf-8" if data.isascii() else "latin-1")
 
 
-def _configuration(text: str, path: Path) -> _Configuration:
+def _rows_of(text: str) -> list[list[str]]:
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines())]
-    lines = iter([row for row in rows if row])
+    return [row for row in rows if row]
+
+
+def _configuration(text: str, path: Path) -> _Configuration:
+    lines = iter(_rows_of(text))
     try:
         next(lines)
         counts = next(lines)
@@ -110,7 +114,7 @@ def _configuration(text: str, path: Path) -> _Configuration:
         if len(set(rates)) > 1 or data_type not in (*_SAMPLES, "ASCII"):
             raise ValueError(f"rates of {rates[:5]} Hz, {data_type} data")
     except (ValueError, IndexError, StopIteration, csv.Error) as error:
-        Stretch(memoryview(b""), path, _FORM).refuse(f"configuration: {error or 'cut short'}")
+        Stretch(memoryview(b""), path, _FORM).refuse(f"configuration: {str(error) or _cut_short(_rows_of(text))}")
     return _Configuration(found, status, rates[0], data_type, factor)
 
 
@@ -119,6 +123,12 @@ def _channel(row: list[str]) -> _Channel:
     primary, secondary = (float(row[k] or 1) for k in (10, 11)) if len(row) > 12 else (1.0, 1.0)
     is_secondary = len(row) > 12 and row[12].upper() == "S" and secondary != 0
     return _Channel(row[1], row[2], row[4], float(row[5]), float(row[6]), primary / secondary if is_secondary else 1.0)
+
+
+def _cut_short(lines: list[list[str]]) -> str:
+    """Where a configuration ends, and what it had promised."""
+    promised = f", where the second promises {', '.join(lines[1])} channels" if len(lines) > 1 else ""
+    return f"cut short after line {len(lines)}{promised}"
 
 
 def _samples(configuration: _Configuration, data: Stretch) -> tuple[Signal, Signal]:

@@ -198,3 +198,16 @@ def test_standstill_tables_between_semicolons_or_tabs_are_the_same_table(tmp_pat
     for name, values in wanted.columns.items():
         np.testing.assert_array_equal(seen.columns[name], values)
     assert dict(seen.metadata) == dict(wanted.metadata)
+
+
+@pytest.mark.parametrize("lines", [2, 3, 5])
+def test_a_comtrade_that_ends_early_says_where_and_what_it_promised(tmp_path, lines):
+    whole = ["station,device,1999", "3,3A,0D", *(f"{k},i{k},{k},,A,0.001,0,0,-32767,32767,1,1,P" for k in (1, 2, 3))]
+    (tmp_path / "x.cfg").write_text("\n".join(whole[:lines]) + "\n")
+    (tmp_path / "x.dat").write_bytes(b"")
+    with pytest.raises(DataRefused) as refused:
+        contract_table(tmp_path / "x.cfg")
+    assert (
+        refused.value.value
+        == f"configuration: cut short after line {lines}, where the second promises 3, 3A, 0D channels"
+    )
