@@ -345,7 +345,7 @@ def test_an_ordinary_drive_is_checked_written_and_restored_over_a_serial_line():
     assert drive.truth["registers"]["1300"] == 36000
 
 
-@pytest.mark.parametrize("code", [5, 6, 11])
+@pytest.mark.parametrize("code", [5, 6, 10, 11])
 def test_a_busy_drive_is_waited_for_where_it_is_read(code):
     with (
         LibmodbusDrive(*YASKAWA, "--busy", f"{code}:3:32") as drive,
