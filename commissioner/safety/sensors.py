@@ -53,7 +53,7 @@ class SensorWatch:
 
     def claim(self, status: DriveStatus) -> None:
         """The drive says how large its newest sample's largest phase current is."""
-        if status.is_energised and status.samples_produced > 0 and math.isfinite(status.current_magnitude_a):
+        if status.is_energised and math.isfinite(status.current_magnitude_a):
             self._claimed = (status.samples_produced - 1, status.current_magnitude_a)
 
     def judge(self, block: SampleBlock) -> StopReason | None:
@@ -131,7 +131,7 @@ def _culprit(current: Signal, cosines: Signal) -> str:
     for phase in range(3):
         others = [k for k in range(3) if k != phase]
         c, i = cosines[others], current[others]
-        along = c @ i / max(float(c @ c), 1e-12)
+        along = c @ i / float(c @ c)
         left.append(float(np.mean(np.square(i - np.outer(c, along)))))
     best = int(np.argmin(left))
     tied = [NAMES[k] for k in range(3) if left[k] <= 1.5 * left[best]]

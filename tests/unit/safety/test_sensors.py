@@ -1,13 +1,13 @@
 """Current sensors that lie are found by what they break: the axis' pattern, their own movement, the drive's magnitude."""
 
 import math
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 
 from commissioner.records import SampleBlock
-from commissioner.safety.sensors import MISFIT, SCALE, SCALE_FLOOR, WINDOW_S, ZERO_S, SensorWatch
+from commissioner.safety.sensors import MISFIT, WINDOW_S, ZERO_S, SensorWatch, _culprit, _misfit, _Zero
 from tests.unit.safety.test_watch import STATUS
 
 PERIOD_S, LIMIT_A, ROWS = 2e-4, 10.0, 50
@@ -15,12 +15,14 @@ RNG = np.random.default_rng(3)
 NOISE = RNG.normal(0.0, 0.003, (3, 40_000))
 
 
-def blocks(axis_deg=0.0, peak_a=4.0, damage=lambda phases, start: phases, phases=3, offset=(0.02, -0.03, 0.01)):
-    """Zero volts for a little longer than ZERO_S, then a ramp with a tone on it, block by block."""
+def blocks(
+    axis_deg=0.0, peak_a=4.0, damage=lambda phases, start: phases, phases=3, offset=(0.02, -0.03, 0.01), rest=300
+):
+    """Zero volts for `rest` samples, at first a little longer than ZERO_S, then a ramp with a tone on it, block by block."""
     for number in range(14):
         start = number * ROWS
         time_s = (start + np.arange(ROWS)) * PERIOD_S
-        voltage = np.where(time_s < ZERO_S + 0.01, 0.0, 20.0 + 10.0 * np.sin(200.0 * time_s))
+        voltage = np.where(start + np.arange(ROWS) < rest, 0.0, 20.0 + 10.0 * np.sin(200.0 * time_s))
         axis = peak_a / 30.0 * voltage
         angles = np.deg2rad(axis_deg) - 2.0 * np.pi / 3.0 * np.arange(3)
         seen = np.cos(angles)[:, None] * axis + NOISE[:, start : start + ROWS] + np.array(offset)[:, None]
@@ -98,13 +100,73 @@ def test_two_sensors_alone_cannot_accuse_each_other():
     assert "phase u or v does not follow" in reason.what
 
 
-def test_nothing_is_judged_before_a_window_is_full():
-    watch, judged = SensorWatch(LIMIT_A), 0
-    for block in blocks(damage=of_phase(0, lambda i: -3.0 * i)):
-        if watch.judge(block) is not None:
-            break
-        judged += 1
-    assert judged * ROWS * PERIOD_S >= ZERO_S + WINDOW_S - ROWS * PERIOD_S
+def believed(**how):
+    """Blocks before the first reason."""
+    watch = SensorWatch(LIMIT_A)
+    reasons = [watch.judge(block) is not None for block in blocks(damage=of_phase(0, lambda i: -3.0 * i), **how)]
+    return reasons.index(True) if True in reasons else None
+
+
+def test_the_first_window_is_judged_that_follows_the_rest_and_is_full():
+    """Five blocks are ZERO_S, four are WINDOW_S: the sixth to the ninth are the first window."""
+    assert pytest.approx((ZERO_S, WINDOW_S)) == (5 * ROWS * PERIOD_S, 4 * ROWS * PERIOD_S)
+    assert believed() == 8
+
+
+@pytest.mark.parametrize(("rest", "judged"), [(75, 5), (2, 4), (1, None), (0, None)])
+def test_a_rest_that_is_cut_short_is_used_where_it_has_two_samples(rest, judged):
+    assert believed(rest=rest) == judged
+
+
+def test_what_was_learnt_at_rest_stays():
+    with pytest.raises(FrozenInstanceError):
+        _Zero(np.zeros(3), np.zeros(3)).noise_a = np.ones(3)
+
+
+# --- one window, in closed form ---------------------------------------------------------------------------------------
+ACROSS = 90.0
+"""Degrees at which phase u carries nothing, and v and w the same."""
+
+
+def window(current, voltage=(20.0, 30.0), *, axis_deg=ACROSS, noise_a=0.1):
+    """Of two samples, each phase's current the same in both where one number is given."""
+    seen = np.array([np.broadcast_to(phase, 2) for phase in current], dtype=float)
+    return _misfit(seen, np.array(voltage), _Zero(np.zeros(len(seen)), np.full(len(seen), noise_a)), axis_deg)
+
+
+@pytest.mark.parametrize(("u", "is_seen"), [(0.59, False), (0.61, True)])
+def test_what_six_standard_deviations_of_noise_make_is_no_lie(u, is_seen):
+    """Nothing flows along the axis: what phase u shows is all beside it."""
+    assert (window(([u, -u], 0.0, 0.0), noise_a=0.1) is not None) is is_seen
+
+
+@pytest.mark.parametrize(("u", "is_seen"), [(1.0, False), (1.1, True)])
+def test_noise_and_misfit_add(u, is_seen):
+    """Along the axis 4 / cos 30 deg flow: 0.12 of that and six times 0.08 are 1.034."""
+    assert (window(([u, -u], [4.0, 4.1], [-4.0, -4.1]), noise_a=0.08) is not None) is is_seen
+
+
+@pytest.mark.parametrize(("moves_v", "is_seen"), [(0.0, False), (1.0, False), (2.2, False), (3.0, True)])
+def test_a_phase_may_stand_still_while_the_voltage_does(moves_v, is_seen):
+    found = window((0.0, 4.0, -4.0), (20.0, 20.0 + moves_v))
+    assert (found is not None) is is_seen
+    assert not is_seen or "phase v and w stands still" in found.what
+
+
+def test_a_phase_may_stand_still_where_no_current_flows():
+    assert window((0.0, 0.0, 0.0)) is None
+
+
+def test_a_phase_of_two_sensors_that_stands_still_is_named():
+    assert "phase v stands still" in window(([0.0, 0.1], 4.0)).what
+
+
+@pytest.mark.parametrize(("ratio", "names"), [(1.4, "u or v"), (2.0, "v")])
+def test_two_phases_that_are_as_likely_are_both_named(ratio, names):
+    """Errors x of u and y of v along 0 deg leave 0.5 y^2 without u, 0.2 x^2 without v, (x / 2 + y)^2 / 1.25 without w."""
+    x, y = 1.0, np.sqrt(ratio * 0.2 / 0.5)
+    current = np.array([[1.0 + x], [-0.5 + y], [-0.5]])
+    assert _culprit(current, np.array([1.0, -0.5, -0.5])) == names
 
 
 def test_offsets_are_no_currents():
@@ -152,20 +214,27 @@ def test_the_same_sample_is_compared():
     assert claimed(a_block(), 2.0, 104)[1] is not None
 
 
-@pytest.mark.parametrize("w", [True, False])
-def test_the_third_phase_follows_from_the_sum(w):
-    block = a_block(w=w)
-    block = replace(block, current_u_a=-0.5 * block.current_u_a, current_v_a=block.current_v_a)
-    three = np.max(np.abs([block.current_u_a[3], block.current_v_a[3], -(block.current_u_a[3] + block.current_v_a[3])]))
-    assert w or claimed(block, float(three), 104)[1] is None
+def test_of_two_sensors_the_third_phase_follows_from_the_sum():
+    block = a_block(w=False)
+    block = replace(block, current_u_a=0.5 * block.current_u_a, current_v_a=-0.5 * block.current_v_a)
+    assert claimed(block, 3.0, 104)[1] is None
+    assert claimed(block, 2.0, 104)[1] is not None
 
 
+def test_of_three_sensors_the_largest_is_compared_whatever_their_sum():
+    block = a_block()
+    block = replace(block, current_v_a=block.current_u_a, current_w_a=block.current_u_a)
+    assert claimed(block, 4.0, 104)[1] is None
+
+
+@pytest.mark.parametrize(("w", "floor"), [(True, 0.004), (False, 0.012)])
 @pytest.mark.parametrize(("off", "passes"), [(-1e-6, True), (1e-6, False)])
-def test_the_allowed_difference_is_a_tenth_of_the_larger_and_a_floor(off, passes):
-    larger = (4.0 + SCALE_FLOOR * LIMIT_A) / (1.0 - SCALE) + off
-    assert (claimed(a_block(), larger, 104)[1] is None) is passes
-    smaller = 4.0 * (1.0 - SCALE) - SCALE_FLOOR * LIMIT_A - off
-    assert (claimed(a_block(), smaller, 104)[1] is None) is passes
+def test_the_allowed_difference_is_a_tenth_of_the_larger_and_a_floor(off, passes, w, floor):
+    """Three times the floor where a third current is the sum of two."""
+    larger = (4.0 + floor * LIMIT_A) / 0.9 + off
+    assert (claimed(a_block(w=w), larger, 104)[1] is None) is passes
+    smaller = 4.0 * 0.9 - floor * LIMIT_A - off
+    assert (claimed(a_block(w=w), smaller, 104)[1] is None) is passes
 
 
 def test_a_claim_waits_for_its_sample_and_one_that_is_gone_is_dropped():
