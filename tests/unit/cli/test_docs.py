@@ -92,9 +92,10 @@ def test_every_address_in_an_example_is_quoted():
         assert not re.findall(r"--drive (?!\")\w+://", text), page
 
 
-def test_the_picture_of_the_report_is_there():
-    (picture,) = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
-    assert (ROOT / picture).read_bytes().startswith(b"\x89PNG")
+def test_the_pictures_of_report_and_page_are_there():
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README)
+    assert [Path(picture).stem for picture in pictures] == ["report", "live"]
+    assert all((ROOT / picture).read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
 
 def test_docs_gives_a_chapter_as_one_document(capsys):
