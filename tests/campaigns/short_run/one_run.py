@@ -119,10 +119,10 @@ class AnswerWatch:
         self._patches.close()
 
     def _noting(self, put: Callable[..., None]) -> Callable[..., None]:
-        def noted(handler: Handler, data: bytes) -> None:
+        def noted(handler: Handler, data: bytes, begin: float) -> None:
             was_stalled = time.monotonic() - handler.line.drive.stalled_until < AFTER_STALL_S
             self._is_sound = not (handler.hits or was_stalled)
-            put(handler, data)
+            put(handler, data, begin)
 
         return noted
 
