@@ -572,7 +572,9 @@ def runs_pull(
 @runs_app.command("diagnose")
 def runs_diagnose(
     run: Run = "last",
-    seconds: Annotated[float, typer.Option(min=0.0, help="Given up, unfinished, after so long.")] = 600.0,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="Given up, unfinished, after so long; 600 if not given.")
+    ] = None,
     seal: Seal = None,
     runs: Runs = RUNS,
     json: Json = False,

@@ -3,7 +3,6 @@ it is ready. It takes processor time that nobody else wants."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -21,10 +20,6 @@ if TYPE_CHECKING:
 DIAGNOSIS_S = 600.0
 """Four tests with five causes in them take 40 s on two quiet cores, three minutes behind other work; then it is given up, wherever it is."""
 LOOK_S, END_S = 0.05, 5.0
-NICER = 10
-"""Steps of POSIX's nice value."""
-BELOW_NORMAL_PRIORITY_CLASS = 0x4000
-"""Of the Win32 call CreateProcess."""
 
 
 def begin_diagnosis(folder: Path, seconds: float, seal: Path | None) -> subprocess.Popen[bytes]:
@@ -34,8 +29,6 @@ def begin_diagnosis(folder: Path, seconds: float, seal: Path | None) -> subproce
         "--seconds", f"{seconds:g}", "--json", *(["--seal", str(seal.absolute())] if seal is not None else []),
     ]  # fmt: skip
     flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) | getattr(subprocess, "CREATE_NO_WINDOW", 0)
-    if sys.platform == "win32":
-        flags |= BELOW_NORMAL_PRIORITY_CLASS
     return subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         creationflags=flags,
@@ -58,10 +51,3 @@ def diagnose_archived(runs: Path, run: str, seconds: float = DIAGNOSIS_S, key: b
     from commissioner.run.diagnosed import diagnose_run
 
     return diagnose_run(find_folder(runs, run), seconds, key)
-
-
-def step_back() -> None:
-    """Let every other program of this computer go first, where the system allows it."""
-    if sys.platform != "win32":
-        with suppress(OSError):
-            os.nice(NICER)

@@ -45,20 +45,21 @@ class Handler(ServerRequestHandler):
             return
         self.heard_until = max(self.loop.time(), self.heard_until) + pace.bytes_s(len(data))
         silence_s = 2.0 * pace.silence_s if self.said_until < self.loop.time() else pace.silence_s
-        self._at(self.heard_until + max(silence_s, pace.turnaround_s), self.turn, data)
+        turns_at = self.heard_until + max(silence_s, pace.turnaround_s)
+        self._at(turns_at, self.turn, data, turns_at)
 
     def turn(self, data: bytes, at: float) -> None:
         """The slave begins its answer; what its own computing takes is hidden behind the bytes that go out."""
         self.turned_at = at
         self.hear(data)
 
-    def _at(self, when: float, do: Callable[[bytes, float], None], data: bytes) -> None:
+    def _at(self, when: float, do: Callable[..., None], *arguments: Any) -> None:
         """To the tenth of a millisecond: a loop of asyncio alone may be one late."""
-        self.loop.call_at(when - LOOP_LATE_S, self._sleep_until, when, do, data)
+        self.loop.call_at(when - LOOP_LATE_S, self._sleep_until, when, do, arguments)
 
-    def _sleep_until(self, when: float, do: Callable[[bytes, float], None], data: bytes) -> None:
+    def _sleep_until(self, when: float, do: Callable[..., None], arguments: tuple[Any, ...]) -> None:
         time.sleep(max(0.0, when - self.loop.time()))
-        do(data, when)
+        do(*arguments)
 
     def hear(self, data: bytes) -> None:
         if self.is_deaf:
@@ -156,7 +157,7 @@ class Handler(ServerRequestHandler):
         self.said_until = max(begin, self.said_until) + pace.bytes_s(len(data))
         self._at(self.said_until, self._write, data)
 
-    def _write(self, data: bytes, _at: float = 0.0) -> None:
+    def _write(self, data: bytes) -> None:
         if self.transport and not self.transport.is_closing():
             self.transport.write(data)
 

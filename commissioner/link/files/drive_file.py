@@ -51,20 +51,8 @@ from commissioner.registers.worked import check_worked
 from commissioner.settings import read_toml
 
 AS_WRITTEN = {
-    *(
-        "type",
-        "length",
-        "scale",
-        "unit",
-        "convention",
-        "quantity",
-        "access",
-        "needs_stop",
-        "source",
-        "parameter",
-        "index",
-    )
-}
+    "type", "length", "scale", "unit", "convention", "quantity", "access", "needs_stop", "source", "parameter", "index",
+}  # fmt: skip
 """Keys of an item's table that say the same in the profile."""
 DRIVES_FOLDER = Path(commissioner.__file__).resolve().parent.parent / "config" / "drives"
 

@@ -18,6 +18,7 @@ from commissioner.run.archive.seal import CLOSED
 from commissioner.run.archive.summary import NAMED
 from commissioner.run.index.results import has_result, result_of
 from commissioner.run.index.rows import Row
+from commissioner.run.index.years import rows_of
 
 JUDGED_AGAINST = 5
 """Newest accepted results of a motor that a run is compared with at most."""
@@ -71,7 +72,7 @@ def list_motors(archive: Archive) -> tuple[Motor, ...]:
 
 def runs_of(archive: Archive, motor: str) -> tuple[Row, ...]:
     """A motor's runs, newest first, by tag or serial number as they were given. UsageError: there is none."""
-    rows = [row for row in find_runs(archive, Wanted(motor=motor)).rows if motor in (row.motor, row.motor_serial)]
+    rows = rows_of(archive.runs, motor, archive.database)
     if not rows:
         known = [found.motor for found in list_motors(archive) if found.motor]
         raise UsageError(

@@ -12,7 +12,7 @@ from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.summary import RunSummary, summary_of
 from commissioner.run.index.index import find
 from commissioner.run.index.results import has_result, result_of
-from commissioner.run.index.rows import Wanted
+from commissioner.run.index.rows import Row, Wanted
 
 
 def over_years(folder: Path) -> Trends | None:
@@ -38,11 +38,17 @@ def seconds(utc: str) -> float:
         return 0.0
 
 
+def rows_of(root: Path, motor: str, database: str | None = None) -> list[Row]:
+    """A motor's runs, newest first, by tag or serial number as they were given."""
+    rows = find(root, Wanted(motor=motor), database).rows
+    return [row for row in rows if motor in (row.motor, row.motor_serial)]
+
+
 def _earlier(root: Path, newest: RunSummary) -> list[RunSummary]:
     """In order of time."""
     found = []
-    for row in reversed(find(root, Wanted(motor=newest.motor_id)).rows):
-        if newest.motor_id not in (row.motor, row.motor_serial) or row.run == newest.run:
+    for row in reversed(rows_of(root, newest.motor_id)):
+        if row.run == newest.run:
             continue
         try:
             summary = read_run(Path(row.folder))

@@ -3,7 +3,8 @@
 ready: process start to the first answer. paint: first contentful paint of the start page and of a result. viewers: CPU of the
 service over one live run with so many pages and scripts watching, the largest delay of a record, records and blocks missed.
 memory: resident size of the service after each of N runs, then over `--hours` of motor time of runs that a simulated one's journal
-and blocks are played from, as a run of another process writes them, each looked at as a page and as a result. overhead: service and run together against `commissioner run`.
+and blocks are played from, as a run of another process writes them, each looked at as a page and as a result.
+overhead: service and run together, a page at the run, against `commissioner run`.
 """
 
 from __future__ import annotations

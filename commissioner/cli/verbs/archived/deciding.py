@@ -9,6 +9,7 @@ from commissioner.errors import DataRefused
 from commissioner.operations import archive, closing, write
 from commissioner.records import drive_words
 from commissioner.run.archive.seal import read_key
+from commissioner.run.holding.priority import lower_priority
 from commissioner.run.write_accepted import Plan, as_document
 
 
@@ -85,11 +86,12 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
     screen.out.print(screen.table("", header, rows, right=(2, 3)))
 
 
-def diagnose_run(runs: Path, run: str, seconds: float, *, seal: Path | None, as_json: bool) -> None:
+def diagnose_run(runs: Path, run: str, seconds: float | None, *, seal: Path | None, as_json: bool) -> None:
     """The closing diagnosis of a run; every other program of this computer goes first."""
-    closing.step_back()
+    lower_priority()
+    allowed_s = closing.DIAGNOSIS_S if seconds is None else seconds
     with screen.busy("diagnosing the samples"):
-        result = closing.diagnose_archived(runs, run, seconds, read_key(seal) if seal is not None else None)
+        result = closing.diagnose_archived(runs, run, allowed_s, read_key(seal) if seal is not None else None)
     if as_json:
         screen.emit(result)
     else:
