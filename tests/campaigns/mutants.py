@@ -50,11 +50,6 @@ EXPLAINED = {
         "commissioner.safety.limits",
         "limits = zip(fields(circuit), circuit.as_tuple(), box.lower.as_tuple(),",
     ): "strict or not: four fields, four values, four limits",
-    ("commissioner.safety.sensors", "_Zero | None -> _Zero & None"): "an annotation: never evaluated",
-    (
-        "commissioner.safety.sensors",
-        "tuple[int, float] | None -> tuple[int, float] & None",
-    ): "an annotation: never evaluated",
     ("commissioner.safety.sensors", "+ floor_a -> abs(shown - claimed) <"): ROUNDED,
     ("commissioner.safety.sensors", "<= allowed -> float(np.max(rest)) < allowed"): ROUNDED,
     ("commissioner.safety.sensors", "np.abs(cosines) > LEAST_SHARE -> np.abs(cosines) >= LEAST_SHARE"): ROUNDED,
@@ -158,7 +153,10 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
 
 def _is_type(node: ast.BinOp) -> bool:
     """`X | None` or `float | str` of an annotation, which nothing evaluates."""
-    return isinstance(node.op, ast.BitOr) and isinstance(node.left, ast.Name) and node.left.id in ANNOTATED
+    if not isinstance(node.op, ast.BitOr):
+        return False
+    optional = isinstance(node.right, ast.Constant) and node.right.value is None
+    return optional or (isinstance(node.left, ast.Name) and node.left.id in ANNOTATED)
 
 
 ANNOTATED = frozenset({"float", "Refusal", "SetDriveLimits", "LoadExcitation", "StopReason"})
