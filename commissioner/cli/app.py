@@ -11,23 +11,27 @@ import typer
 from commissioner.cli.console import degrade_output
 from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.help import Verbs, only
 from commissioner.cli.recordings import Map, recordings_app
 
 app = typer.Typer(
     name="commissioner",
+    cls=Verbs,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
     help="Commission an induction motor at standstill: identify it through its drive, judge the result, write it back.",
 )
 runs_app = typer.Typer(
-    no_args_is_help=True, help="The archive of runs: list, find, show, compare, motors, trend, report, export."
+    cls=Verbs,
+    no_args_is_help=True,
+    help="The archive of runs: list, find, show, compare, motors, trend, report, export.",
 )
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
 app.add_typer(recordings_app, name="recordings")
-accounts_app = typer.Typer(no_args_is_help=True, help="The service's accounts: add, list, remove.")
+accounts_app = typer.Typer(cls=Verbs, no_args_is_help=True, help="The service's accounts: add, list, remove.")
 app.add_typer(accounts_app, name="accounts")
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
@@ -722,4 +726,4 @@ def accounts_remove(
 def main() -> None:
     """Entry point of the console script."""
     degrade_output()
-    run_to_exit(app, sys.argv[1:])
+    run_to_exit(only(app, sys.argv[1:]), sys.argv[1:])

@@ -7,10 +7,14 @@ from typing import Annotated
 
 import typer
 
+from commissioner.cli.help import Verbs
+
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 
 drives_app = typer.Typer(
-    no_args_is_help=True, help="Drive files: list, show, validate; conformance of firmware to the commissioning map."
+    cls=Verbs,
+    no_args_is_help=True,
+    help="Drive files: list, show, validate; conformance of firmware to the commissioning map.",
 )
 
 

@@ -18,7 +18,7 @@ from commissioner.link.wire.secrets import Secrets, shown_call
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 NO_ARGUMENTS = "NoArgsIsHelpError"
-"""How the command line's library leaves a call without arguments, once it has printed the help."""
+"""How the command line's library leaves a call without arguments: its message is the help."""
 INTERRUPTED = 130
 """What typer makes of a KeyboardInterrupt."""
 
@@ -53,6 +53,7 @@ def _carried_out(
         sys.exit(stop.exit_code)
     except TyperException as usage:
         if type(usage).__name__ == NO_ARGUMENTS:
+            typer.echo(usage.message)
             sys.exit(0)
         error = _usage(usage, arguments)
         if not as_json and hasattr(usage, "show") and hide(error.what) == error.what:

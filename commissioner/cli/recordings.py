@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from commissioner.cli.help import Verbs
+
 recordings_app = typer.Typer(
-    no_args_is_help=True, help="Recordings from other instruments: see what is understood, convert."
+    cls=Verbs, no_args_is_help=True, help="Recordings from other instruments: see what is understood, convert."
 )
 MOST_STATES = 12
 Map = Annotated[

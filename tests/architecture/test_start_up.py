@@ -15,6 +15,7 @@ HEAVY = (
     "matplotlib",
     "pyarrow",
     "pymodbus",
+    "pydantic",
     "sqlalchemy",
     "alembic",
     "jinja2",

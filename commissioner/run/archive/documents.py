@@ -6,12 +6,14 @@ import json
 import os
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-from pydantic import TypeAdapter, ValidationError
+from typing import TYPE_CHECKING, Any
 
 from commissioner.errors import CommissionerError, DataRefused
-from commissioner.report.run.contract import RunDocument
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+    from commissioner.report.run.contract import RunDocument
 
 
 def read_document(text: str) -> dict[str, Any]:
@@ -40,6 +42,8 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     what is not there, or null, may be an older version's."""
     if not (folder / "result.json").is_file():
         return None
+    from pydantic import ValidationError  # late: a list of runs reads no result
+
     document = read_saved(folder, "result.json")
     try:
         _promised().validate_python(document, strict=True)
@@ -54,6 +58,10 @@ def read_result(folder: Path) -> dict[str, Any] | None:
 
 @cache
 def _promised() -> TypeAdapter[RunDocument]:
+    from pydantic import TypeAdapter
+
+    from commissioner.report.run.contract import RunDocument
+
     return TypeAdapter(RunDocument)
 
 
