@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +37,16 @@ kernel: Any = njit(**FAST)
 """Cached beside its file; other threads run meanwhile."""
 inlined: Any = njit(inline="always", **FAST)
 """A part of a kernel too small to be called."""
+
+
+@cache
+def threads() -> ThreadPoolExecutor:
+    """Of this process, for kernels on a part of the data each: a core each, at most four, which hold so many parts in memory at once."""
+    return ThreadPoolExecutor(min(int(numba.get_num_threads()), 4))
+
+
+if hasattr(os, "register_at_fork"):  # they stay behind in the parent
+    os.register_at_fork(after_in_child=threads.cache_clear)
 
 
 def writable(signal: ArrayLike) -> NDArray[np.float64]:

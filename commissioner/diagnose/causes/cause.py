@@ -221,6 +221,11 @@ class Cause:
         has_right_sign = not self.sign or not sizes or has_own_sign or next(iter(sizes.values()))[0] * self.sign > 0
         return has_right_sign and self.is_possible(sizes, model, setting)
 
+    def promises_its_sign(self, setting: Setting, values: Numbers) -> bool:
+        """Whether the sizes of these numbers, a step that no fit has made yet, have the sign that physics demands."""
+        sizes = self.sizes(setting, values)
+        return not self.sign or not sizes or next(iter(sizes.values()))[0] * self.sign > 0
+
     def is_possible(self, sizes: Sizes, model: Model, setting: Setting) -> bool:
         """Whether a cause of these sizes exists."""
         return True

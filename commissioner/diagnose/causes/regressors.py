@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,6 +181,13 @@ def power_of(record: Record, segment: Segment) -> Array:
 
 def behind_lag(powers: Sequence[Array], period_s: float, lag_s: float, shape: float = 0.0) -> list[Array]:
     """Means over each period of powers (n,), held over each, behind the lag 1 / (1 + s S + s^2 q S^2), S = `lag_s`, q = `shape`."""
+    top, bottom = _lag_filter(period_s, lag_s, shape)
+    return [np.asarray(lfilter(top, bottom, power)) for power in powers]
+
+
+@lru_cache(maxsize=256)
+def _lag_filter(period_s: float, lag_s: float, shape: float) -> tuple[Array, Array]:
+    """Numerator and denominator of `behind_lag` in z^-1."""
     # state (output, S times its slope if there is one), input, and the output's integral
     order = 2 if shape > 0.0 else 1
     rates = np.zeros((order + 2, order + 2))
@@ -190,7 +198,7 @@ def behind_lag(powers: Sequence[Array], period_s: float, lag_s: float, shape: fl
     rates[-1, 0] = 1.0 / period_s
     step = expm(rates * period_s)
     top, bottom = ss2tf(step[:order, :order], step[:order, [order]], step[[-1], :order], step[[-1], [order]])
-    return [np.asarray(lfilter(top[0], bottom, power)) for power in powers]
+    return top[0], bottom
 
 
 def behind_rectifier(powers: Sequence[Array], period_s: float, lag_s: float) -> list[Array]:

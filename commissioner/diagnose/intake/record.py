@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
+from concurrent.futures import wait
+from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numba import get_num_threads
 from numpy.typing import NDArray
 
+from commissioner.compiled import threads
 from commissioner.records import Signal
 
 Result = TypeVar("Result")
 Named = tuple[Sequence[str], list[NDArray[np.float64]]]
 LEAST_SHARE = 1500
-THREADS = min(int(get_num_threads()), 4)
-"""One segment each: more threads than cores would only hold more sensitivities in memory at once."""
 WORTH_THREADS = 30_000
 """Samples of a record below which threads wait for one another longer than they help: a fifth of the CPU time of 15 000."""
 
@@ -181,8 +179,17 @@ class Record:
 def each_segment(of_segment: Callable[[int], Result], record: Record) -> list[Result]:
     """`of_segment(position)` of every segment, in order; the compiled kernels let other threads run meanwhile."""
     count = len(record.segments)
-    if count == 1 or record.samples < WORTH_THREADS:
+    if count == 1 or record.samples < WORTH_THREADS or _IS_WITHIN.get():
         return [of_segment(k) for k in range(count)]
-    with ThreadPoolExecutor(min(count, THREADS)) as pool:
-        begun = [pool.submit(copy_context().run, of_segment, k) for k in range(count)]
-        return [one.result() for one in begun]
+
+    def one(position: int) -> Result:
+        _IS_WITHIN.set(True)
+        return of_segment(position)
+
+    begun = [threads().submit(copy_context().run, one, k) for k in range(count)]
+    wait(begun)
+    return [done.result() for done in begun]
+
+
+_IS_WITHIN = ContextVar("_IS_WITHIN", default=False)
+"""Whether this is one segment's part already: a part that waited for others could take the last thread from them."""

@@ -151,11 +151,9 @@ def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting:
     upper = np.array([t.upper / t.step - t.start / t.step for t in terms])
     step = bounded_step(gram, slope, lower, upper, 1e-9)
     entry = CATALOGUE[name]
-    if entry.sign:
-        sizes = entry.sizes(setting, {t.symbol: float(x) * t.step for t, x in zip(terms, step, strict=True)})
-        leading = next(iter(sizes.values()))[0] if sizes else 1.0
-        if leading * entry.sign <= 0:
-            return Score(name, 0.0, len(terms), np.zeros(len(terms)), tuple(terms))
+    values = {t.symbol: float(x) * t.step for t, x in zip(terms, step, strict=True)}
+    if entry.sign and not entry.promises_its_sign(setting, values):
+        return Score(name, 0.0, len(terms), np.zeros(len(terms)), tuple(terms))
     gain = float(2.0 * step @ slope - step @ gram @ step)
     return Score(name, max(promised(gain, len(terms), times), 0.0), len(terms), step, tuple(terms))
 

@@ -37,6 +37,9 @@ SAG_SAMPLES = 4000
 SECOND_ORDER_LEAVES, LEAST_RINGING, MOST_RINGING = 0.25, 0.01, 2.0
 """Of the power that a lag of first order leaves; and the least and largest q of a lag 1 / (1 + s S + s^2 q S^2), two equal ones at a quarter."""
 
+RINGING, RINGS = (0.03, 0.1, 0.3, 1.0), 0.8
+"""Shapes q that are looked at before one is sought, and what of the course's size one of them must leave at most."""
+
 
 class DcLinkSag(OfTheLink):
     """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
@@ -92,6 +95,15 @@ class DcLinkSag(OfTheLink):
                 return {"of_the_recorded_swing": (values[RECORDED_LINK], "1")}
         return {"sag_at_rated_power": (sagging(setting, values)[0] if any(values.values()) else 0.0, "1")}
 
+    def promises_its_sign(self, setting: Setting, values: Numbers) -> bool:
+        """As by `sizes`, which seeks the lag that comes nearest: it is among those around any that loses voltage with the numbers."""
+        if not any(values.values()):
+            return False
+        course, weight, sources = _read(setting, values)
+        if any(as_much_of(of(x), course, weight)[0] > 0.0 for of in sources for x in np.log(SAG_LAGS_S)):
+            return True
+        return _may_ring(course, weight, sources) and super().promises_its_sign(setting, values)
+
     def is_possible(self, sizes: Sizes, model: Model, setting: Setting) -> bool:
         most = sizes.get("sag_at_rated_power", (0.0, ""))[0]
         return most <= MOST_SAG or self.is_shown(model, setting.record)
@@ -123,35 +135,10 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
     constant: that only scales the four numbers, so that several lags in place of one between them have any sum. The lag is of second
     order where that leaves at most SECOND_ORDER_LEAVES of what a first one does, and no capacitor holds what is given back.
     """
-    record = setting.record
-    first = [s.first(SAG_SAMPLES) for s in record.segments]
-    weight = np.concatenate([s.voltage_axis_v for s in first])
-    course = np.concatenate(
-        [
-            sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items())
-            for k, s in enumerate(first)
-        ]
-    )
-
-    both_ways, period = [power_of(record, s) for s in first], record.facts.sample_period_s
-    one_way = [np.maximum(p, 0.0) for p in both_ways]
-    holds, draws = any(values.get(n) for n in HELD), any(values.get(n) for n in DRAWN)
-
-    def lagged_of(powers: Sequence[Array]) -> Callable[..., Array]:
-        def lagged(log_lag: float, shape: float = 0.0) -> Array:
-            lag = float(np.exp(log_lag))
-            return -np.concatenate(
-                behind_rectifier(powers, period, lag) if holds else behind_lag(powers, period, lag, shape)
-            )
-
-        return lagged
-
-    # beside a recorded link the powers only mend its course: what they are made of says nothing of the source
-    is_beside_a_link = values.get(RECORDED_LINK) and not holds
-    sources = [both_ways, one_way] if is_beside_a_link else [one_way if draws else both_ways]
-    read = [(lagged, *nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)) for lagged in map(lagged_of, sources)]
+    course, weight, sources = _read(setting, values)
+    read = [(lagged, *nearest_course(course, lagged, np.log(SAG_LAGS_S), weight)) for lagged in sources]
     lagged, size, log_lag = min(read, key=lambda r: float(np.linalg.norm(as_much_of(r[0](r[2]), course, weight)[1])))
-    if holds:
+    if any(values.get(n) for n in HELD):
         return size, float(np.exp(log_lag))
     left = as_much_of(lagged(log_lag), course, weight)[1]
     second = least_squares(
@@ -164,6 +151,52 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
         log_lag, shape = second.x
         size = as_much_of(lagged(log_lag, shape), course, weight)[0]
     return size, float(np.exp(log_lag))
+
+
+def _read(setting: Setting, values: Mapping[str, float]) -> tuple[Array, Array, list[Callable[..., Array]]]:
+    """The course that the numbers make together, the command, and the courses of a unit sag behind one lag that it may be: of power with
+
+    its sign, or where it is drawn; of both beside a recorded link, whose course the powers only mend: what they are made of says
+    nothing of the source there.
+    """
+    record = setting.record
+    first = [s.first(SAG_SAMPLES) for s in record.segments]
+    course = np.concatenate(
+        [
+            sum(v * record.channels[k][: s.count, record.channel(n)] for n, v in values.items())
+            for k, s in enumerate(first)
+        ]
+    )
+    both_ways = [power_of(record, s) for s in first]
+    one_way = [np.maximum(p, 0.0) for p in both_ways]
+    holds, draws = any(values.get(n) for n in HELD), any(values.get(n) for n in DRAWN)
+    is_beside_a_link = values.get(RECORDED_LINK) and not holds
+    powers = [both_ways, one_way] if is_beside_a_link else [one_way if draws else both_ways]
+    lagged = [_lagged_of(record.facts.sample_period_s, holds, p) for p in powers]
+    return course, np.concatenate([s.voltage_axis_v for s in first]), lagged
+
+
+def _may_ring(course: Array, weight: Array, sources: Sequence[Callable[..., Array]]) -> bool:
+    """Whether a lag of second order may leave little where none of first order loses voltage."""
+    alone = float(np.linalg.norm(as_much_of(np.zeros_like(course), course, weight)[1]))
+    return any(
+        float(np.linalg.norm(as_much_of(of(x, shape), course, weight)[1])) < RINGS * alone
+        for of in sources
+        for x in np.log(SAG_LAGS_S)
+        for shape in RINGING
+    )
+
+
+def _lagged_of(period_s: float, holds: bool, powers: Sequence[Array]) -> Callable[..., Array]:
+    """The course of a unit sag behind one lag, over the logarithm of its time constant and its shape."""
+
+    def lagged(log_lag: float, shape: float = 0.0) -> Array:
+        lag = float(np.exp(log_lag))
+        return -np.concatenate(
+            behind_rectifier(powers, period_s, lag) if holds else behind_lag(powers, period_s, lag, shape)
+        )
+
+    return lagged
 
 
 def _as_lags(courses: Mapping[str, Array], names: Iterable[str]) -> tuple[dict[str, float], float]:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from commissioner.compiled import threads
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.diagnosis import Verdict, diagnose
 from commissioner.diagnose.document import as_document
 from commissioner.diagnose.fit.gauss_newton import fit
 from commissioner.diagnose.intake.cancelling import TimeOver, given_up_by
-from commissioner.diagnose.intake.record import THREADS
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.search.journal import Accepted, Screened
@@ -36,7 +36,7 @@ def test_a_fit_is_given_up_between_two_segments(setting):
         patience = Patience(times)
         with given_up_by(patience), pytest.raises(TimeOver):
             fit(start, setting.record, setting.layout, WHITE)
-        assert patience.asked - times <= len(setting.record.segments) + THREADS
+        assert patience.asked - times <= len(setting.record.segments) + threads()._max_workers
 
 
 def test_outside_nothing_is_given_up(setting):
