@@ -30,7 +30,7 @@ from commissioner.identify.estimate.axis import (
     judge_axis,
     segments,
 )
-from commissioner.identify.estimate.leg_family import one_inverter
+from commissioner.identify.estimate.leg_family import one_inverter, pairs_of
 from commissioner.identify.estimate.leg_refit import with_known_law
 from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
 from commissioner.identify.intake.alignment import (
@@ -142,9 +142,10 @@ def identify(
         fits.append(fit_axis(shifted(stretches, late), plate, period_s, start, inverter, fit))
     as_fitted = tuple(fits)
     free = [f.batch for f in fits]
-    legs = one_inverter(free)
+    pairs = pairs_of(free)
+    legs = one_inverter(free, pairs)
     if is_final:
-        legs = with_known_law(free, [segments(f.stretches) for f in fits], legs)
+        legs = with_known_law(free, [segments(f.stretches) for f in fits], legs, pairs)
     fits = [replace(f, batch=batch) for f, batch in zip(fits, legs, strict=True)]
     results = [judge_axis(f, plate, period_s, estimator) for f in fits]
     shift = _time_shift(results, fits, late, period_s) if is_final else _as_fitted(results[0].batch, late, period_s)

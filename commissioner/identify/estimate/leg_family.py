@@ -53,9 +53,8 @@ class Pair:
     plateaus: Signal
 
 
-def one_inverter(fits: Sequence[BatchFit]) -> list[BatchFit]:
-    """The fits with the leg curve they agree on. Unchanged where a leg was not fitted, or no known law describes it."""
-    pairs = pairs_of(fits)
+def one_inverter(fits: Sequence[BatchFit], pairs: Sequence[Pair]) -> list[BatchFit]:
+    """The fits with the leg curve they agree on by their `pairs`. Unchanged where a leg was not fitted, or no known law describes it."""
     if not pairs or chi2.sf(pairs[0].misfit, pairs[0].values.size - 4) < WORST_CHANCE:
         return list(fits)
     chances = chances_of([p.misfit for p in pairs])
@@ -104,7 +103,9 @@ def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: S
         ]
         return np.concatenate([root @ (curve(p) - mean), prior])
 
-    fit = least_squares(misfit, [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical], max_nfev=60)
+    fit = least_squares(
+        misfit, [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical], method="lm", max_nfev=300
+    )
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)
     jacobian = np.linalg.solve(root, fit.jac[: mean.size])
     total, ratio, knee_1, knee_2 = map(float, np.exp(np.clip(fit.x, -30.0, 30.0)))

@@ -19,7 +19,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.model import Matrix
 from commissioner.identify.batch.segments import BatchFit, Segment
-from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair, pairs_of
+from commissioner.identify.estimate.leg_family import WORST_CHANCE, Pair
 from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.leg_pair import PairLaw
 from commissioner.identify.inverter.mixture import chances_of, mixture
@@ -46,16 +46,15 @@ class _Refit:
 
 
 def with_known_law(
-    fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], drawn: Sequence[BatchFit]
+    fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], drawn: Sequence[BatchFit], pairs: Sequence[Pair]
 ) -> list[BatchFit]:
     """`drawn` with what a law that describes the samples says instead, where R_s is not sure without it.
 
-    `fits` are the tests' fits with a free curve, `tests` their segments, in the same order.
+    `fits` are the tests' fits with a free curve, `tests` their segments, in the same order; `pairs` the laws drawn to the curves, the best first.
     """
     if all(math.sqrt(f.covariance[0, 0]) < WORTH * f.theta[0] for f in drawn):
         return list(drawn)
-    likely = pairs_of(fits)
-    likely = [p for p in likely if p.misfit < likely[0].misfit + LIKELY][:MOST_TRIED]
+    likely = [p for p in pairs if p.misfit < pairs[0].misfit + LIKELY][:MOST_TRIED]
     if not likely:
         return list(drawn)
     begun = _on_first_test(fits[0], tests[0], likely)
@@ -84,7 +83,7 @@ def _fit_one(fit: BatchFit, segments: Sequence[Segment], law: PairLaw, values: S
     begun = fit
     for _ in range(ROUNDS):
         try:
-            begun = _fitted(begun, segments, law, values)
+            begun = _fitted(begun, segments, law, values, is_coarse=True)
         except DataRefused:
             return None
         if begun.sum_of_squares > most:
@@ -93,13 +92,15 @@ def _fit_one(fit: BatchFit, segments: Sequence[Segment], law: PairLaw, values: S
     return begun
 
 
-def _fitted(begun: BatchFit, segments: Sequence[Segment], law: PairLaw, values: Signal) -> BatchFit:
+def _fitted(begun: BatchFit, segments: Sequence[Segment], law: PairLaw, values: Signal, *, is_coarse: bool) -> BatchFit:
     model = replace(begun.model, leg=law)
     theta = np.zeros(model.size)
     theta[: model.leg_slice.start] = begun.theta[: begun.model.leg_slice.start]
     theta[model.leg_slice] = law.admissible(values)
     start = begun.gamma.as_inverse_gamma()
-    return fit_segments(segments, begun.sample_period_s, start, model, theta, STEPS, TOLERANCE)
+    return fit_segments(
+        segments, begun.sample_period_s, start, model, theta, STEPS, TOLERANCE, begun.own, is_coarse=is_coarse
+    )
 
 
 def _fit_all(fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], first: BatchFit) -> _Refit | None:
@@ -107,9 +108,9 @@ def _fit_all(fits: Sequence[BatchFit], tests: Sequence[Sequence[Segment]], first
     assert isinstance(first.model.leg, PairLaw)
     law, values = first.model.leg.moved(first.theta[first.model.leg_slice])
     begun = [first, *fits[1:]]
-    for _ in range(ROUNDS - 1):
+    for is_coarse in (True, False):
         try:
-            begun = [_fitted(f, test, law, values) for f, test in zip(begun, tests, strict=True)]
+            begun = [_fitted(f, test, law, values, is_coarse=is_coarse) for f, test in zip(begun, tests, strict=True)]
         except DataRefused:
             return None
         mean, covariance, apart = _in_common(begun)
