@@ -139,6 +139,13 @@ class _Service:
             answer = self._connection.getresponse()
             text = answer.read()
             document = json.loads(text)
+        except ssl.SSLCertVerificationError as failure:
+            raise CommissionerError(
+                f"the service's certificate is not trusted: {failure.verify_message}", step="push", value=self._url,
+                limit="a certificate of this name from an authority that this computer knows, or of --ca",
+                remedy="give --ca FILE with the certificate of who vouches for it, as whoever set up the service has it; take the address that "
+                "the certificate is made out to",
+            ) from failure  # fmt: skip
         except (OSError, http.client.HTTPException, ValueError) as failure:
             raise CommissionerError(
                 f"the service does not answer: {getattr(failure, 'strerror', None) or failure}", step="push", value=self._url,

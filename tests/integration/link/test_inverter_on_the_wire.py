@@ -1,16 +1,12 @@
 """The inverter against the simulated drive over TCP, RTU and TLS. Truth is the simulator's own log."""
 
 import contextlib
-import datetime
-import ipaddress
 import ssl
 
 import numpy as np
 import pytest
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import NameOID
 
 from commissioner.errors import (
     CheckFailed,
@@ -28,6 +24,7 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TcpUrl, parse_url
 from sim.wire.faults import parse
 from tests.campaigns.short_run import truth
+from tests.support.authority import Authority, private_pem
 from tests.support.raw_servers import Bank, TcpDevice
 from tests.support.sim_process import SimProcess
 
@@ -288,53 +285,6 @@ def test_a_killed_service_leaves_a_dead_drive():
 
 
 # --- TLS --------------------------------------------------------------------------------------------------
-class Authority:
-    """A test CA that signs certificates for names and addresses."""
-
-    def __init__(self, folder, name):
-        self.folder = folder
-        self.key = ec.generate_private_key(ec.SECP256R1())
-        self.subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-        self.certificate = self._build(self.subject, self.key, [], is_authority=True)
-        self.file = folder / f"{name}.pem"
-        self.file.write_bytes(self.certificate.public_bytes(serialization.Encoding.PEM))
-
-    def issue(self, name, addresses):
-        key = ec.generate_private_key(ec.SECP256R1())
-        subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-        certificate = self._build(subject, key, addresses, is_authority=False)
-        cert_file, key_file = self.folder / f"{name}.crt", self.folder / f"{name}.key"
-        cert_file.write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
-        key_file.write_bytes(private_pem(key, serialization.NoEncryption()))
-        return cert_file, key_file
-
-    def _build(self, subject, key, addresses, *, is_authority):
-        now = datetime.datetime.now(datetime.UTC)
-        builder = (
-            x509.CertificateBuilder()
-            .subject_name(subject)
-            .issuer_name(self.subject)
-            .public_key(key.public_key())
-            .serial_number(x509.random_serial_number())
-            .not_valid_before(now - datetime.timedelta(days=1))
-            .not_valid_after(now + datetime.timedelta(days=2))
-            .add_extension(x509.BasicConstraints(ca=is_authority, path_length=None), critical=True)
-            .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
-            .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key()), critical=False)
-        )
-        if is_authority:
-            usage = x509.KeyUsage(False, False, False, False, False, True, True, False, False)
-            builder = builder.add_extension(usage, critical=True)
-        if addresses:
-            names = [x509.IPAddress(ipaddress.ip_address(address)) for address in addresses]
-            builder = builder.add_extension(x509.SubjectAlternativeName(names), critical=False)
-        return builder.sign(self.key, hashes.SHA256())
-
-
-def private_pem(key, encryption):
-    return key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, encryption)
-
-
 @pytest.fixture
 def authority(tmp_path):
     return Authority(tmp_path, "test-ca")
