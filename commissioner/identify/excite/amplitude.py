@@ -75,8 +75,10 @@ class Amplitude:
         time_s = np.arange(step_s, self.forecast.excitation.duration_s, step_s)
         ramp = np.minimum(time_s * ramp_per_s, 1.0)
 
+        peaks = self.forecast.ahead(worst, began_s + time_s, loss=SURE_LOSS)
+
         def is_permitted(scale: float) -> bool:
-            flux_wb, current_a = self.forecast.peaks(worst, began_s + time_s, np.minimum(ramp, scale), loss=SURE_LOSS)
+            flux_wb, current_a = peaks(np.minimum(ramp, scale))
             return flux_wb < KNOWN_TARGET * self.limit_wb and current_a < self.current_a
 
         return _largest(self.safe, 1.0, is_permitted)
@@ -109,10 +111,8 @@ class Amplitude:
         start = (float(estimate.current_a[-1]), float(estimate.rotor_flux_wb[-1]), 0.0)
         most_a = min(self.current_a, max(GROWTH * seen_a, CURRENT_STEP * self.current_a))
 
-        def is_permitted(tried: float) -> bool:
-            return self.forecast.peaks(worst, ahead, tried, start, KNOWN_LOSS)[1] < most_a
-
-        return _largest(scale, wanted, is_permitted)
+        peaks = self.forecast.ahead(worst, ahead, start, KNOWN_LOSS)
+        return _largest(scale, wanted, lambda tried: peaks(tried)[1] < most_a)
 
     def unsure(self, machine: InverseGamma, scale: float) -> float:
         """A small raise: it adds at most `CURRENT_STEP` of the permitted current, all tones at their peaks at once."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +44,25 @@ class Forecast:
     ) -> tuple[float, float]:
         """(largest |stator flux|, largest |current|) over evenly spaced instants, from (current, rotor flux, integrated
         stator flux), this share of the inverter's loss taken off."""
-        voltage = self.excitation.voltage_v(time_s, scale)
+        return self.ahead(machine, time_s, start, loss)(scale)
+
+    def ahead(
+        self,
+        machine: InverseGamma,
+        time_s: Signal,
+        start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        loss: float = 1.0,
+    ) -> Callable[[float | Signal], tuple[float, float]]:
+        """`peaks` over the scale: what is the same for all scales is computed once."""
         period_s = float(time_s[1] - time_s[0])
+        of_scale, lost_v = self.excitation.over_scale(time_s), loss * self.lost_v
         matrix, gain = held_input(machine, period_s)
         r_s, leakage = machine.stator_resistance_ohm, machine.leakage_inductance_h
-        flux_wb, current_a = forecast(
-            voltage, period_s, matrix, gain, r_s, leakage, loss * self.lost_v, self.span_a, *start
-        )
-        return float(flux_wb), float(current_a)
+
+        def peaks(scale: float | Signal) -> tuple[float, float]:
+            flux_wb, current_a = forecast(
+                of_scale(scale), period_s, matrix, gain, r_s, leakage, lost_v, self.span_a, *start
+            )
+            return float(flux_wb), float(current_a)
+
+        return peaks

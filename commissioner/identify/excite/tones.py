@@ -9,7 +9,7 @@ tones falls on a tone, so that what iron and inverter add stays off the lines.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -46,10 +46,14 @@ class Excitation:
 
     def voltage_v(self, time_s: Signal, scale: float | Signal = 1.0) -> Signal:
         """The commanded voltage at the instants, `(n,)`."""
+        return self.over_scale(time_s)(scale)
+
+    def over_scale(self, time_s: Signal) -> Callable[[float | Signal], Signal]:
+        """`voltage_v` at the instants over the scale."""
         total = np.zeros_like(time_s)
         for tone in self.tones:
             total += tone.amplitude_v * np.cos(2.0 * np.pi * tone.frequency_hz * time_s + tone.phase_rad)
-        return np.asarray(self.dc_bias_v + scale * total)
+        return lambda scale: np.asarray(self.dc_bias_v + scale * total)
 
 
 @dataclass(frozen=True)
