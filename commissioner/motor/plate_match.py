@@ -99,10 +99,9 @@ def inductance_mismatch(inductance_h: float, plate: Nameplate) -> PlateMismatch 
 
 
 def _of_scale(what: str, value: float, limit: str, impedances: float, plate: Nameplate) -> PlateMismatch:
-    other = {"star": "delta", "delta": "star"}.get(plate.connection, "another connection")
-    factor = "three times" if impedances > 1.0 else "a third of"
-    is_connection = WIRED_OTHERWISE[0] <= max(impedances, 1.0 / impedances) <= WIRED_OTHERWISE[1]
-    if is_connection and (impedances > 1.0) == (plate.connection == "delta"):
+    is_delta = plate.connection == "delta"
+    other, factor = ("star", "three times") if is_delta else ("delta", "a third of")
+    if WIRED_OTHERWISE[0] <= (impedances if is_delta else 1.0 / impedances) <= WIRED_OTHERWISE[1]:
         return PlateMismatch(
             f"the motor is wired in {other} where the plate says {plate.connection}: all its impedances are {factor} "
             "the plate's",
@@ -117,8 +116,8 @@ def _of_scale(what: str, value: float, limit: str, impedances: float, plate: Nam
 
 
 SCALE = (0.70, 1.58)
-"""Geometric mean of current, active and reactive power over the plate's, at one voltage, frequency and slip: 0.87 ... 1.56
-in the table at rated slip (1.37 but for two plates with an efficiency that no motor of their size has). sqrt 3, the smallest
+"""Geometric mean of current, active and reactive power over the plate's, at one voltage, frequency and slip: 0.83 ... 1.56
+in the table at rated slip (1.33 but for two whose stated speed or current is not their circuit's). sqrt 3, the smallest
 factor that two readings differ by, is 1.73."""
 USUAL = (0.80, 1.25)
 """Of the same mean: 99 % of 1500 honest points of tests/campaigns/intake/plate lie within, and of those off by sqrt 2 a tenth."""
@@ -220,7 +219,7 @@ def _factor(seen: OperatingPoint, said: OperatingPoint) -> float | None:
 
 
 def _usual(factor: float) -> tuple[float | None, str]:
-    """The usual factor within a fifth of one, and what makes it."""
+    """The usual factor at most exp(0.27) away, and what makes it."""
     size = max(factor, 1.0 / factor)
     near = min(FACTORS, key=lambda f: abs(math.log(size / f[0])))
     if abs(math.log(size / near[0])) > 0.27:

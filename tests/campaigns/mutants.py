@@ -28,7 +28,10 @@ TARGETS = {
     "commissioner.safety.watch": ("tests/unit/safety/test_watch.py",),
     "commissioner.safety.freshness": ("tests/unit/safety/test_freshness.py",),
     "commissioner.safety.sensors": ("tests/unit/safety/test_sensors.py",),
-    "commissioner.motor.plate_match": ("tests/unit/motor/test_plate_match.py",),
+    "commissioner.motor.plate_match": (
+        "tests/unit/motor/test_plate_match.py",
+        "tests/unit/motor/test_plate_scale.py",
+    ),
     "commissioner.procedure.states": ("tests/unit/procedure/test_states.py",),
 }
 """commands.py holds records only: there is nothing to mutate."""
@@ -60,6 +63,12 @@ EXPLAINED = {
         "commissioner.safety.sensors",
         "-phases.sum(axis=0) -> phases.sum(axis=0)",
     ): "only the magnitude of the third phase is looked at",
+    (
+        "commissioner.motor.plate_match",
+        "ratios = [a / b for a, b in zip(machine.as_tuple(), typical.as_tuple(), strict=True)]",
+    ): "strict or not: four values, four values",
+    ("commissioner.motor.plate_match", "> 0.27 -> abs(math.log(size / near[0])) >= 0.27"): ROUNDED,
+    ("commissioner.motor.plate_match", "factor > 1.0 -> factor >= 1.0"): "no usual factor is near 1",
 }
 """(module, part of the line with the mutant in it or of the mutant's name) of survivors, and why no test can kill them."""
 

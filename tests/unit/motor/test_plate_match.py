@@ -2,7 +2,7 @@
 
 import csv
 import math
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +13,12 @@ from commissioner.motor.plate_match import (
     CURRENT_RATIO,
     MOST_INDUCTIVE,
     PlateMatch,
+    PlateMismatch,
     inductance_mismatch,
     mismatch,
     plate_match,
+    plate_point,
+    rated_point,
 )
 from commissioner.motor.running import equal_leakages, stator_impedance
 from commissioner.settings import load_motor
@@ -25,8 +28,7 @@ PLATE = load_motor("motor_2kw2")
 
 
 def machines():
-    """(name, parameters, plate) of the machines whose plate can be true; what a source does not state is computed at the slip of
-    its rated power."""
+    """(name, parameters, plate) of the usable machines; what a source does not state is computed at the slip of its rated power."""
     with TABLE.open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             if row["use_for_mc"] != "1":
@@ -40,11 +42,12 @@ def machines():
             parameters = InverseGamma(
                 float(row["Rs_ohm"]), float(row["R_R_ohm"]), 1e-3 * float(row["L_sgm_mH"]), 1e-3 * float(row["L_M_mH"])
             )
-            if not check(plate):
-                yield row["id"], parameters, plate
+            yield row["id"], parameters, plate
 
 
-KNOWN = list(machines())
+USABLE = list(machines())
+KNOWN = [machine for machine in USABLE if not check(machine[2])]
+"""Those whose plate can be true."""
 
 
 def scaled(machine, factor):
@@ -52,14 +55,41 @@ def scaled(machine, factor):
 
 
 def test_there_are_machines_with_plates():
-    assert len(KNOWN) >= 30
+    assert (len(USABLE), len(KNOWN)) == (35, 31)
+
+
+def inductance(machine):
+    return machine.leakage_inductance_h + machine.magnetizing_inductance_h
+
+
+def drawn_over_the_plates(machine, plate):
+    """Geometric mean of current, active and reactive power."""
+    drawn = rated_point(machine, plate)
+    said = plate_point(plate, drawn)
+    pairs = zip((drawn.current_a, drawn.power_w, drawn.reactive_var), (said.current_a, said.power_w, said.reactive_var),
+                strict=True)  # fmt: skip
+    return math.prod(a / b for a, b in pairs) ** (1 / 3)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "least", "most"),
+    [
+        (lambda machine, plate: plate_match(machine, plate).current_ratio, 0.83, 1.59),
+        (lambda machine, plate: inductance(machine) / inductance(prior(plate).typical), 0.63, 1.33),
+        (drawn_over_the_plates, 0.83, 1.56),
+    ],
+    ids=["current", "inductance", "scale"],
+)
+def test_the_ranges_are_those_of_the_table(ratio, least, most):
+    seen = [ratio(machine, plate) for _, machine, plate in USABLE]
+    assert (min(seen), max(seen)) == pytest.approx((least, most), abs=0.005)
 
 
 @pytest.mark.parametrize(("name", "machine", "plate"), KNOWN, ids=[name for name, *_ in KNOWN])
 def test_a_machine_fits_its_own_plate(name, machine, plate):
     match = plate_match(machine, plate)
     assert mismatch(match, plate) is None
-    assert inductance_mismatch(machine.leakage_inductance_h + machine.magnetizing_inductance_h, plate) is None
+    assert inductance_mismatch(inductance(machine), plate) is None
     low, high = match.unseen_gain
     assert low <= 1.0 <= high
 
@@ -134,16 +164,33 @@ def test_the_connection_is_named_where_all_impedances_are_its_factor_off(impedan
 
 
 def test_the_first_inductance_is_bounded_upwards_alone():
-    typical = prior(PLATE).typical
-    rest_h = typical.leakage_inductance_h + typical.magnetizing_inductance_h
-    assert inductance_mismatch(MOST_INDUCTIVE * rest_h * (1 - 1e-9), PLATE) is None
-    assert inductance_mismatch(0.01 * rest_h, PLATE) is None
-    found = inductance_mismatch(MOST_INDUCTIVE * rest_h * 1.001, PLATE)
+    typical_h = inductance(prior(PLATE).typical)
+    assert inductance_mismatch(0.01 * typical_h, PLATE) is None
+    found = inductance_mismatch(MOST_INDUCTIVE * typical_h * 1.001, PLATE)
     assert "inductance" in found.what and found.value == pytest.approx(MOST_INDUCTIVE * 1.001)
     assert "at most 1.95" in found.limit
     delta = replace(PLATE, connection="delta")
-    assert "wired in star" in inductance_mismatch(3.0 * rest_h, delta).what
+    assert "wired in star" in inductance_mismatch(3.0 * typical_h, delta).what
+
+
+def test_the_largest_first_inductance_is_still_the_plates():
+    """Of plates whose typical inductance times the limit is no rounded number."""
+    plates = [plate for _, _, plate in KNOWN]
+    pairs = [(plate, inductance(prior(plate).typical)) for plate in plates]
+    even = [
+        (plate, typical_h) for plate, typical_h in pairs if MOST_INDUCTIVE * typical_h / typical_h == MOST_INDUCTIVE
+    ]
+    assert even
+    for plate, typical_h in even:
+        assert inductance_mismatch(MOST_INDUCTIVE * typical_h, plate) is None
+        assert inductance_mismatch(MOST_INDUCTIVE * typical_h * (1.0 + 1e-9), plate) is not None
 
 
 def test_an_unseen_gain_is_the_ratio_over_the_bounds():
     assert PlateMatch(1.2, 0.5, 1.0).unseen_gain == pytest.approx((1.2 / 1.66, 1.2 / 0.66))
+
+
+@pytest.mark.parametrize("record", [PlateMatch(1.2, 0.5, 1.0), PlateMismatch("x", 1.0, "y", "z")])
+def test_what_was_found_stays(record):
+    with pytest.raises(FrozenInstanceError):
+        record.value = 2.0
