@@ -128,14 +128,11 @@ def _culprit(current: Signal, cosines: Signal) -> str:
     if len(cosines) < 3:
         return "u or v"
     left = []
-    for phase in range(3):
-        others = [k for k in range(3) if k != phase]
-        c, i = cosines[others], current[others]
+    for phase in range(len(cosines)):
+        c, i = np.delete(cosines, phase), np.delete(current, phase, axis=0)
         along = c @ i / float(c @ c)
         left.append(float(np.mean(np.square(i - np.outer(c, along)))))
-    best = int(np.argmin(left))
-    tied = [NAMES[k] for k in range(3) if left[k] <= 1.5 * left[best]]
-    return " or ".join(tied)
+    return " or ".join(NAMES[k] for k, rest in enumerate(left) if rest <= 1.5 * min(left))
 
 
 def _distrusted(what: str, value: float, limit: str) -> StopReason:

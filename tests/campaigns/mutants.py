@@ -54,11 +54,7 @@ EXPLAINED = {
         "limits = zip(fields(circuit), circuit.as_tuple(), box.lower.as_tuple(),",
     ): "strict or not: four fields, four values, four limits",
     ("commissioner.safety.sensors", "+ floor_a -> abs(shown - claimed) <"): ROUNDED,
-    ("commissioner.safety.sensors", "<= allowed -> float(np.max(rest)) < allowed"): ROUNDED,
     ("commissioner.safety.sensors", "np.abs(cosines) > LEAST_SHARE -> np.abs(cosines) >= LEAST_SHARE"): ROUNDED,
-    ("commissioner.safety.sensors", "size_a > noise_a -> size_a >= noise_a"): ROUNDED,
-    ("commissioner.safety.sensors", "-> np.ptp(voltage_v) >= MOVES"): ROUNDED,
-    ("commissioner.safety.sensors", "<= 1.5 * left[best] -> left[k] < 1.5 * left[best]"): ROUNDED,
     (
         "commissioner.safety.sensors",
         "-phases.sum(axis=0) -> phases.sum(axis=0)",

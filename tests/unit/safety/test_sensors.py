@@ -153,8 +153,17 @@ def test_a_phase_may_stand_still_while_the_voltage_does(moves_v, is_seen):
     assert not is_seen or "phase v and w stands still" in found.what
 
 
-def test_a_phase_may_stand_still_where_no_current_flows():
-    assert window((0.0, 0.0, 0.0)) is None
+@pytest.mark.parametrize("noise_a", [0.0, 0.1])
+def test_a_phase_may_stand_still_where_no_current_flows(noise_a):
+    assert window((0.0, 0.0, 0.0), noise_a=noise_a) is None
+
+
+def test_a_current_that_decays_without_voltage_may_stand_still():
+    assert window((0.0, 4.0, -4.0), (0.0, 0.0)) is None
+
+
+def test_two_phases_that_agree_to_the_last_digit_leave_the_third():
+    assert _culprit(np.array([[2.0], [-0.5], [-0.5]]), np.array([1.0, -0.5, -0.5])) == "u"
 
 
 def test_a_phase_of_two_sensors_that_stands_still_is_named():
