@@ -11,7 +11,7 @@ derives them again from the table.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, prior
@@ -20,6 +20,8 @@ from commissioner.motor.running import equal_leakages, from_nameplate, stator_im
 CURRENT_RATIO = (0.66, 1.66)
 """Computed over rated current: 0.83 ... 1.59 in the table, widened: upwards by 5 % (a cold rotor adds a fifth to what most
 have), downwards by a fifth for the iron that is less saturated in the test than at rated voltage."""
+SURE, LEAST_SHARE = 2.0, 0.01
+"""Standard errors by which R_s must contradict the plate; what of it is left at the least."""
 MOST_INDUCTIVE = 1.95
 """Unsaturated static stator inductance over the plate's typical one: 0.63 ... 1.33 in the table at rated flux; iron that is
 not saturated shows up to 1.4 times as much, and a value from few levels is a tenth off. There is no lower bound: behind an
@@ -84,6 +86,16 @@ def mismatch(match: PlateMatch, plate: Nameplate) -> PlateMismatch | None:
             match.copper_loss_ratio, "1", "check that --motor is the motor at the drive, and the current sensors' scale",
         )  # fmt: skip
     return None
+
+
+def sure_mismatch(machine: InverseGamma, resistance_std_ohm: float, plate: Nameplate) -> PlateMismatch | None:
+    """As `mismatch`, where it stands with R_s smaller by SURE of its standard errors, too: a copper loss that is not sure contradicts no
+    plate.
+    """
+    least_ohm = machine.stator_resistance_ohm - SURE * resistance_std_ohm
+    least = replace(machine, stator_resistance_ohm=max(least_ohm, LEAST_SHARE * machine.stator_resistance_ohm))
+    found = mismatch(plate_match(machine, plate), plate)
+    return found if found and mismatch(plate_match(least, plate), plate) else None
 
 
 def inductance_mismatch(inductance_h: float, plate: Nameplate) -> PlateMismatch | None:

@@ -53,6 +53,7 @@ class FirstCurrentSeen:
 
     axis_deg: float
     stator_inductance_h: float
+    stator_inductance_std_h: float
     of_typical: float
     slope_ohm: float
     voltage_v: tuple[float, float]

@@ -11,7 +11,7 @@ import numpy as np
 from commissioner.identify.analysis import Identification, axis_at
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity
 from commissioner.motor.nameplate import Nameplate, ParameterBox, prior
-from commissioner.motor.plate_match import PlateMatch, mismatch, plate_match
+from commissioner.motor.plate_match import PlateMatch, plate_match, sure_mismatch
 from commissioner.procedure.plan import Acceptance
 from commissioner.records import Signal
 
@@ -119,7 +119,8 @@ def _another_motor(combined: Values, plate: Nameplate) -> Iterator[Objection]:
     """Values that no common error explains away: the plate is another motor's, or the currents are of foreign scale."""
     if any(combined[name].value <= 0.0 for name in PARAMETERS):
         return
-    found = mismatch(match_of(combined, plate), plate)
+    machine = InverseGamma(*(combined[name].value for name in PARAMETERS))
+    found = sure_mismatch(machine, combined[PARAMETERS[0]].std, plate)
     if found is not None:
         yield Objection(found.what, found.value, found.limit, found.remedy)
 

@@ -11,6 +11,7 @@ still to come is added. Without both, a motor of three times the plate's impedan
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,6 +27,7 @@ class FirstCurrent:
     """`slope_ohm`: of the static curve, resistance and the inverter's knee together. Levels of the larger, then the smaller."""
 
     stator_inductance_h: float
+    stator_inductance_std_h: float
     slope_ohm: float
     voltage_v: tuple[float, float]
     current_a: tuple[float, float]
@@ -60,24 +62,57 @@ def first_current(levels: Sequence[HeldLevel], settled: Settled, sample_period_s
             remedy="check the current sensors' sign and order, the motor cable and the contactor",
         )  # fmt: skip
     slope_ohm = change_v / change_a
-    line = zip(levels[1:], (smaller_a, last_a), strict=True)
-    down, up = (
-        _moved_wb(level, heading_a, slope_ohm, settled.time_constant_s, sample_period_s) for level, heading_a in line
-    )
-    inductance_h = 0.5 * (up - down) / change_a
-    return FirstCurrent(inductance_h, slope_ohm, (larger.voltage_v, smaller.voltage_v), (larger_a, smaller_a))
+    time_s = settled.time_constant_s, sample_period_s
+    down_wb, fall_a = _step(larger, smaller, (first_a, smaller_a), slope_ohm, *time_s)
+    up_wb, rise_a = _step(smaller, levels[2], (smaller_a, last_a), slope_ohm, *time_s)
+    doubts_as = [_doubt_as(level, a, *time_s) for level, a in zip(levels[1:], settled.std_a[1:], strict=True)]
+    moved_a = max(rise_a - fall_a, 1e-9)
+    inductance_h, std_h = (up_wb - down_wb) / moved_a, slope_ohm * math.hypot(*doubts_as) / moved_a
+    return FirstCurrent(inductance_h, std_h, slope_ohm, (larger.voltage_v, smaller.voltage_v), (larger_a, smaller_a))
 
 
 def stepped_inductance_h(larger: HeldLevel, smaller: HeldLevel, settled: Settled, sample_period_s: float) -> float:
     """The static inductance between the last two levels, above the inverter's knee, the second held after the first."""
     larger_a, smaller_a = (float(a) for a in settled.current_a[-2:])
-    change_a = max(larger_a - smaller_a, 1e-9)
-    slope_ohm = (larger.voltage_v - smaller.voltage_v) / change_a
-    return -_moved_wb(smaller, smaller_a, slope_ohm, settled.time_constant_s, sample_period_s) / change_a
+    slope_ohm = (larger.voltage_v - smaller.voltage_v) / max(larger_a - smaller_a, 1e-9)
+    down_wb, fall_a = _step(larger, smaller, (larger_a, smaller_a), slope_ohm, settled.time_constant_s, sample_period_s)
+    return down_wb / min(fall_a, -1e-9)
+
+
+def _step(
+    before: HeldLevel,
+    level: HeldLevel,
+    headings_a: tuple[float, float],
+    slope_ohm: float,
+    time_constant_s: float,
+    period_s: float,
+) -> tuple[float, float]:
+    """Stator flux and current gained from where `before` had come to, which need not be where it was heading, to for ever."""
+    was_heading_a, heading_a = headings_a
+    mean_a, since_s = float(np.mean(before.samples_a[-_tail(before) :])), 0.5 * _tail(before) * period_s
+    start_a = was_heading_a + (mean_a - was_heading_a) * math.exp(-since_s / time_constant_s)
+    return _moved_wb(level, heading_a, slope_ohm, time_constant_s, period_s), heading_a - start_a
+
+
+def _doubt_as(level: HeldLevel, heading_std_a: float, time_constant_s: float, period_s: float) -> float:
+    """Standard error of the integral of the current that `_moved_wb` takes off: of the samples' noise, of the mean at the end, and of where
+
+    the current is heading, which counts for all of the time.
+    """
+    count, tail = level.samples_a.size, _tail(level)
+    noise_a = float(np.std(np.diff(level.samples_a))) / math.sqrt(2.0)
+    of_samples = noise_a * math.hypot(math.sqrt(count) * period_s, time_constant_s / math.sqrt(tail))
+    return math.hypot(of_samples, heading_std_a * (count * period_s + time_constant_s))
 
 
 def _moved_wb(level: HeldLevel, heading_a: float, slope_ohm: float, time_constant_s: float, period_s: float) -> float:
     """Stator flux gained from the level's first sample to for ever: what of the voltage the static line does not take."""
-    end_a = float(np.mean(level.samples_a[-max(8, round(END * level.samples_a.size)) :]))
-    seen = float(np.sum(level.samples_v - level.voltage_v - slope_ohm * (level.samples_a - heading_a))) * period_s
-    return seen - slope_ohm * (end_a - heading_a) * time_constant_s
+    tail = _tail(level)
+    end_a, counted = float(np.mean(level.samples_a[-tail:])), slice(level.samples_a.size - tail // 2)
+    taken = level.samples_v - level.voltage_v - slope_ohm * (level.samples_a - heading_a)
+    # the mean at the end is the current in the tail's middle: what is to come is counted from there
+    return float(np.sum(taken[counted])) * period_s - slope_ohm * (end_a - heading_a) * time_constant_s
+
+
+def _tail(level: HeldLevel) -> int:
+    return max(8, round(END * level.samples_a.size))

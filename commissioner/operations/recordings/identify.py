@@ -19,7 +19,7 @@ from commissioner.identify.document import document as identification_document
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import contradiction, doubt, mismatch, plate_match, rated_point
+from commissioner.motor.plate_match import contradiction, doubt, rated_point, sure_mismatch
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.trust import (
     Trust,
@@ -135,7 +135,7 @@ def _with_the_plate(
     found = analyse(recording, plate, estimator)
     rated = rated_point(found.parameters, plate)
     against, said = contradiction(rated, plate), doubt(rated, plate)
-    other = mismatch(plate_match(found.parameters, plate), plate)
+    other = sure_mismatch(found.parameters, found.std[0], plate)
     if against is None and other is None:
         return found, [said] if said else []
     if trust == "data":

@@ -13,7 +13,7 @@ from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import DesignedExcitation, ExcitationLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
-from commissioner.motor.plate_match import PlateMismatch, mismatch, plate_match
+from commissioner.motor.plate_match import PlateMismatch, sure_mismatch
 from commissioner.procedure.assembly import assemble
 from commissioner.procedure.energised.captured import captured
 from commissioner.procedure.energised.ceilings import aimed_current_a, for_tones
@@ -120,7 +120,7 @@ def _mismatch(job: Job, findings: Findings) -> PlateMismatch | None:
     look = findings.look
     if look is None or any(s > LOOK_STD * v for v, s in zip(look.parameters.as_tuple(), look.std, strict=True)):
         return None
-    return mismatch(plate_match(look.parameters, job.nameplate), job.nameplate)
+    return sure_mismatch(look.parameters, look.std[0], job.nameplate)
 
 
 def _believable(look: Identification, otherwise: InverseGamma, box: ParameterBox) -> InverseGamma:

@@ -46,6 +46,11 @@ TOP_ROOM = 1.15
 SECONDS = 5.0
 """A staircase's energised time, a first current's included; levels that have not settled by then are extrapolated."""
 FIRST_SECONDS, FIRST_END_S = 2.2, 0.05
+LEAST_HELD, FIRST_LEAST_HELD = 0.2, 1.3
+"""Of the plate's slow time constant: what a level is held at least, however long the climb took. A first current whose levels were held
+for 0.3 of it, over a link that steers slowly, said 1.7 times the inductance, and that it was another motor's."""
+SURE = 2.0
+"""Standard errors by which a first current must show another motor: beside large sensors a small one tells little."""
 FIRST_KEEPS = 0.6
 """Of the climb's voltage: what the first current is held at, at the least; a slow motor's climb is nearly all induction."""
 IDLE_S = 4.0
@@ -70,7 +75,8 @@ def measure_resistance(job: Job, findings: Findings) -> Step:
     findings.axis_s = 0.0
     if findings.first_current is None:
         seen = yield from _first_current(job, findings, axis_deg)
-        mismatch = inductance_mismatch(seen.stator_inductance_h, job.nameplate)
+        surely_h = seen.stator_inductance_h - SURE * seen.stator_inductance_std_h
+        mismatch = inductance_mismatch(surely_h, job.nameplate)
         if mismatch is not None:
             return (yield from reject(findings, (Objection(**asdict(mismatch)),)))
     stair = _Stair(job, findings, axis_deg)
@@ -139,7 +145,7 @@ class _Stair(DirectCurrent):
             self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
         step = FIRST_STEP if is_first else STEP
         super().__init__(job, findings, step, axis_deg, self._plan.largest_inductance_h, self._known)
-        self._already_s = 0.0 if is_first or self._known else findings.axis_s
+        self._already_s = 0.0 if is_first or self._known else min(findings.axis_s, FIRST_SECONDS * job.stretch)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -182,7 +188,7 @@ class _Stair(DirectCurrent):
             back = min(len(reached) - 1, RISE_STEPS)
             rise = (reached[-1] - reached[-1 - back]) / (back * step_s)
             held_v = voltage_v - self._plan.largest_inductance_h * rise
-            steady.append(max(steady[-1], held_v, FIRST_KEEPS * voltage_v if self._is_first else 0.0))
+            steady.append(max(steady[-1], held_v, self._holds_at_least(voltage_v, seen_a)))
         if reached[-1] < 0.3 * wanted_a:
             raise Aborted(
                 "no current flows", step=self._where, value=f"{reached[-1]:.3g} A",
@@ -190,6 +196,13 @@ class _Stair(DirectCurrent):
                 remedy="check the motor cable and the contactor; check rated current and voltage of the plate",
             )  # fmt: skip
         self._top_a = min(self._top_a, reached[-1] / share)
+
+    def _holds_at_least(self, voltage_v: float, current_a: float) -> float:
+        """Of the climb's voltage: what such a current takes once it stands still; no less than the first current took for less."""
+        seen = self.findings.first_current
+        if seen is None:
+            return FIRST_KEEPS * voltage_v
+        return seen.voltage_v[0] if current_a >= seen.current_a[0] else 0.0
 
     def voltage_at(self, rung: float) -> float:
         """What the climb has shown to hold this share of the top current."""
@@ -223,7 +236,8 @@ class _Stair(DirectCurrent):
         """Hold a level until its current has settled or its share of the time is up; keep how it got there."""
         budget_s = FIRST_SECONDS if self._is_first else SECONDS
         share_s = (budget_s * self.job.stretch - self._already_s - self.seconds) / levels_left
-        until_s = self.seconds + max(share_s, 0.2 * self._slow_s, 0.05)
+        least_s = (FIRST_LEAST_HELD if self._is_first else LEAST_HELD) * self._slow_s
+        until_s = self.seconds + max(share_s, least_s, 0.05)
         yield from self._push(before_v, voltage_v)
         yield SetBias(voltage_v)
         began_s, ramp_s = self.seconds, abs(voltage_v - before_v) / (BIAS_RAMP_PER_S * self.job.test_voltage_v)

@@ -10,7 +10,7 @@ from commissioner.run import runner
 from tests.campaigns.hostile_run.one_run import run_one
 from tests.campaigns.hostile_run.troubles import FOR_EVER_S, FOREIGN, LINKS, Trouble
 
-BUSY_HOST = LINKS[2]
+BUSY_HOST, GATEWAY = LINKS[2:]
 SILENT_FLUX = 0.151
 """Where the guards are at work."""
 FOREIGN_BIAS = [name for name, _ in FOREIGN].index("dc_bias_v")
@@ -34,6 +34,15 @@ def test_a_hostile_run_passes_no_limit_and_writes_nothing(tmp_path, name):
     assert not judged.broken, judged
     assert judged.ended in ("rejected", "aborted", "faulted"), judged
     assert said in judged.reason
+    assert judged.flux < 0.95
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("motor", ["default", "0k37_large_drive"])
+def test_a_slow_link_that_does_nothing_wrong_is_commissioned(tmp_path, motor):
+    """Over it the first climb takes most of the time that a first current has: its levels were held too briefly to tell the motor."""
+    judged = run_one(273, motor, Trouble("none", 0, 0.0, FOR_EVER_S, 0.0), tmp_path, GATEWAY)
+    assert (judged.ended, judged.wrong, judged.broken) == ("commissioned", (), ()), judged
     assert judged.flux < 0.95
 
 

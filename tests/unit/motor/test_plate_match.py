@@ -19,6 +19,7 @@ from commissioner.motor.plate_match import (
     plate_match,
     plate_point,
     rated_point,
+    sure_mismatch,
 )
 from commissioner.motor.running import equal_leakages, stator_impedance
 from commissioner.settings import load_motor
@@ -194,3 +195,15 @@ def test_an_unseen_gain_is_the_ratio_over_the_bounds():
 def test_what_was_found_stays(record):
     with pytest.raises(FrozenInstanceError):
         record.value = 2.0
+
+
+@pytest.mark.parametrize(("std_share", "is_sure"), [(0.0, True), (0.2, True), (0.4, False)])
+def test_a_copper_loss_contradicts_the_plate_where_it_is_sure(std_share, is_sure):
+    """R_s at twice what all the plate's losses allow: 0.2 of it as a standard error leaves 1.2 times, 0.4 leaves 0.4 times."""
+    plate = load_motor("motor_2kw2")
+    machine = prior(plate).typical
+    loss = plate_match(machine, plate).copper_loss_ratio
+    hot = replace(machine, stator_resistance_ohm=2.0 / loss * machine.stator_resistance_ohm)
+    assert mismatch(plate_match(hot, plate), plate) is not None
+    assert (sure_mismatch(hot, std_share * hot.stator_resistance_ohm, plate) is not None) is is_sure
+    assert sure_mismatch(machine, 0.0, plate) is None
