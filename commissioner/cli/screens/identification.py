@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 ROWS = (
@@ -108,3 +109,36 @@ def show_sheets(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     out.print(f"Method: {document['method']}.")
     for remark in document["remarks"]:
         out.print(f"- {remark}", markup=False)
+
+
+def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_folder: Path | None = None) -> None:
+    """Of a manufacturer's sheet: the four with both errors, the circuits, each value beside the circuit's, what stays open."""
+    from commissioner.cli.screens.screen import out, table
+
+    found = document["parameters"]
+    rows = [(label, *_with_errors(found[key], factor), unit) for label, key, unit, factor in ROWS if key in found]
+    heads = ("per phase, star equivalent", "value", "std error", "of the type", "unit")
+    out.print(table("Identified from " + ", ".join(sources), heads, rows))
+    circuits = (("one cage at rated slip", document["t_circuit"]), ("two cages", document["double_cage"]))
+    lines = [
+        ("" if k else words, name, *_with_errors(q, 1.0))
+        for words, of in circuits
+        for k, (name, q) in enumerate(of.items())
+    ]
+    out.print(table("", ("T circuit, ohm at rated frequency", "", "value", "std error", "of the type"), lines))
+    loss = [
+        (name.removesuffix("_w").replace("_", " "), *_with_errors(q, 1.0)) for name, q in document["losses"].items()
+    ]
+    out.print(table("", ("losses at rated load, W", "value", "std error", "of the type"), loss))
+    met = [(v["name"], f"{v['given']:.5g}", f"{v['reproduced']:.5g}", v["unit"], "" if v["is_fitted"] else "not used")
+           for v in document["values"]]  # fmt: skip
+    out.print(table("", ("the sheet's values", "given", "circuit", "unit", ""), met))
+    for remark in document["remarks"]:
+        out.print(f"- {remark}", markup=False)
+    if out_folder is not None:
+        out.print(f"report    {out_folder / 'report.html'}", markup=False, soft_wrap=True)
+
+
+def _with_errors(quantity: Mapping[str, Any], factor: float) -> tuple[str, str, str]:
+    value = quantity["value"]
+    return f"{factor * value:.4g}", f"{quantity['std'] / value:.1%}", f"{quantity['std_of_type'] / value:.1%}"

@@ -5,9 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from commissioner.cli.screens import screen
-from commissioner.cli.screens.identification import show, show_running, show_sheets
+from commissioner.cli.screens.identification import show, show_catalogue, show_running, show_sheets
 from commissioner.errors import UsageError
-from commissioner.operations.recordings.identify import IdentifiedRunning, IdentifiedSheets, IdentifyRequest
+from commissioner.operations.recordings.identify import (
+    IdentifiedCatalogue,
+    IdentifiedRunning,
+    IdentifiedSheets,
+    IdentifyRequest,
+)
 from commissioner.operations.recordings.identify import identify as carry_out
 from commissioner.operations.recordings.identify import identify_any as of_any_kind
 
@@ -20,6 +25,8 @@ def identify(request: IdentifyRequest, *, as_json: bool) -> None:
         screen.emit(done.document)
     elif isinstance(done, IdentifiedRunning):
         show_running(done.document, [str(path) for path in done.files])
+    elif isinstance(done, IdentifiedCatalogue):
+        show_catalogue(done.document, [str(path) for path in done.files], request.out)
     elif isinstance(done, IdentifiedSheets):
         show_sheets(done.document, [str(path) for path in done.files])
     else:

@@ -6,7 +6,8 @@ the operating point the diagnosis states.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import sqrt
 from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE, Setting
@@ -30,9 +31,23 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
         sizes = {key: value for key, (value, _, _) in cause.sizes.items()}
         if entry := CATALOGUE[cause.name].to_scenario(sizes, model.of(cause.name), setting, model):
             effects[cause.name] = entry
+    machine = {**gamma_machine(model.at_rest(setting.layout)[0]), "saturation_at_rated_flux": 0.0}
+    return _document(plate, machine, setting.facts.rated_current_peak_a, effects)
+
+
+def plain_scenario(nominal: Iterable[float], plate: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a motor by its four numbers alone, behind an ideal drive."""
+    kept = {k: plate[k] for k in PLATE if k in plate}
+    peak_a = sqrt(2.0) * float(plate["rated_current_a"])
+    return _document(kept, {**gamma_machine(nominal), "saturation_at_rated_flux": 0.0}, peak_a, {})
+
+
+def _document(
+    plate: Mapping[str, Any], machine: Mapping[str, float], rated_peak_a: float, effects: Mapping[str, Any]
+) -> dict[str, Any]:
     return {
         "nameplate": plate,
-        "machine": {**gamma_machine(model.at_rest(setting.layout)[0]), "saturation_at_rated_flux": 0.0},
+        "machine": machine,
         "power_stage": {"dead_time_s": 0.0, "threshold_v": 0.0, "slope_ohm": 0.0, "link_ripple": 0.0},
         "sensors": {
             "noise_a": 0.0,
@@ -41,7 +56,7 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
             "gain": [1.0] * 3,
             "delay_s": 0.0,
             "lag_s": 0.0,
-            "full_scale_a": FULL_SCALE * setting.facts.rated_current_peak_a,
+            "full_scale_a": FULL_SCALE * rated_peak_a,
         },
         "heating": {"stator_per_min": 0.0, "rotor_per_min": 0.0},
         "effects": effects,

@@ -24,6 +24,7 @@ from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
+from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed, is_running
 from commissioner.operations.recordings.sheets import are_sheets, are_three, require_whole_sheets
@@ -83,9 +84,11 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
     said = read_mapping(request.mapping) if request.mapping else None
-    tables = [contract_table(Path(path), said, request.motor) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
+    if (sheet := catalogue.sheet_of(request.files, said)) is not None:
+        return Diagnosed(catalogue.diagnosed(sheet, request.motor, request.trust, request.out), request.out)
+    tables = [contract_table(Path(path), said, request.motor) for path in request.files]
     if are_sheets(tables):
         return _points(tables, request)
     require_whole_sheets(tables)

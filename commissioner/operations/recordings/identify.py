@@ -72,6 +72,14 @@ class IdentifiedRunning:
 
 
 @dataclass(frozen=True)
+class IdentifiedCatalogue:
+    """Of a manufacturer's sheet; nothing is written into a drive from it."""
+
+    document: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
 class IdentifiedSheets:
     """Of test sheets: direct current, no load, locked rotor; nothing is written into a drive from them."""
 
@@ -81,17 +89,21 @@ class IdentifiedSheets:
 
 def identify_any(
     request: IdentifyRequest, observe: Observe = nobody
-) -> Identified | IdentifiedRunning | IdentifiedSheets:
+) -> Identified | IdentifiedRunning | IdentifiedSheets | IdentifiedCatalogue:
     """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine, test sheets
-    by their three tests."""
+    by their three tests, a manufacturer's sheet by its values."""
+    from commissioner.operations.recordings import catalogue
     from commissioner.operations.recordings.running import identified, is_running
     from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
-    tables = [contract_table(path, said, request.motor) for path in request.files]
     if request.out is not None:
         folder_to_write(request.out)
+    if (sheet := catalogue.sheet_of(request.files, said)) is not None:
+        made = catalogue.identified(sheet, request.motor, request.trust, request.out)
+        return IdentifiedCatalogue(made, request.files)
+    tables = [contract_table(path, said, request.motor) for path in request.files]
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     require_whole_sheets(tables)

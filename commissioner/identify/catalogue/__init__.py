@@ -1,0 +1,1 @@
+"""A motor from its manufacturer's sheet. In: printed values with their last digits; out: a double-cage circuit, the inverse-Gamma set at running slip, errors, and what the sheet leaves open. sheet, contradictions, machine, evidence, fit, answer."""

@@ -1,0 +1,76 @@
+"""An answer as the JSON that `identify` gives, and the sentences of what a sheet can and cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from commissioner.identify.catalogue.answer import UNMET, Answer, Stated
+from commissioner.identify.catalogue.sheet import KEYS
+from commissioner.identify.document import CONVENTION
+
+KIND = "manufacturer's sheet"
+METHOD = "double-cage circuit that meets the sheet (Pedra and Corcoles 2004, doi:10.1109/TEC.2003.822314); errors linearised at it"
+WORDS = {
+    "stator_resistance_ohm": "R_s", "rotor_resistance_ohm": "R_R", "leakage_inductance_h": "L_sigma", "magnetizing_inductance_h": "L_M",
+}  # fmt: skip
+
+
+def document(found: Answer) -> dict[str, Any]:
+    """Plain JSON types. `std` of a parameter is that of a motor of this type, `std_of_type` without the tolerances."""
+    return {
+        "kind": KIND,
+        "method": METHOD,
+        "convention": CONVENTION,
+        "parameters": {k: _stated(v) for k, v in found.parameters.items()},
+        "holds_for_stator_flux_wb": found.stator_flux_wb,
+        "withheld": dict(found.withheld),
+        "t_circuit": {k: _stated(v) for k, v in found.t_circuit.items()},
+        "double_cage": {k: _stated(v) for k, v in found.cages.items()},
+        "losses": {k: _stated(v) for k, v in found.losses.items()},
+        "values": [asdict(row) | {"name": KEYS[row.key][0], "unit": KEYS[row.key][1]} for row in found.rows],
+        "assumed": [asdict(one) for one in found.assumed],
+        "nameplate": None if found.plate is None else {k: v for k, v in asdict(found.plate).items() if v is not None},
+        "remarks": remarks(found),
+    }
+
+
+def remarks(found: Answer) -> list[str]:
+    """What was decided, what is not met, what a sheet cannot tell."""
+    out = list(found.sheet.remarks)
+    out += [
+        f"{WORDS[name]} is withheld: the sheet does not tell it; it would need {need}."
+        for name, need in found.withheld.items()
+    ]
+    unmet = [row for row in found.rows if abs(row.reproduced / row.given - 1.0) > UNMET]
+    out += [
+        f"{KEYS[r.key][0]}: {r.given:.4g} on the sheet, {r.reproduced:.4g} of the circuit"
+        + (
+            ": no circuit meets all values to their digits, the errors are larger for it."
+            if r.is_fitted
+            else " (not used)."
+        )
+        for r in unmet
+    ]
+    if not found.cages:
+        out.append(
+            "Starting current and starting torque are not both there: one cage, as it is at rated slip; the start is not described."
+        )
+    out += [
+        f"Not on the sheet: {one.words}; taken as other motors have it ({one.source}), within a factor of {one.factor:.2f}."
+        for one in found.assumed
+    ]  # fmt: skip
+    return [
+        *out,
+        "The sheet is of the type: a motor of it may differ within the tolerances of IEC 60034-1, which the error holds (std_of_type: without).",
+        "R_s is warm (about 85 degC); L_M holds at the rated flux. No sheet tells iron that bends, bars over frequency beyond two cages, or "
+        "anything of the inverter: a measurement does.",
+    ]  # fmt: skip
+
+
+def _stated(value: Stated) -> Mapping[str, Any]:
+    return {
+        "value": value.value, "std": value.std, "std_of_type": value.of_type,
+        "from": {"rounding": value.rounding, "assumptions": value.assumptions, "tolerances": value.tolerances},
+    }  # fmt: skip

@@ -1,0 +1,114 @@
+"""What a sheet calls its values, in English and German: `P_N [kW]`, `Wirkungsgrad 3/4`, `I_A/I_N`, `cos phi`, `Kippmoment`."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from commissioner.identify.catalogue.sheet import KEYS
+from commissioner.recordings.units import unbracketed, unit_in
+
+_RATED = r"(?:rated|nominal|full ?load|nenn|bemessungs)?"
+_OVER = (
+    r"(?:ratio|verhaltnis|multiple|factor|(?:perunit|pu))?(?:/(?:in|ir|i|mn|mr|m|tn|tr|t|cn|c|rated\w*|nenn\w*|fl\w*))?"
+)
+_START = r"(?:starting|start|lockedrotor|anlauf|anzugs|anzug)"
+_LOAD = r"(?:(?:at|bei)?(?:load|last)?(4/4|3/4|2/4|1/2|1/1|100|75|50|fullload|volllast|fl)(?:load|last)?)?"
+NAMES = {
+    "rated_power_w": rf"{_RATED}(?:output|shaft|mechanical|wellen|abgabe|motor)?(?:power|leistung|output)|p[nr2]?|kw|hp|ps",
+    "rated_voltage_v": rf"{_RATED}(?:line|supply)?(?:voltage|spannung)|[uv][nr]?",
+    "rated_frequency_hz": rf"{_RATED}(?:supply)?(?:frequency|frequenz|netzfrequenz)|f[nr]?",
+    "rated_speed_rpm": rf"{_RATED}(?:speed|drehzahl)|n[nr]?|rpm",
+    "rated_slip": rf"{_RATED}(?:slip|schlupf)|s[nr]?",
+    "rated_current_a": rf"{_RATED}(?:current|strom|amps)|i[nr]?|fla|flc",
+    "power_factor": rf"{_RATED}(?:powerfactor|leistungsfaktor|pf|cos(?:phi)?[nr]?){_LOAD}",
+    "efficiency": rf"{_RATED}(?:efficiency|wirkungsgrad|eff|eta[nr]?){_LOAD}",
+    "rated_torque_nm": rf"{_RATED}(?:torque|moment|drehmoment)|[mtc][nr]?",
+    "starting_current": rf"(?:{_START}(?:current|strom)|i(?:a|st|s|lr|l|anl)|lra|lrc){_OVER}",
+    "starting_torque": rf"(?:{_START}(?:torque|moment|drehmoment)|[mtc](?:a|st|lr|l|d)|lrt){_OVER}",
+    "breakdown_torque": rf"(?:(?:breakdown|pullout|maximum|max|kipp)(?:torque|moment|drehmoment)|[mtc](?:k|max|b|m)|bdt){_OVER}",
+    "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mtc](?:s|u|pu)){_OVER}",
+    "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
+    "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor",
+    "winding_resistance": r"(?:winding|stator|phase|wicklungs|strang|klemmen|terminal)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
+    "winding_temperature_c": r"(?:winding|resistance|wicklungs)temperatu?re?|temperature|temperatur",
+    "pole_pairs": r"pole?pairs?|polpaare|polpaarzahl|numberofpolepairs",
+    "poles": r"(?:numberof)?poles?|polzahl|2p",
+    "connection": r"connection|schaltung|wiring|wicklungsschaltung",
+    "design_class": r"(?:nema|iec)?design(?:class|letter)?",
+}  # fmt: skip
+"""Patterns of the letters and digits of a name; a group says the load."""
+_PATTERNS = {key: re.compile(pattern.replace(" ", "")) for key, pattern in NAMES.items()}
+_GREEK = {"η": "eta", "φ": "phi", "ϕ": "phi", "ϑ": "temperature", "₀": "0", "µ": "u", "½": "1/2", "¾": "3/4"}
+_SUFFIX = re.compile(r"(?<=[a-z])_(kw|w|hp|v|kv|hz|a|nm|rpm|ohm|c|pct|percent|kg_m2|kgm2)$", re.IGNORECASE)
+HALF_LOADS = {"3/4": "_75", "75": "_75", "2/4": "_50", "1/2": "_50", "50": "_50"}
+_LOADS = re.compile(
+    r"[\[(]?\s*(?:4/4|100|1/1)\s*%?\s*[/|,; -]+\s*(?:3/4|75)\s*%?\s*[/|,; -]+\s*(?:1/2|2/4|50)\s*%?\s*(?:load|last)?\s*[\])]?",
+    re.IGNORECASE,
+)
+"""Three loads behind one name: `Efficiency 100/75/50 %`."""
+
+
+def key_of(name: str) -> str | None:
+    """The key of `KEYS` that a name means (`starting_current` and its like without ratio or unit; winding_resistance, poles, connection
+    and design_class beside them), or None."""
+    if name.strip().lower() in KEYS:
+        return name.strip().lower()
+    if (found := SAID_WHOLE.get(name.strip().lower())) is not None:
+        return found
+    letters = _letters(_SUFFIX.sub("", _without_unit(_LOADS.sub("", name))))
+    for key, pattern in _PATTERNS.items():
+        if (match := pattern.fullmatch(letters)) is not None:
+            return key + (HALF_LOADS.get(match[1] or "", "") if pattern.groups else "")
+    return None
+
+
+SAID_WHOLE = {f"{kind}_{load}": f"{kind}_{load}" for kind in ("efficiency", "power_factor") for load in (75, 50)}
+
+
+def unit_of(name: str) -> str:
+    """The unit in a name: in brackets, after a slash that divides by none of the rated values, or as its last letters (`_kw`)."""
+    if (ending := _SUFFIX.search(name.strip())) is not None:
+        return {"pct": "%", "percent": "%", "kg_m2": "kgm2"}.get(ending[1].lower(), ending[1])
+    if (bare := re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)) is not None:
+        return "" if _is_load(bare[1]) else bare[1].strip()
+    found = unbracketed(unit_in(name))
+    return (
+        "" if found != unit_in(name).strip() or re.fullmatch(r"[A-Za-z]_?[A-Za-z]+|\d", found) or not found else found
+    )
+
+
+def is_ratio(name: str) -> bool:
+    """Whether the name says that it is one: `I_A/I_N`, `starting current ratio`."""
+    return re.search(r"/[imtc][_ ]?[nr]?|/rated|/nenn|ratio|verh|multiple|_pu\b", name.lower()) is not None
+
+
+def is_between_terminals(name: str) -> bool | None:
+    """Of a winding's resistance: between two terminals, of one phase, or unsaid."""
+    lower = name.lower()
+    if re.search(r"uv|u-v|terminal|line|klemme|phase[- ]?(?:to[- ]?)?phase|zwischen", lower):
+        return True
+    return False if re.search(r"phase|strang|per ph|_ph", lower) else None
+
+
+def _is_load(text: str) -> bool:
+    return (
+        re.fullmatch(
+            r"\s*(?:4/4|3/4|2/4|1/2|1/1|(?:100|75|50)\s*%?|full load|volllast)\s*(?:load|last)?\s*", text.lower()
+        )
+        is not None
+    )
+
+
+def _without_unit(name: str) -> str:
+    """Without a unit in brackets at the end; a load in brackets stays."""
+    found = re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)
+    return name[: found.start()] if found is not None and not _is_load(found[1]) else name
+
+
+def _letters(name: str) -> str:
+    """Lower-case letters, digits and slashes, without marks above them."""
+    for letter, word in _GREEK.items():
+        name = name.lower().replace(letter, word)
+    plain = unicodedata.normalize("NFKD", name.lower())
+    return re.sub(r"[^a-z0-9/]", "", plain)

@@ -1,0 +1,209 @@
+"""A manufacturer's sheet from a file: a value a line (`name: value unit`, `name;value;unit`), or one row below its names.
+
+Recognised by its names; a table with a time, or with the columns of a test sheet, or with rows of numbers, is none.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from commissioner.errors import DataRefused
+from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS, Sheet, Value
+from commissioner.motor.nameplate import connection_of
+from commissioner.recordings.catalogue import names
+from commissioner.recordings.catalogue.cells import refused, split_unit, unit_key, value_of
+from commissioner.recordings.formats.foreign_csv import read_text
+from commissioner.recordings.names import is_sheet, meaning_of
+from commissioner.recordings.reading.cells import is_number
+from commissioner.recordings.reading.layout import split
+
+ENDINGS = (".csv", ".txt", ".tsv")
+LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 4
+"""Of a sheet; and how many values that it knows make one."""
+TELLING = ("efficiency", "starting_", "breakdown_", "rated_slip", "power_factor", "rated_power")
+"""One of them at least is on a sheet of a manufacturer."""
+PAIR = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[A-Za-zΔ△]*\s*/\s*(\d+(?:[.,]\d+)?)\s*([^/]*)$")
+TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """`key` of `names.key_of`; the name and the cell as printed, and a unit that stood apart."""
+
+    key: str
+    name: str
+    printed: str
+    unit: str = ""
+
+
+def sheet_in(path: Path) -> Sheet | None:
+    """The sheet in a file, None where the file is none. DataRefused: it holds several motors, a value twice, or an impossible one."""
+    if path.suffix.lower() not in ENDINGS or not path.is_file() or not 0 < path.stat().st_size <= LARGEST_BYTES:
+        return None
+    text, _ = read_text(path)
+    lines = [line.strip().lstrip("\ufeff") for line in text.replace("\r", "\n").split("\n") if line.strip()]
+    if len(lines) > MOST_LINES or _is_table_of_samples(lines):
+        return None
+    entries = list(_table(lines, str(path)) or _lines(lines))
+    keys = {e.key for e in entries}
+    if len(keys) < FEWEST or not any(key.startswith(TELLING) for key in keys):
+        return None
+    return _sheet(entries, str(path))
+
+
+def _cells(line: str) -> list[str]:
+    """Of a line: between semicolons or tabs, else commas."""
+    separator = next((s for s in (";", "\t") if s in line), ",")
+    return [cell.strip('" ') for cell in split(line.lstrip("# "), separator)]
+
+
+def _is_table_of_samples(lines: Sequence[str]) -> bool:
+    rows = [_cells(line) for line in lines]
+    numbers = [row for row in rows if len(row) >= 3 and sum(map(is_number, row)) >= 3]
+    alike = len({len(row) for row in numbers}) == 1
+    if len(numbers) > 2 and alike and not any(sum(names.key_of(c) is not None for c in row) >= FEWEST for row in rows):
+        return True
+    return any(is_sheet(row) or any(meaning_of(c) == "time_s" for c in row if len(row) > 2) for row in rows)
+
+
+def _table(lines: Sequence[str], source: str) -> list[Entry]:
+    """Names in one line, units below or not, values in one line; nothing of a file of another form."""
+    head = next(
+        (k for k, line in enumerate(lines) if sum(names.key_of(c) is not None for c in _cells(line)) >= FEWEST), None
+    )
+    if head is None:
+        return []
+    above = list(_lines(lines[:head]))
+    titles, rows = _cells(lines[head]), [_cells(line) for line in lines[head + 1 :]]
+    units = rows.pop(0) if rows and not any(map(is_number, rows[0])) else [""] * len(titles)
+    if len(rows) != 1:
+        raise refused(f"{len(rows)} rows of values stand below the names", len(rows), "one motor, one row", source)
+    if len(rows[0]) != len(titles):
+        raise refused(
+            f"the row holds {len(rows[0])} cells and {len(titles)} names stand above (decimal commas between commas?)", lines[-1][:100],
+            "as many cells as names", source,
+        )  # fmt: skip
+    units += [""] * (len(titles) - len(units))
+    found = [
+        Entry(key, t, c, u)
+        for t, c, u in zip(titles, rows[0], units, strict=False)
+        if c and (key := names.key_of(t)) is not None
+    ]
+    return above + found
+
+
+_LINE = (
+    re.compile(r"^([^;\t]+?)\s*[;\t]\s*(.+)$"),
+    re.compile(r"^([^:=]+?)\s*[:=]\s*(.+)$"),
+    re.compile(r"^([^,]+?)\s*,\s*(.+)$"),
+)
+
+
+def _lines(lines: Sequence[str]) -> Iterator[Entry]:
+    for line in lines:
+        for pattern in _LINE:
+            found = pattern.match(line.lstrip("# "))
+            if found is not None and (key := names.key_of(found[1].strip('" '))) is not None:
+                yield Entry(key, found[1].strip('" '), found[2].strip('" '))
+                break
+
+
+def _sheet(entries: Sequence[Entry], source: str) -> Sheet:
+    words = {e.key: e.printed.strip() for e in entries if e.key in ("connection", "design_class")}
+    connection = str(connection_of(words.get("connection", "")))
+    sheet = Sheet(
+        {}, connection if connection in ("star", "delta") else "", words.get("design_class", "").upper()[-1:], source
+    )
+    unsaid: list[str] = []
+    for entry in entries:
+        if entry.key in words:
+            continue
+        for key, value in _read(entry, sheet, unsaid):
+            sheet = _with(sheet, key, value, entry.name)
+    remarks = tuple(f"{name}: not said between which terminals it was measured, not used" for name in unsaid)
+    return replace(_with_unit_of_power(sheet, entries), remarks=(*sheet.remarks, *remarks))
+
+
+def _with(sheet: Sheet, key: str, value: Value, name: str) -> Sheet:
+    before = sheet.values.get(key)
+    if before is not None and abs(before.value / value.value - 1.0) > 1e-9:
+        raise refused(
+            f"{KEYS[key][0]} is said twice ({name}): two motors, or 50 and 60 Hz, on one sheet?", f"{before.printed} and {value.printed}",
+            "one value of one motor at one frequency", sheet.source,
+        )  # fmt: skip
+    return replace(sheet, values={**sheet.values, key: value})
+
+
+def _read(entry: Entry, sheet: Sheet, unsaid: list[str]) -> Iterator[tuple[str, Value]]:
+    """The values of one entry, with their keys."""
+    if entry.key in ("efficiency", "power_factor") and (three := TRIPLE.match(entry.printed)):
+        unit = three[4] or names.unit_of(entry.name)
+        for ending, number in zip(("", "_75", "_50"), three.groups()[:3], strict=True):
+            yield entry.key + ending, value_of(entry.key + ending, number, unit, entry.name, sheet.source)
+        return
+    printed = _of_connection(entry, sheet) if (PAIR.match(entry.printed)) else entry.printed
+    found = split_unit(printed)
+    if found is None:
+        return
+    number, unit = found
+    unit = unit.partition(";")[0].strip() or entry.unit or names.unit_of(entry.name)
+    key = _whole_key(entry, unit, unsaid)
+    if key == "poles":
+        yield "pole_pairs", Value(value_of("pole_pairs", number, "", entry.name, sheet.source).value / 2.0, 0.0, number)
+    elif key:
+        yield key, value_of(key, number, "" if _says_it_again(key, unit) else unit, entry.name, sheet.source)
+
+
+def _says_it_again(key: str, unit: str) -> bool:
+    """`7,4 x I_N`, `2,3 M_N`: what a ratio is of."""
+    return key.endswith("_ratio") and re.fullmatch(r"[x×*·]?\s*[imtc]_?[nr]?|-?fach", unit.lower().strip()) is not None
+
+
+def _whole_key(entry: Entry, unit: str, unsaid: list[str]) -> str:
+    """The key with ratio or unit, with terminals or phase; nothing where that is not said."""
+    if entry.key in ABSOLUTE:
+        ending = "_a" if ABSOLUTE[entry.key] == "rated_current_a" else "_nm"
+        is_absolute = unit_key(unit) in {"a", "ka", "nm", "knm", "kgm", "lbft"} and not names.is_ratio(entry.name)
+        return entry.key + (ending if is_absolute else "_ratio")
+    if entry.key == "winding_resistance":
+        between = names.is_between_terminals(entry.name)
+        if between is None:
+            unsaid.append(entry.name)
+            return ""
+        return "winding_resistance_uv_ohm" if between else "winding_resistance_phase_ohm"
+    return entry.key
+
+
+def _of_connection(entry: Entry, sheet: Sheet) -> str:
+    """Of `230/400 V` or `8,7/5,0 A` the value of the connection that is said. DataRefused: none is, or it is no such pair."""
+    found = PAIR.match(entry.printed)
+    assert found is not None
+    pair = sorted((found[1], found[2]), key=lambda t: float(t.replace(",", ".")))
+    if entry.key not in ("rated_voltage_v", "rated_current_a"):
+        raise refused(
+            f"{entry.name} holds two values", entry.printed, "one value of one motor at one frequency", sheet.source
+        )
+    if not sheet.connection:
+        raise DataRefused(
+            f"{sheet.source}: {entry.name} holds the values of two connections and the sheet does not say which is meant", step="read the sheet",
+            value=entry.printed, limit="connection: star or connection: delta", remedy="add a line `connection: star` or `connection: delta`",
+        )  # fmt: skip
+    is_high = (sheet.connection == "star") == (entry.key == "rated_voltage_v")
+    return f"{pair[1] if is_high else pair[0]} {found[3]}"
+
+
+def _with_unit_of_power(sheet: Sheet, entries: Sequence[Entry]) -> Sheet:
+    """A power without any unit is in kW where volts and amperes say so."""
+    named = next((e for e in entries if e.key == "rated_power_w"), None)
+    power, voltage, current = (sheet.get(k) for k in ("rated_power_w", "rated_voltage_v", "rated_current_a"))
+    if named is None or power is None or voltage is None or current is None:
+        return sheet
+    is_said = names.unit_of(named.name) or named.unit or (split_unit(named.printed) or ("", ""))[1]
+    if is_said or power > 0.05 * math.sqrt(3.0) * voltage * current:
+        return sheet
+    said = f"the rated power has no unit: {power:g} was taken as kW, by volts and amperes"
+    return replace(sheet.with_value("rated_power_w", 1e3 * power), remarks=(*sheet.remarks, said))
