@@ -18,7 +18,7 @@ from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate
 
 SILENT = 0.75
-"""Of an assumption's spread that is left: above it the sheet did not tell the value, the assumption did."""
+"""Of an assumption's spread: an error above it is the assumption's, the sheet did not tell the value."""
 WITHHELD = {
     "stator_resistance_ohm": ("stator_resistance", "a winding resistance, or efficiency, power factor and speed"),
     "rotor_resistance_ohm": ("rotor_resistance", "the rated speed or slip"),
@@ -89,11 +89,14 @@ def answer(sheet: Sheet) -> Answer:
         missing = [KEYS[k][0] for k in ("rated_voltage_v", "rated_frequency_hz", "rated_power_w") if not sheet.has(k)]
         raise _too_little(sheet, f"it lacks {', '.join(missing)}", ", ".join(missing))
     found = fit(evidence)
-    told = dict(zip((a.name for a in evidence.assumptions), found.told, strict=True))
-    withheld = {k: need for k, (name, need) in WITHHELD.items() if told[name] > SILENT}
+    every = _parameters(found)
+    spreads = {a.name: a.std for a in evidence.assumptions}
+    withheld = {
+        k: need for k, (name, need) in WITHHELD.items() if every[k].of_type > SILENT * spreads[name] * every[k].value
+    }
     if len(withheld) == len(WITHHELD):
         raise _too_little(sheet, "it tells none of the four parameters", "; ".join(withheld.values()))
-    parameters = _parameters(found, withheld)
+    parameters = _without(every, withheld)
     has_start = sheet.has("starting_current_ratio", "starting_torque_ratio")
     w = 2.0 * math.pi * evidence.scale.frequency_hz
     voltage = evidence.scale.voltage_v
@@ -126,7 +129,7 @@ def _rated_slip(evidence: Evidence, numbers: Array) -> Array:
     return np.asarray(loaded(numbers, np.array([evidence.scale.shaft])).slip[:, 0])
 
 
-def _parameters(found: Fit, withheld: Mapping[str, str]) -> dict[str, Stated]:
+def _parameters(found: Fit) -> dict[str, Stated]:
     scale = found.evidence.scale
     w = 2.0 * math.pi * scale.frequency_hz
     units = scale.impedance_ohm * np.array([1.0, 1.0, 1.0 / w, 1.0 / w])
@@ -135,10 +138,13 @@ def _parameters(found: Fit, withheld: Mapping[str, str]) -> dict[str, Stated]:
         four = inverse_gamma(x, _rated_slip(found.evidence, x)) * units
         return np.concatenate([four, four[:, 3:] / four[:, 1:2]], axis=1)
 
-    every = _named(found, of, (*PARAMETERS, "rotor_time_constant_s"))
-    lost = set(withheld) | (
-        {"rotor_time_constant_s"} if {"rotor_resistance_ohm", "magnetizing_inductance_h"} & set(withheld) else set()
-    )
+    return _named(found, of, (*PARAMETERS, "rotor_time_constant_s"))
+
+
+def _without(every: Mapping[str, Stated], withheld: Mapping[str, str]) -> dict[str, Stated]:
+    """Without the withheld and the time constant that needs them."""
+    is_timeless = {"rotor_resistance_ohm", "magnetizing_inductance_h"} & set(withheld)
+    lost = {*withheld, *(("rotor_time_constant_s",) if is_timeless else ())}
     return {k: v for k, v in every.items() if k not in lost}
 
 
@@ -230,7 +236,9 @@ def _plate(sheet: Sheet, found: Fit) -> Nameplate | None:
         and (synchronous := synchronous_rpm(sheet)) is not None
     ):
         speed = synchronous * (1.0 - slip)
-    factor = sheet.get("power_factor")
+    factor, efficiency = sheet.get("power_factor"), sheet.get("efficiency")
+    if factor is None and efficiency is not None:
+        factor = scale.shaft / efficiency
     if speed is None or pairs is None or factor is None:
         return None
     return Nameplate(

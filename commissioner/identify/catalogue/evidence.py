@@ -89,9 +89,10 @@ class Evidence:
         """(n, assumptions), logarithms, in the order of `assumptions_for`."""
         r_s, x_m, r_0, x_r, x_s, d, t, iron, friction, stray, saturation = numbers.T
         rotor = x_r + r_0 * d * t
-        return np.log(
+        logs: Array = np.log(
             np.stack([r_s, x_m, r_0, x_s + rotor, x_s / rotor, d, t, iron, friction, stray, saturation], axis=1)
         )
+        return logs
 
 
 def evidence_of(sheet: Sheet) -> Evidence | None:
@@ -223,10 +224,10 @@ def assumptions_for(sheet: Sheet, scale: Scale) -> tuple[Assumption, ...]:
         Assumption("rotor_resistance", "the rotor's resistance at running slip", s, 0.5, "its share of the losses"),
         Assumption("leakage", "the leakage reactance", 0.17, 0.4, machines),
         Assumption("leakage_split", "the stator's leakage over the rotor's", share, 0.35, "IEEE 112-2017, 5.9"),
-        Assumption("displacement", "how much the rotor's resistance rises at standstill", 1.0, 1.0, "cage rotors"),
+        Assumption("displacement", "how much the rotor's resistance rises at standstill", 0.8, 1.5, "cage rotors"),
         Assumption("displacement_frequency", "at which slip it rises (as 1 over it)", 3.0, 0.7, "cage rotors"),
-        Assumption("iron_loss", "the iron loss", 0.2 * loss, 0.45, "0.2 of all losses"),
-        Assumption("friction", "friction and windage", 0.07 * loss, 0.6, "0.07 of all losses"),
+        Assumption("iron_loss", "the iron loss", 0.18 * loss, 0.6, "0.18 of all losses"),
+        Assumption("friction", "friction and windage", 0.07 * loss, 0.7, "0.07 of all losses"),
         Assumption("stray_loss", "the additional load loss", stray, 0.5, "0.7 of the allowance of IEC 60034-2-1"),
         Assumption("leakage_saturation", "the leakage at the starting current over that at the rated one", 0.9, 0.12, "built machines"),
     )  # fmt: skip

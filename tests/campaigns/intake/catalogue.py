@@ -5,11 +5,19 @@ python -m tests.campaigns.intake.catalogue --draws 200
 
 from __future__ import annotations
 
+import argparse
 import math
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
+
+from commissioner.identify.catalogue.answer import Answer, answer
+from commissioner.identify.catalogue.contradictions import settled
+from commissioner.motor.circuit import PARAMETERS
+from commissioner.recordings.catalogue.reading import sheet_in
 
 NAMES = ("R_s", "R_R", "L_sigma", "L_M")
 SIZES_KW = (0.37, 0.75, 1.5, 2.2, 4, 5.5, 7.5, 11, 15, 22, 30, 45, 55, 75, 90, 132, 160, 200, 315)
@@ -85,13 +93,13 @@ def draw(random: np.random.Generator) -> tuple[Machine, float]:
     return machine, power
 
 
-def values(machine: Machine, power: float) -> dict[str, float] | None:
+def values(machine: Machine, power: float, is_usual: bool = True) -> dict[str, float] | None:
     """The catalogue's values, exact; None where the machine cannot carry its power as motors do."""
     rated = power / (math.sqrt(3.0) * machine.voltage_v * 0.85 * 0.85)
     for _ in range(4):
         slips = np.geomspace(1e-3, 0.3, 60)
         shafts = [machine.shaft(s, rated) for s in slips]
-        if max(shafts) < 1.5 * power:
+        if max(shafts) < (1.5 if is_usual else 1.02) * power:
             return None
         first = next(k for k, p in enumerate(shafts) if p > power)
         slip = brentq(lambda s, r=rated: machine.shaft(s, r) - power, slips[max(first - 1, 0)], slips[first])
@@ -113,9 +121,9 @@ def values(machine: Machine, power: float) -> dict[str, float] | None:
     usual = (
         1.5 < out["breakdown_torque_ratio"] < 4.5
         and 3.5 < out["starting_current_ratio"] < 10
-        and 0.7 < out["starting_torque_ratio"] < 4
+        and 0.7 < out["starting_torque_ratio"] < min(4.0, out["breakdown_torque_ratio"])
     )
-    return out if usual else None
+    return out if usual or not is_usual else None
 
 
 def scattered(exact: dict[str, float], random: np.random.Generator) -> dict[str, float]:
@@ -138,8 +146,9 @@ def scattered(exact: dict[str, float], random: np.random.Generator) -> dict[str,
     out["starting_current_ratio"] = (
         exact["starting_current_ratio"] * exact["rated_current_a"] / out["rated_current_a"] / (1.0 + 0.2 * u(-1, 1))
     )
-    out["starting_torque_ratio"] = exact["starting_torque_ratio"] / (1.0 + u(-0.15, 0.25))
     out["breakdown_torque_ratio"] = exact["breakdown_torque_ratio"] / (1.0 + 0.1 * u(-1, 1))
+    start = exact["starting_torque_ratio"] / (1.0 + u(-0.15, 0.25))
+    out["starting_torque_ratio"] = min(start, out["breakdown_torque_ratio"])
     return out
 
 
@@ -162,3 +171,88 @@ def printed(exact: dict[str, float]) -> dict[str, str]:
         else:
             out[key] = f"{value:g}"
     return out
+
+
+LABELS = {
+    "rated_power_w": "Rated power [W]", "rated_voltage_v": "Rated voltage [V]", "rated_frequency_hz": "Frequency [Hz]",
+    "rated_speed_rpm": "Speed [1/min]", "rated_current_a": "Rated current [A]", "power_factor": "cos phi 4/4",
+    "power_factor_75": "cos phi 3/4", "power_factor_50": "cos phi 1/2", "efficiency": "Efficiency 4/4", "efficiency_75": "Efficiency 3/4",
+    "efficiency_50": "Efficiency 1/2", "starting_current_ratio": "I_A/I_N", "starting_torque_ratio": "M_A/M_N",
+    "breakdown_torque_ratio": "M_K/M_N", "winding_resistance_uv_ohm": "Winding resistance between terminals, 20 degC [ohm]",
+}  # fmt: skip
+PARTS = ("power_factor_75", "power_factor_50", "efficiency_75", "efficiency_50")
+START = ("starting_current_ratio", "starting_torque_ratio")
+PAGES = {"a whole page": (), "without part loads": PARTS, "without part loads and start": (*PARTS, *START)}
+
+
+def page(exact: dict[str, float], without: tuple[str, ...] = ()) -> str:
+    """The sheet as a technician types it."""
+    lines = printed({k: v for k, v in exact.items() if k not in without})
+    return "".join(f"{LABELS[key]}; {text.replace('.', ',')}\n" for key, text in lines.items())
+
+
+def found_in(text: str) -> Answer:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "sheet.csv"
+        path.write_text(text, encoding="utf-8")
+        sheet = sheet_in(path)
+    assert sheet is not None
+    return answer(settled(sheet, frozenset()))
+
+
+@dataclass(frozen=True)
+class Covered:
+    """Of some draws, `(n, 4)` each: error over its stated standard deviation, that over the value, error over the truth."""
+
+    sigmas: np.ndarray
+    stated: np.ndarray
+    off: np.ndarray
+
+
+def covered(draws: int, seed: int, without: tuple[str, ...] = (), is_another: bool = False) -> Covered:
+    """`is_another`: the sheet is of the type and the truth of another motor of it. What a sheet withholds is not a number."""
+    random = np.random.default_rng(seed)
+    sigmas, stated, off = [], [], []
+    while len(sigmas) < draws:
+        machine, power = draw(random)
+        exact = values(machine, power)
+        if exact is None:
+            continue
+        found = found_in(page(scattered(exact, random) if is_another else exact, without))
+        one = [found.parameters.get(name) for name in PARAMETERS]
+        value = np.array([np.nan if q is None else q.value for q in one])
+        std = np.array([np.nan if q is None else (q.std if is_another else q.of_type) for q in one])
+        truth = machine.truth(exact["rated_slip"])
+        sigmas.append((value - truth) / std)
+        stated.append(std / value)
+        off.append(value / truth - 1.0)
+    return Covered(np.array(sigmas), np.array(stated), np.array(off))
+
+
+def share(inside: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """Of those that are numbers."""
+    return np.sum(inside, axis=0) / np.maximum(np.sum(np.isfinite(of), axis=0), 1)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=39)
+    asked = parser.parse_args()
+    for is_another in (False, True):
+        for name, without in PAGES.items():
+            of = covered(asked.draws, asked.seed, without, is_another)
+            print(
+                f"{name}, {'a motor within the tolerances of the type' if is_another else 'the type itself'}: {asked.draws} draws"
+            )
+            inside = share(np.abs(of.sigmas) < 2, of.sigmas), share(np.abs(of.sigmas) < 1, of.sigmas)
+            for k, n in enumerate(NAMES):
+                print(
+                    f"    {n:8} within 2 std {inside[0][k]:6.1%}, within 1 std {inside[1][k]:6.1%}; stated {np.nanmedian(of.stated[:, k]):6.1%}, "
+                    f"off by {np.nanmedian(abs(of.off[:, k])):6.1%} in the median, {np.nanpercentile(abs(of.off[:, k]), 95):6.1%} in 1 of 20; "
+                    f"withheld {np.mean(np.isnan(of.off[:, k])):.0%}"
+                )
+
+
+if __name__ == "__main__":
+    main()
