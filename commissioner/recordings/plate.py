@@ -52,7 +52,7 @@ def has_no_plate(metadata: Mapping[str, float | str]) -> bool:
 
 
 def start_from(path: Path) -> Start:
-    """What commissioning found: the `parameters` of a run's result, as the start and the prior of the fit."""
+    """What commissioning or `identify` found: its `parameters` as the start and the prior of the fit, as wide as they were uncertain."""
     if not path.is_file() or path.stat().st_size > MAX_RESULT_BYTES:
         raise UsageError(
             f"there is no result {path}",
@@ -61,18 +61,13 @@ def start_from(path: Path) -> Start:
             limit="the result.json of a run",
             remedy="give the result.json of a commissioning run",
         )
+    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
     try:
-        parameters = json.loads(path.read_text("utf-8"))["parameters"]
-        values = [
-            float(parameters[name]["value"])
-            for name in (
-                "stator_resistance_ohm",
-                "rotor_resistance_ohm",
-                "leakage_inductance_h",
-                "magnetizing_inductance_h",
-            )
-        ]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        document = json.loads(path.read_text("utf-8"))
+        parameters, kind = document["parameters"], str(document.get("kind", "commissioning result"))
+        values = [float(parameters[name]["value"]) for name in names]
+        stds = [float(parameters[name].get("std") or 0.0) for name in names]
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ConfigurationError(
             file=str(path),
             key="parameters",
@@ -81,4 +76,8 @@ def start_from(path: Path) -> Start:
         ) from error
     if not all(np.isfinite(v) and v > 0 for v in values):
         raise ConfigurationError(file=str(path), key="parameters", value=str(values), expected="four numbers above 0")
-    return Start(equal_leakages(InverseGamma(*values)), PRIOR_FROM_COMMISSIONING, f"commissioning result {path.name}")
+    r_s, r_r, leakage, main = (std / value for std, value in zip(stds, values, strict=True))
+    own = (r_s, r_r, main, leakage)
+    log_std = tuple(max(a, min(b, 1.0)) for a, b in zip(PRIOR_FROM_COMMISSIONING, own, strict=True))
+    circuit = equal_leakages(InverseGamma(*values))
+    return Start(circuit, (log_std[0], log_std[1], log_std[2], log_std[3]), f"{kind} {path.name}")

@@ -26,6 +26,7 @@ from commissioner.motor.computed import without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
+from commissioner.recordings.reading.said_tests import codes, is_title
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
@@ -362,6 +363,8 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
         elif name in CONTRACT_COLUMNS:
             raise _not_numeric(path, name, _first_text(column))
+        elif is_title(name) and (said := codes([str(cell) for cell in column.to_pylist()])) is not None:
+            columns[name] = said
     return Table(columns, metadata, str(path))
 
 

@@ -1,7 +1,7 @@
 """The motor from the three tests of a textbook: direct current, no load and locked rotor, one row each or a few.
 
 IEEE 112-2017, 5.9 (impedance test): R_s from direct current, L_s = L_sigma + L_M from no load, L_sigma and R_R from the locked
-rotor with the magnetizing branch kept. Which row is which test follows from its frequency and its inductance; nothing is left
+rotor with the magnetizing branch kept. Which row is which test follows from its frequency and its inductance, and must be what the sheet calls it; nothing is left
 over to judge the circuit by, and the result says so.
 """
 
@@ -21,7 +21,7 @@ from commissioner.diagnose.points.table import LEAST_POINTS
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.running import TCircuit
-from commissioner.records import POINT_COLUMNS
+from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, POINT_COLUMNS
 
 APART = 3.0
 """Least ratio of the inductances of no load and locked rotor: L_s over L_sigma is 5 to 30 of built motors."""
@@ -56,6 +56,9 @@ class ThreeTests:
     rows: Mapping[str, int]
 
 
+COLUMNS = ("frequency_hz", "voltage_v", "current_a", "power_w", "said")
+
+
 @dataclass(frozen=True)
 class _Rows:
     """Points of one test, `(n,)` each."""
@@ -64,6 +67,8 @@ class _Rows:
     voltage_v: Array
     current_a: Array
     power_w: Array
+    said: Array
+    """`records.DIRECT_TEST` and its like where the sheet names the test, else not a number."""
 
     @property
     def resistance_ohm(self) -> Array:
@@ -82,7 +87,7 @@ class _Rows:
         return np.asarray(self.reactance_ohm / (2.0 * np.pi * self.frequency_hz))
 
     def at(self, keep: NDArray[np.bool_]) -> _Rows:
-        return _Rows(self.frequency_hz[keep], self.voltage_v[keep], self.current_a[keep], self.power_w[keep])
+        return _Rows(*(getattr(self, name)[keep] for name in COLUMNS))
 
 
 def are_three_tests(tables: Sequence[Mapping[str, Array]]) -> bool:
@@ -95,6 +100,8 @@ def are_three_tests(tables: Sequence[Mapping[str, Array]]) -> bool:
         return True
     ac = _join(every)
     few = any(rows.frequency_hz.size < LEAST_POINTS for rows in every)
+    if few and {IDLE_TEST, LOCKED_TEST} <= set(ac.said.tolist()):
+        return True
     return few and ac.frequency_hz.size > 1 and bool(np.ptp(np.log(np.maximum(ac.inductance_h, 1e-12))) > np.log(APART))
 
 
@@ -108,6 +115,8 @@ def solve(
     ac = rows.at(~direct)
     if (wrong := _wrong_cell(ac)) is not None:
         return wrong
+    if (against := _called_otherwise(ac)) is not None:
+        return against
     idle, locked, assumed = _by_kind(ac)
     if not idle.frequency_hz.size or not locked.frequency_hz.size:
         kind = "no-load and locked-rotor"
@@ -161,20 +170,17 @@ def _pooled(table: Mapping[str, Array]) -> _Rows | None:
         return None
     size = table[POINT_COLUMNS[1]].size
     nothing = np.full(size, np.nan)
-    f, v, i, p = (np.asarray(table.get(c, nothing), dtype=float) for c in POINT_COLUMNS)
-    return _Rows(f, v, i, p)
+    return _Rows(*(np.asarray(table.get(c, nothing), dtype=float) for c in (*POINT_COLUMNS, "test")))
 
 
 def _join(every: Sequence[_Rows]) -> _Rows:
-    f, v, i, p = (
-        np.concatenate([getattr(r, n) for r in every]) for n in ("frequency_hz", "voltage_v", "current_a", "power_w")
-    )
-    return _Rows(f, v, i, p)
+    return _Rows(*(np.concatenate([getattr(r, name) for r in every]) for name in COLUMNS))
 
 
 def _is_direct(rows: _Rows) -> NDArray[np.bool_]:
-    """A row without frequency is of direct current."""
-    return np.asarray(~(np.nan_to_num(rows.frequency_hz) > 0.0) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0))
+    """A row without frequency is of direct current, unless it is called otherwise."""
+    no_frequency = ~(np.nan_to_num(rows.frequency_hz) > 0.0) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0)
+    return np.asarray(no_frequency & ~(rows.said > DIRECT_TEST))
 
 
 def _wrong_cell(ac: _Rows) -> DataRefused | None:
@@ -195,13 +201,52 @@ def _wrong_cell(ac: _Rows) -> DataRefused | None:
     return None
 
 
-def _by_kind(ac: _Rows) -> tuple[_Rows, _Rows, tuple[str, ...]]:
-    """No-load points, locked-rotor points, and what was left out: inductances lie in two groups."""
+def _looks_idle(ac: _Rows) -> NDArray[np.bool_] | None:
+    """By the inductance of each row; None where all are of one kind."""
     inductance = np.maximum(ac.inductance_h, 1e-12)
     if not inductance.size or inductance.max() < APART * inductance.min():
-        is_idle = np.zeros(inductance.size, dtype=bool)
-    else:
-        is_idle = inductance > np.sqrt(inductance.max() * inductance.min())
+        return None
+    return np.asarray(inductance > np.sqrt(inductance.max() * inductance.min()))
+
+
+CALLED = {DIRECT_TEST: "direct current", IDLE_TEST: "no load", LOCKED_TEST: "locked rotor"}
+
+
+def _called_otherwise(ac: _Rows) -> DataRefused | None:
+    """A row whose test, as the sheet calls it, is not what its values are."""
+    if (wrong := np.flatnonzero(ac.said == DIRECT_TEST)).size:
+        hz = float(ac.frequency_hz[wrong[0]])
+        return refused(
+            f"a row is called direct current and has a frequency of {hz:g} Hz", hz, "no frequency, or 0",
+            "correct the frequency or the test's name",
+        )  # fmt: skip
+    looks = _looks_idle(ac)
+    against = (
+        np.flatnonzero(np.isfinite(ac.said) & ((ac.said == IDLE_TEST) != looks))
+        if looks is not None
+        else np.array([], dtype=int)
+    )
+    if not against.size:
+        return None
+    k = int(against[0])
+    name, other = (
+        CALLED[c] for c in ((IDLE_TEST, LOCKED_TEST) if ac.said[k] == IDLE_TEST else (LOCKED_TEST, IDLE_TEST))
+    )
+    return refused(
+        f"the row with {ac.voltage_v[k]:g} V and {ac.current_a[k]:g} A is called {name} and is {other} by its inductance",
+        f"{1e3 * ac.inductance_h[k]:.4g} mH, the rows hold {1e3 * ac.inductance_h.min():.4g} to {1e3 * ac.inductance_h.max():.4g} mH",
+        "a larger inductance at no load than with a locked rotor", "correct the test's name or the values",
+    )  # fmt: skip
+
+
+def _by_kind(ac: _Rows) -> tuple[_Rows, _Rows, tuple[str, ...]]:
+    """No-load points, locked-rotor points, and what was left out: inductances lie in two groups."""
+    is_idle = _looks_idle(ac)
+    if is_idle is None:
+        named = np.isfinite(ac.said)
+        is_idle, ac = (ac.said == IDLE_TEST)[named], ac.at(named)
+        if not np.any(is_idle) or np.all(is_idle):
+            is_idle = np.zeros(is_idle.size, dtype=bool)
     loaded = is_idle & (ac.resistance_ohm > IDLE_POWER_FACTOR * ac.impedance_ohm)
     said = (f"{int(loaded.sum())} points of a loaded motor were not used.",) if loaded.any() else ()
     return ac.at(is_idle & ~loaded), ac.at(~is_idle), said

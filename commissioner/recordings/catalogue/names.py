@@ -56,7 +56,14 @@ def key_of(name: str) -> str | None:
         return name.strip().lower()
     if (found := SAID_WHOLE.get(name.strip().lower())) is not None:
         return found
-    letters = _letters(_SUFFIX.sub("", _without_unit(_LOADS.sub("", name))))
+    bare = _SUFFIX.sub("", _without_unit(_LOADS.sub("", name)))
+    words, _, symbol = bare.strip().rpartition(" ")
+    whole, first = _matched(bare), _matched(words)
+    return whole or (first if first is not None and first == _matched(symbol) else None)
+
+
+def _matched(name: str) -> str | None:
+    letters = _letters(name)
     for key, pattern in _PATTERNS.items():
         if (match := pattern.fullmatch(letters)) is not None:
             return key + (HALF_LOADS.get(match[1] or "", "") if pattern.groups else "")

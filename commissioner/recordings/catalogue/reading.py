@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,8 +24,15 @@ from commissioner.recordings.reading.layout import split
 ENDINGS = (".csv", ".txt", ".tsv")
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 4
 """Of a sheet; and how many values that it knows make one."""
-TELLING = ("efficiency", "starting_", "breakdown_", "rated_slip", "power_factor", "rated_power")
-"""One of them at least is on a sheet of a manufacturer."""
+TELLING = (
+    ("efficiency",),
+    ("starting_",),
+    ("breakdown_",),
+    ("rated_slip", "rated_speed"),
+    ("power_factor",),
+    ("rated_power",),
+)
+"""Two of them at least are on a sheet of a manufacturer."""
 PAIR = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[A-Za-zΔ△]*\s*/\s*(\d+(?:[.,]\d+)?)\s*([^/]*)$")
 TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
 
@@ -49,10 +56,15 @@ def sheet_in(path: Path) -> Sheet | None:
     if len(lines) > MOST_LINES or _is_table_of_samples(lines):
         return None
     entries = list(_table(lines, str(path)) or _lines(lines))
-    keys = {e.key for e in entries}
-    if len(keys) < FEWEST or not any(key.startswith(TELLING) for key in keys):
-        return None
-    return _sheet(entries, str(path))
+    return _sheet(entries, str(path)) if _are_enough({e.key for e in entries}) else None
+
+
+def _are_enough(keys: Set[str]) -> bool:
+    return len(keys) >= FEWEST and sum(any(key.startswith(of) for key in keys) for of in TELLING) > 1
+
+
+def _keys(cells: Sequence[str]) -> set[str]:
+    return {key for cell in cells if (key := names.key_of(cell)) is not None}
 
 
 def _cells(line: str) -> list[str]:
@@ -72,9 +84,7 @@ def _is_table_of_samples(lines: Sequence[str]) -> bool:
 
 def _table(lines: Sequence[str], source: str) -> list[Entry]:
     """Names in one line, units below or not, values in one line; nothing of a file of another form."""
-    head = next(
-        (k for k, line in enumerate(lines) if sum(names.key_of(c) is not None for c in _cells(line)) >= FEWEST), None
-    )
+    head = next((k for k, line in enumerate(lines) if _are_enough(_keys(_cells(line)))), None)
     if head is None:
         return []
     above = list(_lines(lines[:head]))

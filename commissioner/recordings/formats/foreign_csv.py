@@ -19,6 +19,7 @@ from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
+from commissioner.recordings.reading.said_tests import codes, is_title
 from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
@@ -95,10 +96,11 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     table = _parsed(_even(body, layout, width), layout, width, keep, source)
     columns, rows = [], table.num_rows
     bad = np.zeros(rows, dtype=np.int64)
-    for column in table.columns[layout.skip :]:
+    for name, column in zip(layout.names, table.columns[layout.skip :], strict=False):
         values, _ = to_numbers(column, marks)
-        columns.append(values)
         bad += np.isfinite(values)
+        said = codes([str(cell) for cell in column.to_pylist()]) if is_title(name) else None
+        columns.append(values if said is None else said)
     last = int(np.flatnonzero(bad)[-1]) + 1 if bad.any() else 0
     notes = []
     if wrong_rows:

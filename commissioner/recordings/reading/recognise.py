@@ -23,6 +23,7 @@ from commissioner.recordings.names import (
     uses_rst,
 )
 from commissioner.recordings.reading.mapping import Target
+from commissioner.recordings.reading.said_tests import is_title
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
 from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in
 from commissioner.records import ReadingNote, Signal
@@ -69,7 +70,7 @@ def recognise(
             meaning = None
         if meaning is None:
             unnamed += [name] if is_asked or CHANNEL.fullmatch(IN_NAME.sub("", name).strip()) else []
-            columns.setdefault(name, values[k])
+            columns.setdefault("test" if of_sheet and is_title(name) else name, values[k])
         else:
             with np.errstate(invalid="ignore", over="ignore"):
                 columns[meaning] = factor * values[k] if factor != 1.0 else values[k]

@@ -1,0 +1,176 @@
+"""Sheets of manufacturers as people type them: a value a line or a row below its names, English and German, units, decimal commas."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from commissioner.errors import DataRefused, UsageError
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.identify import IdentifiedCatalogue, IdentifyRequest, identify_any
+from commissioner.operations.recordings.simulate import SimulateRequest, simulate
+from commissioner.recordings.catalogue.reading import sheet_in
+from commissioner.recordings.plate import start_from
+from commissioner.settings import load_motor
+
+GERMAN = """Bemessungsleistung;11;kW
+Bemessungsspannung;400;V
+Frequenz;50;Hz
+Bemessungsdrehzahl;1465;1/min
+Bemessungsstrom;21,5;A
+cos φ;0,81
+Wirkungsgrad 4/4;91,4;%
+Anzugsmoment M_A/M_N;2,3
+Anzugsstrom I_A/I_N;7,4
+Kippmoment M_K/M_N;2,9
+Massenträgheitsmoment J;0,044;kgm²
+Schaltung;Dreieck
+"""
+FORMS = {
+    "german": GERMAN,
+    "one row": "P_N [kW];U [V];f [Hz];n [1/min];I_N [A];cos phi;eta [%];M_A/M_N;I_A/I_N;M_K/M_N;J [kgm2];Schaltung\n"
+    "11;400;50;1465;21,5;0,81;91,4;2,3;7,4;2,9;0,044;D\n",
+    "units below": "P_N,U_N,f,n_N,I_N,cos phi,eta,M_A/M_N,I_A/I_N,M_K/M_N,J,connection\nkW,V,Hz,1/min,A,,%,,,,kgm2,\n"
+    "11,400,50,1465,21.5,0.81,91.4,2.3,7.4,2.9,0.044,delta\n",
+    "keys": "# rated_power_w: 11000\n# rated_voltage_v: 400\n# rated_frequency_hz: 50\n# rated_speed_rpm: 1465\n# rated_current_a: 21.5\n"
+    "# power_factor: 0.81\n# efficiency: 0.914\n# starting_torque_ratio: 2.3\n# starting_current_ratio: 7.4\n"
+    "# breakdown_torque_ratio: 2.9\n# inertia_kg_m2: 0.044\n# connection: delta\n",
+    "english": "Rated output (kW): 11\nRated voltage: 400 V\nFrequency = 50 Hz\nFull load speed: 1465 rpm\nFull-load current (A): 21.5\n"
+    "Power factor: 81 %\nEfficiency: 91.4\nLocked rotor torque: 230 %\nLocked rotor current ratio: 7.4\nBreakdown torque (%): 290\n"
+    "Moment of inertia: 0.044 kg m2\nConnection: Delta\n",
+}
+
+
+def read(tmp_path: Path, text: str, name: str = "sheet.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return sheet_in(path)
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_page_is_the_same_sheet_in_anybodys_form(tmp_path, name):
+    sheet = read(tmp_path, FORMS[name])
+    assert sheet is not None and sheet.connection == "delta"
+    assert {k: v.value for k, v in sheet.values.items()} == pytest.approx({
+        "rated_power_w": 11000, "rated_voltage_v": 400, "rated_frequency_hz": 50, "rated_speed_rpm": 1465, "rated_current_a": 21.5,
+        "power_factor": 0.81, "efficiency": 0.914, "starting_torque_ratio": 2.3, "starting_current_ratio": 7.4,
+        "breakdown_torque_ratio": 2.9, "inertia_kg_m2": 0.044,
+    })  # fmt: skip
+    assert sheet.values["efficiency"].half_step == pytest.approx(5e-4)
+    assert sheet.values["rated_current_a"].half_step == pytest.approx(0.05)
+
+
+def test_loads_connections_poles_absolute_values_and_horse_power_are_understood(tmp_path):
+    sheet = read(
+        tmp_path,
+        "Rated power: 15 hp\nRated voltage: 230/460 V\nconnection: star\nFrequency: 60 Hz\nRated speed: 1765 rpm\nFull load current: 36/18 A\n"
+        "Power factor (100%): 0.83\nPower factor 75: 0.78\nEfficiency 100/75/50 %: 92.4/92.5/91.0\nLocked rotor current: 116 A\n"
+        "Breakdown torque: 162 Nm\nNumber of poles: 4\nWinding resistance between terminals: 0.52 ohm\nR phase: 0.26\n",
+    )
+    assert sheet is not None
+    got = {k: v.value for k, v in sheet.values.items()}
+    assert got == pytest.approx({
+        "rated_power_w": 11185.5, "rated_voltage_v": 460, "rated_frequency_hz": 60, "rated_speed_rpm": 1765, "rated_current_a": 18,
+        "power_factor": 0.83, "power_factor_75": 0.78, "efficiency": 0.924, "efficiency_75": 0.925, "efficiency_50": 0.91,
+        "starting_current_a": 116, "breakdown_torque_nm": 162, "pole_pairs": 2, "winding_resistance_uv_ohm": 0.52,
+        "winding_resistance_phase_ohm": 0.26,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        (("91,4;%", "0,914;%"), "per cent and per unit mixed"),
+        (("cos φ;0,81", "cos φ;8,1"), "cos φ is"),
+        (("400;V", "400;A"), "the unit A of Bemessungsspannung is none of V"),
+        (("400;V", "230/400 V\nSchaltung;Stern/Dreieck"), "two connections and the sheet does not say|cannot"),
+        (("50;Hz", "50;Hz\nFrequenz;60;Hz"), "rated frequency is said twice .*50 and 60 Hz"),
+        (("Frequenz;50;Hz", "Frequenz;50/60 Hz"), "holds two values"),
+        (("Kippmoment M_K/M_N;2,9", "Kippmoment M_K/M_N;0,8"), "the breakdown torque is below the rated one"),
+        (("11;kW", "15;kW"), "contradict the efficiency"),
+    ],
+)
+@pytest.mark.parametrize("verb", [identify_any, diagnose])
+def test_what_cannot_be_is_refused_by_name(tmp_path, verb, changed, says):
+    text = GERMAN.replace("Schaltung;Dreieck\n", "") if "Schaltung" in changed[1] else GERMAN
+    path = tmp_path / "sheet.csv"
+    path.write_text(text.replace(*changed), encoding="utf-8")
+    request = IdentifyRequest((path,)) if verb is identify_any else DiagnoseRequest((path,))
+    with pytest.raises(DataRefused, match=says) as refused:
+        verb(request)
+    assert refused.value.step == "read the sheet" and refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "test,frequency_hz,voltage_line_v,current_line_a,power_w\ndc,0,13.6,28.0,380.8\nno_load,60,208,8.17,420\n",
+        "# rated_power_w: 2200\n# rated_voltage_v: 400\n# rated_frequency_hz: 50\n# rated_current_a: 5\n# rated_speed_rpm: 1436\n"
+        "# power_factor: 0.8\ntime_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a\n0,0,0,12.5,0.01,0\n0.0002,0,0,12.6,0.04,0\n",
+        "# rated_power_w: 2200\n# rated_voltage_v: 400\n# rated_frequency_hz: 50\n# rated_speed_rpm: 1436\n# power_factor: 0.8\n"
+        "f,U,I,P\n50,100,3,200\n50,150,4,300\n50,200,5,400\n50,250,6,500\n",
+        "f [Hz],U [V],I [A],cos phi\n50,400,3,0.2\n25,400,3,0.2\n",
+        "a,b,c\n1,2,3\n",
+    ],
+)
+def test_recordings_and_tests_are_no_manufacturers_sheet(tmp_path, text):
+    assert read(tmp_path, text) is None
+
+
+def test_several_motors_of_one_table_are_asked_apart(tmp_path):
+    row = FORMS["one row"].splitlines()[1]
+    with pytest.raises(DataRefused, match="2 rows of values"):
+        read(tmp_path, FORMS["one row"] + row + "\n")
+
+
+def test_it_is_a_source_of_a_model_for_every_verb(tmp_path):
+    path, out = tmp_path / "elf.csv", tmp_path / "out"
+    path.write_text(GERMAN, encoding="utf-8")
+    done = identify_any(IdentifyRequest((path,), out=out))
+    assert isinstance(done, IdentifiedCatalogue) and done.document["kind"] == "manufacturer's sheet"
+    assert {"report.html", "identification.json", "model.json", "motor.toml", "motor.mo", "motor.py", "motor.mat", "motor.csv", "motor.json"} == {
+        p.name for p in out.iterdir()
+    }  # fmt: skip
+    plate = load_motor(str(out / "motor.toml"))
+    assert (plate.rated_power_w, plate.pole_pairs, plate.connection, plate.inertia_kg_m2) == (11000, 2, "delta", 0.044)
+    played = simulate(SimulateRequest(str(out / "model.json"), tmp_path / "played.csv", seconds=0.5))
+    assert played.samples > 1000
+    start, stated = start_from(out / "identification.json"), done.document["parameters"]["stator_resistance_ohm"]
+    assert start.log_std[0] == pytest.approx(stated["std"] / stated["value"]) and "sheet" in start.origin
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "of a motor of this type" in page and "IEC 60034-1" in page
+    assert all(abs(v["reproduced"] / v["given"] - 1) < 0.02 for v in done.document["values"])
+
+
+def test_the_plays_scenario_is_the_sheets_motor(tmp_path):
+    from sim.scenario import load
+
+    path, out = tmp_path / "elf.csv", tmp_path / "out"
+    path.write_text(GERMAN, encoding="utf-8")
+    done = identify_any(IdentifyRequest((path,), out=out))
+    assert isinstance(done, IdentifiedCatalogue)
+    machine = load(str(out / "model.json")).machine
+    assert machine.stator_resistance_ohm == pytest.approx(done.document["parameters"]["stator_resistance_ohm"]["value"])
+
+
+def test_a_diagnosis_says_what_a_sheet_can_and_cannot_tell(tmp_path):
+    path = tmp_path / "elf.csv"
+    path.write_text(GERMAN, encoding="utf-8")
+    done = diagnose(DiagnoseRequest((path,), out=tmp_path / "out"))
+    assert done.document["causes"] == [] and "leaves nothing over" in done.document["reason"]
+    assert any("No sheet tells iron that bends" in r for r in done.document["remarks"])
+    assert json.loads((tmp_path / "out" / "diagnosis.json").read_text())["test"] == "manufacturer's sheet"
+
+
+def test_a_plate_fills_the_sheet_or_contradicts_it(tmp_path):
+    path = tmp_path / "elf.csv"
+    path.write_text(GERMAN, encoding="utf-8")
+    with pytest.raises(DataRefused, match="sheet and plate contradict") as refused:
+        identify_any(IdentifyRequest((path,), motor="motor_2kw2"))
+    assert "--trust plate or --trust data" in refused.value.remedy
+    trusted = identify_any(IdentifyRequest((path,), motor="motor_2kw2", trust="data"))
+    assert trusted.document["nameplate"]["rated_power_w"] == 11000
+    with pytest.raises(UsageError, match="no trust in 'me'"):
+        identify_any(IdentifyRequest((path,), trust="me"))
