@@ -19,11 +19,17 @@ from commissioner.motor.nameplate import Nameplate
 
 SILENT = 0.75
 """Of an assumption's spread: an error above it is the assumption's, the sheet did not tell the value."""
-WITHHELD = {
-    "stator_resistance_ohm": ("stator_resistance", "a winding resistance, or efficiency, power factor and speed"),
-    "rotor_resistance_ohm": ("rotor_resistance", "the rated speed or slip"),
-    "leakage_inductance_h": ("leakage", "the breakdown torque, or the starting current"),
-    "magnetizing_inductance_h": ("magnetizing_reactance", "the power factor, or the no-load current"),
+_START = {"starting_current_ratio": "the starting current", "starting_torque_ratio": "the starting torque"}
+WITHHELD: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "stator_resistance_ohm": (
+        "stator_resistance",
+        {"winding_resistance_uv_ohm": "a winding resistance", "efficiency": "the efficiency", "rated_speed_rpm": "the rated speed"},
+    ),
+    "rotor_resistance_ohm": ("rotor_resistance", {"rated_speed_rpm": "the rated speed or slip"}),
+    "leakage_inductance_h": ("leakage", {"breakdown_torque_ratio": "the breakdown torque", **_START}),
+    "magnetizing_inductance_h": (
+        "magnetizing_reactance", {"power_factor": "the power factor", "no_load_current_a": "the no-load current"},
+    ),
 }  # fmt: skip
 """Which assumption stands for which parameter, and what on a sheet tells it."""
 UNMET = 0.05
@@ -92,7 +98,9 @@ def answer(sheet: Sheet) -> Answer:
     every = _parameters(found)
     spreads = {a.name: a.std for a in evidence.assumptions}
     withheld = {
-        k: need for k, (name, need) in WITHHELD.items() if every[k].of_type > SILENT * spreads[name] * every[k].value
+        k: _need(sheet, by)
+        for k, (name, by) in WITHHELD.items()
+        if every[k].of_type > SILENT * spreads[name] * every[k].value
     }
     if len(withheld) == len(WITHHELD):
         raise _too_little(sheet, "it tells none of the four parameters", "; ".join(withheld.values()))
@@ -106,6 +114,11 @@ def answer(sheet: Sheet) -> Answer:
         _named(found, lambda x: cages(x) * evidence.scale.impedance_ohm, ("R_1", "X_1", "R_2", "X_2")) if has_start and not withheld else {},
         _losses(found), tuple(_rows(sheet, found)), _assumed(found), _plate(sheet, found), math.sqrt(2.0) * 0.95 * voltage / w,
     )  # fmt: skip
+
+
+def _need(sheet: Sheet, told_by: Mapping[str, str]) -> str:
+    """What of this the sheet lacks."""
+    return ", ".join(words for key, words in told_by.items() if not sheet.has(key)) or "more digits"
 
 
 def _too_little(sheet: Sheet, why: str, need: str) -> DataRefused:

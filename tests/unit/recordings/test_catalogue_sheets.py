@@ -151,8 +151,10 @@ def test_the_plays_scenario_is_the_sheets_motor(tmp_path):
     path.write_text(GERMAN, encoding="utf-8")
     done = identify_any(IdentifyRequest((path,), out=out))
     assert isinstance(done, IdentifiedCatalogue)
-    machine = load(str(out / "model.json")).machine
-    assert machine.stator_resistance_ohm == pytest.approx(done.document["parameters"]["stator_resistance_ohm"]["value"])
+    machine = load(str(out / "model.json")).document["machine"]
+    assert machine["stator_resistance_ohm"] == pytest.approx(
+        done.document["parameters"]["stator_resistance_ohm"]["value"]
+    )
 
 
 def test_a_diagnosis_says_what_a_sheet_can_and_cannot_tell(tmp_path):
