@@ -43,7 +43,11 @@ Waits = Annotated[
 ]
 Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
 Trust = Annotated[
-    str | None, typer.Option("--trust", help="plate | data: which is right where the two contradict each other.")
+    str | None,
+    typer.Option(
+        "--trust",
+        help="plate | data: which is right where the two contradict each other; of a manufacturer's sheet the word that its refusal names.",
+    ),
 ]
 Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
 Drive = Annotated[
@@ -269,7 +273,8 @@ def identify(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE."
+            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE; the three "
+            "tests of a textbook; or a manufacturer's sheet (values by their names)."
         ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,
@@ -356,7 +361,12 @@ def diagnose(
 
 @app.command()
 def simulate(
-    model: Annotated[str, typer.Argument(help="A model.json of diagnose, or a motor's name or TOML file.")],
+    model: Annotated[
+        str,
+        typer.Argument(
+            help="A model.json of diagnose or identify, a manufacturer's sheet, or a motor's name or TOML file."
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", help="The recording to write: .csv, .csv.gz or .parquet.")],
     like: Annotated[Path | None, typer.Option("--like", help="Take the command of this recording.")] = None,
     seconds: Annotated[float, typer.Option(help="Length of each segment.")] = 6.0,

@@ -14,7 +14,7 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.export.model_file import FORMAT
 from commissioner.diagnose.export.scenario import plain_scenario
 from commissioner.encoding import plain
-from commissioner.errors import UsageError
+from commissioner.errors import DataRefused, UsageError
 from commissioner.export.forms import FORMS
 from commissioner.export.found import Found
 from commissioner.identify.catalogue.answer import Answer, answer
@@ -101,8 +101,12 @@ def _circuit(found: Answer) -> InverseGamma:
 
 
 def model_document(found: Answer) -> dict[str, Any]:
-    """The plain model that `commissioner simulate` and `python -m sim --scenario` play."""
-    assert found.plate is not None
+    """The plain model that `commissioner simulate` and `python -m sim --scenario` play. DataRefused: the sheet tells a part only."""
+    if found.plate is None or found.withheld:
+        raise DataRefused(
+            f"{found.sheet.source}: the sheet tells only a part of the motor", step="simulate", value=", ".join(found.withheld) or "plate",
+            limit="all four parameters, speed and power factor", remedy="add what `commissioner identify` names",
+        )  # fmt: skip
     circuit = _circuit(found)
     plate = {k: v for k, v in asdict(found.plate).items() if v is not None}
     return {

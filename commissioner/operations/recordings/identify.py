@@ -116,6 +116,7 @@ def identify_any(
 def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     """DataRefused where the recordings cannot carry an answer; UsageError for a file or an estimator that does not exist."""
     said = read_mapping(request.mapping) if request.mapping else None
+    _require_measured(request.files, said)
     recording = joined([to_standstill(contract_table(path, said)) for path in request.files])
     plate = None if request.motor is None else load_motor(request.motor)
     plate = plate or nameplate_from(recording.metadata, recording.source)
@@ -127,6 +128,17 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
     if request.out is not None:
         _write(request, found, document)
     return Identified(document, found, plate, request.files)
+
+
+def _require_measured(files: Sequence[Path], said: object) -> None:
+    """DataRefused: a manufacturer's sheet, from which no drive is set."""
+    from commissioner.operations.recordings.catalogue import sheet_of
+
+    if sheet_of(files, said) is not None:
+        raise DataRefused(
+            f"{files[0]}: a manufacturer's sheet is no measurement of the motor at the drive", step="identify", value=str(files[0]),
+            limit="a recording at standstill", remedy="use `commissioner identify` without --write-back, or measure",
+        )  # fmt: skip
 
 
 def _write(request: IdentifyRequest, found: Identification, document: IdentifiedDocument) -> None:

@@ -20,6 +20,7 @@ from commissioner.diagnose.plant.model import Layout, Model
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.paths import no_file
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
@@ -33,7 +34,7 @@ Command = list[tuple[float, Any]]
 
 @dataclass(frozen=True)
 class SimulateRequest:
-    """`model`: a model.json of a diagnosis, or a motor's name or file. The command is that of the recording `like`, or six tones
+    """`model`: a model.json of a diagnosis, a manufacturer's sheet, or a motor's name or file. The command is that of the recording `like`, or six tones
     at two levels on `axes_deg` for `seconds` each. `plain` leaves the named effects out."""
 
     model: str
@@ -144,6 +145,8 @@ def _motor(name: str, plain: bool) -> _Motor:
     path = Path(name)
     if path.suffix == ".json":
         return _extended(path, plain)
+    if (sheet := catalogue.sheet_of([path], None)) is not None:
+        return _of_document(catalogue.model_document(catalogue.answered(sheet, None, None)))
     plate = load_motor(name)
     typical = prior(plate).typical.as_tuple()
     return _Motor(Model(typical), None, {}, {k: v for k, v in asdict(plate).items() if v is not None})
@@ -158,12 +161,16 @@ def _extended(path: Path, plain: bool) -> _Motor:
         )
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        document = without_effects(document) if plain else document
-        model, layout = model_from(document)
+        return _of_document(without_effects(document) if plain else document)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ConfigurationError(
             file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
         ) from error
+
+
+def _of_document(document: Mapping[str, Any]) -> _Motor:
+    """KeyError, TypeError or ValueError where it is no model."""
+    model, layout = model_from(document)
     return _Motor(model, layout, dict(document.get("lines_hz", {})), dict(document.get("nameplate", {})))
 
 

@@ -66,7 +66,7 @@ def value_of(key: str, number: str, unit: str, name: str, source: str) -> Value:
     if not said and value > PER_CENT_FROM.get(stem, float("inf")):
         factor = 0.01
     step = 0.0 if stem in NOMINAL else 0.5 * factor * 10.0**-decimals
-    low, high = RANGES.get(stem, (1e-9, float("inf")))
+    low, high = RANGES.get(stem, (1e-9, 1e9))
     if not low <= factor * value <= high:
         hint = " (per cent and per unit mixed?)" if said == "%" and value <= 1.0 else ""
         raise refused(

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from commissioner.cli.verbs.identify import identify as verb
 from commissioner.errors import DataRefused, UsageError
+from commissioner.identify.catalogue.contradictions import settled
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
-from commissioner.operations.recordings.identify import IdentifiedCatalogue, IdentifyRequest, identify_any
+from commissioner.operations.recordings.identify import IdentifiedCatalogue, IdentifyRequest, identify, identify_any
 from commissioner.operations.recordings.simulate import SimulateRequest, simulate
 from commissioner.recordings.catalogue.reading import sheet_in
 from commissioner.recordings.plate import start_from
@@ -92,14 +95,14 @@ def test_loads_connections_poles_absolute_values_and_horse_power_are_understood(
         (("11;kW", "15;kW"), "contradict the efficiency"),
     ],
 )
-@pytest.mark.parametrize("verb", [identify_any, diagnose])
-def test_what_cannot_be_is_refused_by_name(tmp_path, verb, changed, says):
+@pytest.mark.parametrize("carry_out", [identify_any, diagnose])
+def test_what_cannot_be_is_refused_by_name(tmp_path, carry_out, changed, says):
     text = GERMAN.replace("Schaltung;Dreieck\n", "") if "Schaltung" in changed[1] else GERMAN
     path = tmp_path / "sheet.csv"
     path.write_text(text.replace(*changed), encoding="utf-8")
-    request = IdentifyRequest((path,)) if verb is identify_any else DiagnoseRequest((path,))
+    request = IdentifyRequest((path,)) if carry_out is identify_any else DiagnoseRequest((path,))
     with pytest.raises(DataRefused, match=says) as refused:
-        verb(request)
+        carry_out(request)
     assert refused.value.step == "read the sheet" and refused.value.remedy
 
 
@@ -137,6 +140,8 @@ def test_it_is_a_source_of_a_model_for_every_verb(tmp_path):
     assert (plate.rated_power_w, plate.pole_pairs, plate.connection, plate.inertia_kg_m2) == (11000, 2, "delta", 0.044)
     played = simulate(SimulateRequest(str(out / "model.json"), tmp_path / "played.csv", seconds=0.5))
     assert played.samples > 1000
+    assert simulate(SimulateRequest(str(path), tmp_path / "same.csv", seconds=0.5)).samples == played.samples
+    assert (tmp_path / "same.csv").read_text() == (tmp_path / "played.csv").read_text()
     start, stated = start_from(out / "identification.json"), done.document["parameters"]["stator_resistance_ohm"]
     assert start.log_std[0] == pytest.approx(stated["std"] / stated["value"]) and "sheet" in start.origin
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -176,3 +181,52 @@ def test_a_plate_fills_the_sheet_or_contradicts_it(tmp_path):
     assert trusted.document["nameplate"]["rated_power_w"] == 11000
     with pytest.raises(UsageError, match="no trust in 'me'"):
         identify_any(IdentifyRequest((path,), trust="me"))
+
+
+def test_no_drive_is_set_from_a_sheet_and_no_part_of_a_motor_is_played(tmp_path):
+    path = tmp_path / "elf.csv"
+    path.write_text(GERMAN, encoding="utf-8")
+    with pytest.raises(DataRefused, match="no measurement of the motor at the drive"):
+        identify(IdentifyRequest((path,)))
+    path.write_text(
+        "".join(line for line in GERMAN.splitlines(True) if "moment" not in line and "Anzug" not in line),
+        encoding="utf-8",
+    )
+    with pytest.raises(DataRefused, match="only a part of the motor"):
+        simulate(SimulateRequest(str(path), tmp_path / "played.csv"))
+
+
+def test_the_screen_shows_values_errors_and_what_stays_open(tmp_path, capsys):
+    path = tmp_path / "elf.csv"
+    path.write_text(GERMAN, encoding="utf-8")
+    verb(IdentifyRequest((path,)), as_json=False)
+    shown = capsys.readouterr().out
+    assert (
+        "of the type" in shown
+        and "breakdown torque M_K/M_N" in shown
+        and "two cages" in shown
+        and "IEC 60034-1" in shown
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_torn_sheets_end_in_an_answer_or_in_one_error(tmp_path, seed):
+    random = np.random.default_rng(seed)
+    for _ in range(25):
+        lines = list(FORMS.values())[random.integers(len(FORMS))].splitlines()
+        for _ in range(int(random.integers(1, 4))):
+            k = int(random.integers(len(lines)))
+            cut = int(random.integers(len(lines[k]) + 1))
+            lines[k] = [
+                lines[k][:cut],
+                lines[k][cut:],
+                lines[k].replace("1", "9" * 40),
+                lines[k].replace(";", ","),
+                lines[k] + " %",
+            ][random.integers(5)]
+        try:
+            sheet = read(tmp_path, "\n".join(lines))
+            if sheet is not None:
+                settled(sheet, frozenset())
+        except DataRefused as refused:
+            assert refused.step and refused.limit and refused.remedy

@@ -61,3 +61,32 @@ def test_a_sheet_that_lacks_a_column_is_told_which(tmp_path, verb, head, row, la
     with pytest.raises(DataRefused, match=f"looks like a test sheet and lacks {lacks}$") as refused:
         verb(request)
     assert "sum of two wattmeters" in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (SHEETS["contract"].replace("no_load,60", "locked_rotor,60").replace("locked_rotor,15", "no_load,15"), "is called locked rotor and is no load"),
+        (SHEETS["german"].replace("Leerlauf", "Kurzschluss"), "is called locked rotor and is no load by its inductance"),
+        (SHEETS["units"].replace("Blocked rotor", "Leerlauf"), "is called no load and is locked rotor by its inductance"),
+        (SHEETS["contract"].replace("dc,0", "dc,50"), "is called direct current and has a frequency of 50 Hz"),
+        (SHEETS["contract"].replace("no_load,60", "no_load,0"), "frequency_hz is 0 in point 1"),
+    ],
+)  # fmt: skip
+def test_a_row_that_is_not_what_the_sheet_calls_it_is_refused_by_name(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DataRefused, match=says) as refused:
+        identify_any(IdentifyRequest((path,)))
+    assert refused.value.value is not None and refused.value.limit and refused.value.remedy
+
+
+def test_rows_whose_inductances_do_not_tell_them_apart_are_what_the_sheet_calls_them(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(
+        "Versuch;f [Hz];U [V];I [A];P [W]\nGleichstrom;0;13,6;28,0;\nLeerlauf;60;208;20;420\nKurzschluss;15;50;27,9;920\n",
+        encoding="utf-8",
+    )
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    assert done.document["rows"] == {"direct current": 1, "no load": 1, "locked rotor": 1}
