@@ -38,7 +38,7 @@ UNMET = 0.05
 
 @dataclass(frozen=True)
 class Stated:
-    """`std`: of a motor of this type; `of_type`: without the tolerances; the three parts, one standard deviation each."""
+    """`std`: of a motor of this type; `of_type`: without the tolerances; the three parts, whose squares make that of `std`."""
 
     value: float
     std: float
@@ -100,7 +100,7 @@ def answer(sheet: Sheet) -> Answer:
     withheld = {
         k: _need(sheet, by)
         for k, (name, by) in WITHHELD.items()
-        if every[k].of_type > SILENT * spreads[name] * every[k].value
+        if every[k].of_type > math.expm1(SILENT * spreads[name]) * every[k].value
     }
     if len(withheld) == len(WITHHELD):
         raise _too_little(sheet, "it tells none of the four parameters", "; ".join(withheld.values()))
@@ -130,11 +130,16 @@ def _too_little(sheet: Sheet, why: str, need: str) -> DataRefused:
 
 
 def _named(found: Fit, of: Callable[[Array], Array], names: tuple[str, ...]) -> dict[str, Stated]:
-    """Values and errors of positive quantities `of` (n, 11) -> (n, m)."""
+    """Values and errors of positive quantities `of` (n, 11) -> (n, m): the fit is in logarithms, a standard deviation is the way up."""
     value = of(found.numbers[None])[0]
     spread = found.spread(lambda x: np.log(of(x)))
     parts = (spread.of_motor, spread.of_type, spread.rounding, spread.assumptions, spread.tolerances)
-    std = [value * np.sqrt(np.maximum(np.diag(p), 0.0)) for p in parts]
+    motor, of_type, *three = (np.sqrt(np.maximum(np.diag(p), 1e-18)) for p in parts)
+    std = [
+        value * np.expm1(motor),
+        value * np.expm1(of_type),
+        *(value * part * np.expm1(motor) / motor for part in three),
+    ]
     return {n: Stated(float(value[k]), *(float(s[k]) for s in std)) for k, n in enumerate(names)}
 
 

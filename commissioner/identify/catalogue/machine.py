@@ -19,7 +19,7 @@ NUMBERS = ("r_s", "x_m", "r_0", "x_r", "x_s", "d", "t", "iron", "friction", "str
 """`iron`: loss at rated main voltage; `friction`: at rated speed; `stray`: at base current, all over base power; `saturation`:
 leakage at the locked rotor's current over that at the rated one."""
 LOADS = (1.0, 0.75, 0.5)
-HALVINGS, NEWTONS, GRID, ZOOMS = 14, 3, 25, 5
+HALVINGS, NEWTONS, GRID, ZOOMS = 10, 3, 25, 3
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,14 @@ def breakdown(numbers: Array) -> tuple[Array, Array]:
     leakage = np.sqrt(numbers[:, 10])[:, None]
     low, high = np.full(len(numbers), np.log(1e-3)), np.zeros(len(numbers))
     for _ in range(ZOOMS):
-        grid = np.exp(low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, GRID))
-        torque = at(numbers, grid, leakage).gap
-        best, step = torque.argmax(axis=1), (high - low) / (GRID - 1)
-        centre = np.log(grid[np.arange(len(numbers)), best])
+        grid = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, GRID)
+        torque, step = at(numbers, np.exp(grid), leakage).gap, (high - low) / (GRID - 1)
+        best = np.clip(torque.argmax(axis=1), 1, GRID - 2)[:, None] + np.arange(-1, 2)
+        left, middle, right = np.take_along_axis(torque, best, axis=1).T
+        bend = np.minimum(left - 2.0 * middle + right, -1e-300)
+        centre = np.take_along_axis(grid, best, axis=1)[:, 1] + np.clip(0.5 * (left - right) / bend, -1.0, 1.0) * step
         low, high = centre - 2.0 * step, np.minimum(centre + 2.0 * step, 0.0)
-    slip = np.exp(centre)
+    slip = np.exp(np.minimum(centre, 0.0))
     return slip, at(numbers, slip, leakage[:, 0]).gap - numbers[:, 8]
 
 

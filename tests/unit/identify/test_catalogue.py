@@ -125,10 +125,8 @@ def test_a_winding_resistance_narrows_the_stators_and_the_parts_of_an_error_add_
     given = answer(sheet(winding_resistance_uv_ohm=0.46)).parameters["stator_resistance_ohm"]
     assert given.std < 0.25 * without.std
     assert given.value == pytest.approx(0.23 * (234.5 + 85) / (234.5 + 20), rel=0.05)
-    parts = math.hypot(without.rounding, without.assumptions)
-    assert without.of_type == pytest.approx(parts) and without.std == pytest.approx(
-        math.hypot(parts, without.tolerances)
-    )
+    assert without.std == pytest.approx(math.hypot(without.rounding, without.assumptions, without.tolerances))
+    assert without.rounding < without.of_type < without.std
 
 
 def test_the_fit_meets_the_values_and_is_deterministic():
