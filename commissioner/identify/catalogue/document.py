@@ -57,10 +57,9 @@ def remarks(found: Answer) -> list[str]:
         out.append(
             "Starting current and starting torque are not both there: one cage, as it is at rated slip; the start is not described."
         )
-    out += [
-        f"Not on the sheet: {one.words}; taken as other motors have it ({one.source}), within a factor of {one.factor:.2f}."
-        for one in found.assumed
-    ]  # fmt: skip
+    if found.assumed:
+        taken = "; ".join(f"{one.words} (within a factor of {one.factor:.2f}; {one.source})" for one in found.assumed)
+        out.append(f"Not told by the sheet and taken as other motors have it: {taken}.")
     return [
         *out,
         "The sheet is of the type: a motor of it may differ within the tolerances of IEC 60034-1, which the error holds (std_of_type: without).",
