@@ -226,8 +226,8 @@ def assumptions_for(sheet: Sheet, scale: Scale) -> tuple[Assumption, ...]:
         Assumption("leakage_split", "the stator's leakage over the rotor's", share, 0.35, "IEEE 112-2017, 5.9"),
         Assumption("displacement", "how much the rotor's resistance is larger at standstill", 0.8, 1.5, "cage rotors"),
         Assumption("displacement_frequency", "from which slip on it is larger (its inverse)", 3.0, 0.7, "cage rotors"),
-        Assumption("iron_loss", "the iron loss", 0.18 * loss, 0.6, "0.18 of all losses"),
+        Assumption("iron", "the iron loss", 0.18 * loss, 0.6, "0.18 of all losses"),
         Assumption("friction", "friction and windage", 0.07 * loss, 0.7, "0.07 of all losses"),
-        Assumption("stray_loss", "the additional load loss", stray, 0.5, "0.7 of the allowance of IEC 60034-2-1"),
-        Assumption("leakage_saturation", "the leakage at the starting current over that at the rated one", 0.9, 0.12, "built machines"),
+        Assumption("stray", "the additional load loss", stray, 0.5, "0.7 of the allowance of IEC 60034-2-1"),
+        Assumption("saturation", "the leakage at the starting current over that at the rated one", 0.9, 0.12, "built machines"),
     )  # fmt: skip
