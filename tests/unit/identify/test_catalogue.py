@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +15,8 @@ from commissioner.identify.catalogue.document import document
 from commissioner.identify.catalogue.evidence import evidence_of
 from commissioner.identify.catalogue.fit import fit
 from commissioner.identify.catalogue.sheet import Sheet, Value
-from commissioner.motor.circuit import PARAMETERS
-from tests.campaigns.intake.catalogue import PARTS, START, Machine, covered, found_in, page, share, values
+from tests.campaigns.intake.catalogue import PARTS, START, Machine, covered, of_published, share
 
-DATA = Path(__file__).parents[2] / "data"
 NUMBERS = np.array([[0.03, 2.2, 0.022, 0.06, 0.09, 1.4, 3.1, 0.02, 0.006, 0.01, 1.0]])
 ELEVEN_KW = {
     "rated_power_w": 11000, "rated_voltage_v": 400, "rated_frequency_hz": 50, "rated_speed_rpm": 1465, "rated_current_a": 21.5,
@@ -72,31 +68,11 @@ def test_the_true_circuit_lies_within_the_stated_errors(is_another, without):
     assert np.nanmedian(np.abs(of.off), axis=0).max() < 0.25
 
 
-def published():
-    """Rated power and the T circuit of published machines; losses that a row lacks as of common motors."""
-    with (DATA / "motors" / "motors.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["use_for_mc"] == "1"]
-    for row in rows[::4]:
-        power, w = 1000 * float(row["P_kW"]), 2 * math.pi * float(row["f_Hz"])
-        rotor = (float(row["Rr_ohm"]), w * float(row["Llr_mH"]) / 1e3)
-        volts, iron = float(row["V_LL"]), float(row["P_fe_W"] or 0.02 * power)
-        yield Machine(
-            float(row["Rs_ohm"]), w * float(row["Lls_mH"]) / 1e3, w * float(row["Lm_mH"]) / 1e3, 0.9 * volts**2 / iron, (rotor,), 1.0,
-            float(row["P_fric_W"] or 0.01 * power), 0.005 * power, volts, float(row["f_Hz"]), int(row["poles"]) // 2,
-        ), power  # fmt: skip
-
-
 def test_published_single_cage_machines_lie_within_the_errors_of_their_pages():
-    inside = []
-    for machine, power in published():
-        exact = values(machine, power, is_usual=False)
-        assert exact is not None
-        found = found_in(page(exact))
-        truth = machine.truth(exact["rated_slip"])
-        inside += [
-            abs(found.parameters[name].value - true) < 2 * found.parameters[name].std for name, true in zip(PARAMETERS, truth, strict=True)
-        ]  # fmt: skip
-    assert len(inside) >= 32 and np.mean(inside) >= 0.95
+    of = of_published(every=4)
+    assert of.sigmas.shape == (9, 4)
+    assert np.mean(np.abs(of.sigmas) < 2) >= 0.85 and np.abs(of.sigmas).max() < 3.5
+    assert np.median(np.abs(of.off), axis=0).max() < 0.25
 
 
 def test_the_plate_of_a_real_200_kw_motor_says_what_its_type_test_measured():
