@@ -32,6 +32,8 @@ WITHHELD: Mapping[str, tuple[str, Mapping[str, str]]] = {
     ),
 }  # fmt: skip
 """Which assumption stands for which parameter, and what on a sheet tells it."""
+WIDEST = 3.0
+"""Of a logarithm's standard deviation, as stated; two cages beyond half of it are not told apart."""
 UNMET = 0.05
 """Relative, by which a value that the circuit does not meet is named."""
 
@@ -111,7 +113,7 @@ def answer(sheet: Sheet) -> Answer:
     return Answer(
         sheet, parameters, withheld,
         {} if withheld else _named(found, _t_circuit(evidence), ("R_1", "R_2", "X_1", "X_2", "X_M")),
-        _named(found, lambda x: cages(x) * evidence.scale.impedance_ohm, ("R_1", "X_1", "R_2", "X_2")) if has_start and not withheld else {},
+        _cages(found) if has_start and not withheld else {},
         _losses(found), tuple(_rows(sheet, found)), _assumed(found), _plate(sheet, found), math.sqrt(2.0) * 0.95 * voltage / w,
     )  # fmt: skip
 
@@ -134,7 +136,7 @@ def _named(found: Fit, of: Callable[[Array], Array], names: tuple[str, ...]) -> 
     value = of(found.numbers[None])[0]
     spread = found.spread(lambda x: np.log(of(x)))
     parts = (spread.of_motor, spread.of_type, spread.rounding, spread.assumptions, spread.tolerances)
-    motor, of_type, *three = (np.sqrt(np.maximum(np.diag(p), 1e-18)) for p in parts)
+    motor, of_type, *three = (np.sqrt(np.clip(np.diag(p), 1e-18, WIDEST**2)) for p in parts)
     std = [
         value * np.expm1(motor),
         value * np.expm1(of_type),
@@ -180,6 +182,13 @@ def _t_circuit(evidence: Evidence) -> Callable[[Array], Array]:
         )
 
     return of
+
+
+def _cages(found: Fit) -> dict[str, Stated]:
+    """R_1, X_1, R_2, X_2; nothing where the sheet does not tell two cages apart."""
+    ohm = found.evidence.scale.impedance_ohm
+    two = _named(found, lambda x: cages(x) * ohm, ("R_1", "X_1", "R_2", "X_2"))
+    return two if all(q.of_type < math.expm1(0.5 * WIDEST) * q.value for q in two.values()) else {}
 
 
 def _losses(found: Fit) -> dict[str, Stated]:

@@ -54,9 +54,13 @@ def remarks(found: Answer) -> list[str]:
         for r in unmet
     ]
     if not found.cages:
-        out.append(
-            "Starting current and starting torque are not both there: one cage, as it is at rated slip; the start is not described."
+        has_start = found.sheet.has("starting_current_ratio", "starting_torque_ratio")
+        why = (
+            "two cages cannot be told apart"
+            if has_start
+            else "starting current and torque are not both there, the start is not described"
         )
+        out.append(f"One cage, as it is at rated slip: {why}.")
     if found.assumed:
         taken = "; ".join(f"{one.words} (within a factor of {one.factor:.2f}; {one.source})" for one in found.assumed)
         out.append(f"Not told by the sheet and taken as other motors have it: {taken}.")

@@ -14,6 +14,10 @@ NAMES = (
     ("leakage_inductance_h", "leakage inductance L_σ", 1e3, "mH"), ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
     ("rotor_time_constant_s", "rotor time constant", 1e3, "ms"),
 )  # fmt: skip
+PLATE = (
+    ("rated_power_w", "rated power", 1e-3, "kW"), ("rated_voltage_v", "rated voltage", 1.0, "V"), ("rated_current_a", "rated current", 1.0, "A"),
+    ("rated_speed_rpm", "rated speed", 1.0, "1/min"), ("rated_frequency_hz", "frequency", 1.0, "Hz"),
+)  # fmt: skip
 HEADER = ("", "value", "± of a motor of this type", "± of the type", "rounding", "assumed", "tolerance")
 
 
@@ -27,7 +31,7 @@ def catalogue_page(document: Mapping[str, Any], name: str) -> Page:
     ]
     losses = [_row(n.removesuffix("_w").replace("_", " "), q, 1.0, "W") for n, q in document["losses"].items()]
     met = [
-        (v["name"], digits(v["given"], 5), digits(v["reproduced"], 5), v["unit"],
+        (v["name"], f"{v['given']:.5g}", f"{v['reproduced']:.5g}", v["unit"],
          f"{v['reproduced'] / v['given'] - 1.0:+.1%}{'' if v['is_fitted'] else ' (not used)'}")
         for v in document["values"]
     ]  # fmt: skip
@@ -45,7 +49,8 @@ def catalogue_page(document: Mapping[str, Any], name: str) -> Page:
         if not document["withheld"]
         else "The sheet tells a part of the circuit"
     )
-    facts = [(v["name"], f"{digits(v['given'], 4)} {v['unit']}") for v in document["values"][:4]]
+    plate = document["nameplate"] or {}
+    facts = [(words, f"{factor * plate[key]:.4g} {unit}") for key, words, factor, unit in PLATE if key in plate]
     return Page(f"Motor from its sheet: {name}", headline, "plain", facts, [s for s in sections if s.parts],
                 "± holds the true value in 19 of 20 cases; the last three columns are its parts, one standard deviation of the value.")  # fmt: skip
 

@@ -60,12 +60,12 @@ def test_the_performance_is_that_of_the_closed_form():
 @pytest.mark.parametrize("is_another", [False, True])
 @pytest.mark.parametrize("without", [(), (*PARTS, *START)])
 def test_the_true_circuit_lies_within_the_stated_errors(is_another, without):
-    of = covered(14, 7, without, is_another)
+    of = covered(12, 8, without, is_another)
     inside = share(np.abs(of.sigmas) < 2, of.sigmas)
     assert inside.mean() >= 0.95 and inside.min() >= 0.85
     assert np.nanmedian(of.stated, axis=0) == pytest.approx(np.zeros(4), abs=0.45)
     assert np.nanmedian(of.stated[:, 1]) < (0.16 if is_another else 0.06)
-    assert np.nanmedian(np.abs(of.off), axis=0).max() < 0.25
+    assert np.nanmedian(np.abs(of.off), axis=0).max() < 0.3
 
 
 def test_published_single_cage_machines_lie_within_the_errors_of_their_pages():
