@@ -125,7 +125,8 @@ def show_catalogue(document: Mapping[str, Any], sources: Sequence[str], out_fold
         for words, of in circuits
         for k, (name, q) in enumerate(of.items())
     ]
-    out.print(table("", ("T circuit, ohm at rated frequency", "", "value", "std error", "of the type"), lines))
+    if lines:
+        out.print(table("", ("T circuit, ohm at rated frequency", "", "value", "std error", "of the type"), lines))
     loss = [
         (name.removesuffix("_w").replace("_", " "), *_with_errors(q, 1.0)) for name, q in document["losses"].items()
     ]

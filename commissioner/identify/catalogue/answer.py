@@ -10,7 +10,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.identify.catalogue.contradictions import complete
-from commissioner.identify.catalogue.evidence import LINEAR, Evidence, evidence_of
+from commissioner.identify.catalogue.evidence import LINEAR, Evidence, evidence_of, slip_of
 from commissioner.identify.catalogue.fit import Fit, fit
 from commissioner.identify.catalogue.machine import Array, at, breakdown, cages, inverse_gamma, loaded, performance
 from commissioner.identify.catalogue.sheet import KEYS, Sheet, pole_pairs, synchronous_rpm
@@ -208,11 +208,12 @@ def _rows(sheet: Sheet, found: Fit) -> list[Row]:
     evidence = found.evidence
     predicted = dict(zip((d.key for d in evidence.data), evidence.predicted(found.numbers[None])[0], strict=True))
     value = {k: float(v if k in LINEAR else math.exp(v)) for k, v in predicted.items()}
+    is_speed = slip_of(sheet) is not sheet.values.get("rated_slip")
     current = {"rated_current": "rated_current_a", "no_load_current": "no_load_current_a"}
     out = []
     for datum in evidence.data:
         key = current.get(datum.key, datum.key)
-        if key in sheet.values and key != "r_s" and not (key == "rated_slip" and sheet.has("rated_speed_rpm")):
+        if key in sheet.values and key != "r_s" and not (key == "rated_slip" and is_speed):
             out.append(
                 Row(
                     key,
@@ -224,7 +225,9 @@ def _rows(sheet: Sheet, found: Fit) -> list[Row]:
     made = performance(found.numbers[None], evidence.scale.shaft)
     slip, synchronous = float(made["rated_slip"][0]), synchronous_rpm(sheet)
     if sheet.has("rated_speed_rpm") and synchronous is not None:
-        out.insert(0, Row("rated_speed_rpm", sheet.values["rated_speed_rpm"].value, synchronous * (1.0 - slip), True))
+        out.insert(
+            0, Row("rated_speed_rpm", sheet.values["rated_speed_rpm"].value, synchronous * (1.0 - slip), is_speed)
+        )
         if sheet.has("rated_torque_nm"):
             torque = evidence.scale.shaft * evidence.scale.power_w / (synchronous * (1.0 - slip) * math.pi / 30.0)
             out.append(Row("rated_torque_nm", sheet.values["rated_torque_nm"].value, torque, False))

@@ -121,12 +121,17 @@ def _scale(sheet: Sheet) -> Scale | None:
 
 
 def slip_of(sheet: Sheet) -> Value | None:
-    """Rated slip from the speed, else as printed. A speed that ends in 0 or 5 is printed to 5 1/min."""
-    speed, synchronous = sheet.values.get("rated_speed_rpm"), synchronous_rpm(sheet)
+    """Rated slip from the speed or as printed, whichever has the finer digits. A speed that ends in 0 or 5 is printed to 5 1/min."""
+    speed, synchronous, printed = (
+        sheet.values.get("rated_speed_rpm"),
+        synchronous_rpm(sheet),
+        sheet.values.get("rated_slip"),
+    )
     if speed is None or synchronous is None:
-        return sheet.values.get("rated_slip")
+        return printed
     step = 2.5 if speed.half_step >= 0.5 and round(speed.value) % 5 == 0 else speed.half_step
-    return Value(1.0 - speed.value / synchronous, max(step, speed.half_step) / synchronous)
+    follows = Value(1.0 - speed.value / synchronous, step / synchronous)
+    return printed if printed is not None and printed.half_step < follows.half_step else follows
 
 
 def tolerances(sheet: Sheet, power_w: float) -> dict[str, float]:
