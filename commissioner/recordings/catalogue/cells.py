@@ -7,7 +7,7 @@ import re
 from commissioner.errors import DataRefused
 from commissioner.identify.catalogue.sheet import KEYS, Value
 
-NUMBER = r"[-+]?\d[\d ]*(?:[.,]\d+)?(?:[eE][-+]?\d+)?|[-+]?[.,]\d+"
+NUMBER = r"[-+]?(?:\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?!\d)|\d+)(?:[.,]\d+)?(?:[eE][-+]?\d+)?|[-+]?[.,]\d+"
 PRINTED = re.compile(rf"\s*(?:ca\.?|~|≈)?\s*({NUMBER})\s*(.*)", re.DOTALL)
 UNITS = {
     "w": 1.0, "kw": 1e3, "mw": 1e6, "hp": 745.7, "ps": 735.5, "bhp": 745.7, "v": 1.0, "kv": 1e3, "vac": 1.0, "a": 1.0, "ka": 1e3,
@@ -59,7 +59,7 @@ def value_of(key: str, number: str, unit: str, name: str, source: str) -> Value:
             shown or "none or %",
             source,
         )
-    text = number.replace(" ", "").replace(",", ".")
+    text = re.sub(r"\s", "", number).replace(",", ".")
     decimals = len(re.split("[eE]", text)[0].partition(".")[2])
     factor = UNITS[said]
     value = float(text)

@@ -22,7 +22,7 @@ from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
 
 ENDINGS = (".csv", ".txt", ".tsv")
-LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 4
+LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3
 """Of a sheet; and how many values that it knows make one."""
 TELLING = (
     ("efficiency",),
@@ -33,7 +33,10 @@ TELLING = (
     ("rated_power",),
 )
 """Two of them at least are on a sheet of a manufacturer."""
-PAIR = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[A-Za-zΔ△]*\s*/\s*(\d+(?:[.,]\d+)?)\s*([^/]*)$")
+PAIR = re.compile(
+    r"^\s*(\d+(?:[.,]\d+)?)(?:\s*[A-Za-zΔ△]+)*\s*/\s*(\d+(?:[.,]\d+)?)\s*([A-Za-z]{0,3}?)\s*(?:[DYΔ△](?:\s*/\s*[DYΔ△])?)?\s*$"
+)
+"""`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
 TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
 
 

@@ -40,6 +40,14 @@ FORMS = {
     "keys": "# rated_power_w: 11000\n# rated_voltage_v: 400\n# rated_frequency_hz: 50\n# rated_speed_rpm: 1465\n# rated_current_a: 21.5\n"
     "# power_factor: 0.81\n# efficiency: 0.914\n# starting_torque_ratio: 2.3\n# starting_current_ratio: 7.4\n"
     "# breakdown_torque_ratio: 2.9\n# inertia_kg_m2: 0.044\n# connection: delta\n",
+    "units beside the values": "P_N,U_N,f,n,I_N,cos phi,eta,T_A/T_N,I_A/I_N,T_K/T_N,J,connection\n"
+    "11 kW,400 V,50 Hz,1 465 1/min,21.5 A,0.81,91.4 %,2.3,7.4,2.9,0.044 kgm2,D\n",
+    "both connections": "Leistung;11 kW\nSpannung;400/690 V D/Y\nFrequenz;50 Hz\nDrehzahl;1465 1/min\nStrom;21,5/12,4 A\ncos phi;0,81\n"
+    "Wirkungsgrad;91,4\nAnzugsmoment M_A/M_N;2,3\nAnzugsstrom I_A/I_N;7,4\nKippmoment M_K/M_N;2,9\n"
+    "J;0,044 kgm2\nSchaltung;Dreieck\n",
+    "each with its connection": "Leistung;11 kW\nSpannung;400 V D / 690 V Y\nFrequenz;50 Hz\nDrehzahl;1465 1/min\nStrom;21,5 A D / 12,4 A Y\n"
+    "cos phi;0,81\nWirkungsgrad;91,4\nAnzugsmoment M_A/M_N;2,3\nAnzugsstrom I_A/I_N;7,4\nKippmoment M_K/M_N;2,9\nJ;0,044 kgm2\n"
+    "Schaltung;Dreieck\n",
     "english": "Rated output (kW): 11\nRated voltage: 400 V\nFrequency = 50 Hz\nFull load speed: 1465 rpm\nFull-load current (A): 21.5\n"
     "Power factor: 81 %\nEfficiency: 91.4\nLocked rotor torque: 230 %\nLocked rotor current ratio: 7.4\nBreakdown torque (%): 290\n"
     "Moment of inertia: 0.044 kg m2\nConnection: Delta\n",
@@ -63,6 +71,20 @@ def test_a_page_is_the_same_sheet_in_anybodys_form(tmp_path, name):
     })  # fmt: skip
     assert sheet.values["efficiency"].half_step == pytest.approx(5e-4)
     assert sheet.values["rated_current_a"].half_step == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("name", ["Wirkungsgrad (4/4, 3/4, 1/2)", "Wirkungsgrad 4/4, 3/4, 1/2 [%]"])
+def test_three_loads_in_one_cell(tmp_path, name):
+    sheet = read(tmp_path, GERMAN.replace("Wirkungsgrad 4/4;91,4;%", f"{name};91,4 / 91,5 / 90,6"))
+    found = [sheet.values[f"efficiency{at}"].value for at in ("", "_75", "_50")]
+    assert found == pytest.approx([0.914, 0.915, 0.906])
+
+
+def test_three_values_of_a_sheet_are_told_what_is_missing(tmp_path):
+    path = tmp_path / "sheet.csv"
+    path.write_text("Rated power (kW),11\nRated voltage (V),400\nRated speed (rpm),1475\n", encoding="utf-8")
+    with pytest.raises(DataRefused, match="lacks rated frequency"):
+        identify_any(IdentifyRequest((path,)))
 
 
 def test_loads_connections_poles_absolute_values_and_horse_power_are_understood(tmp_path):
