@@ -98,12 +98,12 @@ def is_between_terminals(name: str) -> bool | None:
     return False if re.search(r"phase|strang|per ph|_ph", lower) else None
 
 
-_LOAD = re.compile(r"\s*(?:4/4|3/4|2/4|1/2|1/1|(?:100|75|50)\s*%?|full load|volllast)\s*(?:load|last)?\s*")
+_A_LOAD = re.compile(r"\s*(?:4/4|3/4|2/4|1/2|1/1|(?:100|75|50)\s*%?|full load|volllast)\s*(?:load|last)?\s*")
 
 
 def _is_load(text: str) -> bool:
     """Whether it names a load, or several one after the other."""
-    return all(_LOAD.fullmatch(part) for part in re.split("[,;]", text.lower()))
+    return all(_A_LOAD.fullmatch(part) for part in re.split("[,;]", text.lower()))
 
 
 def _without_unit(name: str) -> str:

@@ -5,8 +5,8 @@ import pytest
 from commissioner.run.archive.verify import verify
 from commissioner.service.access.accounts import Accounts, Role
 from tests.integration.archive.test_push import OTTO, content, make_run
-from tests.support.authority import Authority
 from tests.support.command_line import call
+from tests.support.service.authority import Authority
 from tests.support.service.service_process import ServiceProcess
 
 

@@ -24,8 +24,8 @@ from commissioner.link.wire.modbus import open_port
 from commissioner.link.wire.url import TcpUrl, parse_url
 from sim.wire.faults import parse
 from tests.campaigns.short_run import truth
-from tests.support.authority import Authority, private_pem
 from tests.support.raw_servers import Bank, TcpDevice
+from tests.support.service.authority import Authority, private_pem
 from tests.support.sim_process import SimProcess
 
 PROFILE = load_profile("simulated")
