@@ -116,17 +116,17 @@ class Problem:
             residual = over.residuals[k] if over else np.empty_like(segment.current_a)
             flux = over.flux[k] if over else np.empty_like(segment.current_a)
             shared = (information, score, block, scores, residual, flux)
-            with np.errstate(over="ignore", invalid="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):  # a trial step may run away
                 if is_linear:
                     squares = self._simulate_linear(k, theta, own[k], shared)
                 else:
                     squares = self._simulate(k, held, theta, own[k], shared)
-            scale = np.ones(columns.size)
-            scale[DELAY] = 1.0 / self.period_s
-            information *= np.outer(scale, scale)
-            out.squares += squares if math.isfinite(squares) else math.inf
-            out.information[np.ix_(columns, columns)] += information
-            out.score[columns] += score * scale
+                scale = np.ones(columns.size)
+                scale[DELAY] = 1.0 / self.period_s
+                information *= np.outer(scale, scale)
+                out.squares += squares if math.isfinite(squares) else math.inf
+                out.information[np.ix_(columns, columns)] += information
+                out.score[columns] += score * scale
             wide = np.zeros((scores.shape[0], self.total))
             wide[:, columns] = scores * scale
             out.block_scores.append(wide)
