@@ -119,6 +119,10 @@ class ServiceProcess:
         lines = path.read_text("utf-8").splitlines() if path.is_file() else []
         return [json.loads(line) for line in lines if line.endswith("}")]
 
+    def energised_times(self) -> int:
+        """How often so far, by the simulator's own log: a run pauses between its sessions."""
+        return sum(line["event"] == "energised" for line in self.truth())
+
     def is_energised(self) -> bool:
         """By the simulator's own log."""
         events = [line["event"] for line in self.truth() if line["event"] in ("energised", "de_energised")]
