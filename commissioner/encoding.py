@@ -7,8 +7,10 @@ import math
 from collections.abc import Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
+JsonObject: TypeAlias = dict[str, Any]
+"""A JSON object that another version, another process or a person wrote: of no shape that could be promised, and passed on as it is."""
 HIDDEN = MappingProxyType({"is_hidden": True})
 """Metadata of a field that is no part of the JSON."""
 

@@ -16,6 +16,7 @@ from starlette.types import Scope
 
 from commissioner.service import problems
 from commissioner.service.access.gate import Gate
+from commissioner.service.contract.description import describe_answers
 from commissioner.service.page import views
 from commissioner.service.page.frame import prepare, prepare_causes
 from commissioner.service.parts import Parts
@@ -62,6 +63,7 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     for router in all_routers():
         app.include_router(router)
     app.include_router(views.router, include_in_schema=False)
+    describe_answers(app)
     app.mount("/static", _Static(directory=STATIC), name="static")
     return app
 

@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import JsonObject
+from commissioner.identify.contract import Measured
 from commissioner.run.archive.catalogue import RunSummary, read_run
 from commissioner.run.archive.documents import read_document, read_result
+from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
 
 OUTCOMES = ("commissioned", "rejected", "aborted", "faulted", "cut off")
@@ -31,7 +34,7 @@ class Entry:
     reason: str
     energised_s: float
     written: str
-    parameters: Mapping[str, Mapping[str, float]] | None
+    parameters: Mapping[str, Measured] | None
     flux_wb: float | None
     folder: Path
 
@@ -73,7 +76,7 @@ class Archive:
     def summary(self, run: str) -> RunSummary:
         return read_run(self.find(run).folder)
 
-    def result(self, run: str) -> dict[str, Any]:
+    def result(self, run: str) -> JsonObject | RunWithoutResult:
         """The result document; of a run without one, what its journal says. DataRefused: it is damaged."""
         entry = self.find(run)
         return read_result(entry.folder) or {
@@ -86,7 +89,7 @@ class Archive:
             "holds": entry.written,
         }
 
-    def request(self, run: str) -> dict[str, Any]:
+    def request(self, run: str) -> JsonObject:
         """What the run was asked to do."""
         path = self.find(run).folder / "request.json"
         return read_document(path.read_text("utf-8", "replace")) if path.is_file() else {}

@@ -11,7 +11,10 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+from commissioner.encoding import JsonObject
+from commissioner.service.contract.people import AuditEntry
 
 FIRST = "0" * 64
 """What the first line carries as the hash of its predecessor."""
@@ -54,9 +57,9 @@ class Audit:
                 os.fsync(file.fileno())
             self._number, self._head = self._number + 1, digest
 
-    def newest(self, limit: int) -> list[dict[str, Any]]:
+    def newest(self, limit: int) -> list[AuditEntry]:
         """The last entries, newest first."""
-        return list(reversed(deque(_entries(self._path), maxlen=limit)))
+        return [cast("AuditEntry", entry) for entry in reversed(deque(_entries(self._path), maxlen=limit))]
 
     def verify(self) -> Chain:
         """The whole chain, read again from the disk."""
@@ -80,7 +83,7 @@ def _digest(head: str, entry: Mapping[str, Any]) -> str:
     return hashlib.sha256(f"{head}\n{text}".encode("utf-8", "replace")).hexdigest()
 
 
-def _entries(path: Path) -> Iterator[dict[str, Any]]:
+def _entries(path: Path) -> Iterator[JsonObject]:
     if not path.is_file():
         return
     with path.open(encoding="utf-8", errors="replace") as file:

@@ -6,15 +6,17 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
+from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
 from commissioner.validation import requirement
 
@@ -108,9 +110,9 @@ class Library:
         return sorted((self._data / folder).glob(f"*.{ending}"))
 
 
-def judge_plate(values: Mapping[str, Any]) -> dict[str, Any]:
+def judge_plate(values: Mapping[str, Any]) -> JudgedPlate:
     """Each field of a plate: ok, or what is wrong and what to do; then what the whole plate implies."""
-    fields = {name: {"ok": True, "what": "", "remedy": ""} for name in PLATE_FIELDS}
+    fields: dict[str, JudgedField] = {name: {"ok": True, "what": "", "remedy": ""} for name in PLATE_FIELDS}
     numbers = {key: _number(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
     try:
         table = MotorFile.model_validate(numbers)
@@ -180,11 +182,6 @@ def _motor(path: Path, source: str, origin: str) -> Motor | None:
         return None
 
 
-def plate_document(plate: Nameplate) -> dict[str, Any]:
-    """The plate as JSON."""
-    return asdict(plate)
-
-
 def _found(known: list[Known], identifier: str, what: str) -> Known:
     for one in known:
         if one.id == identifier:
@@ -201,7 +198,7 @@ def _must_be_new(taken: list[str], identifier: str) -> None:
                          remedy="choose another id")  # fmt: skip
 
 
-def _read_json(path: Path) -> dict[str, Any] | None:
+def _read_json(path: Path) -> JsonObject | None:
     try:
         return DriveTable.model_validate(json.loads(path.read_text("utf-8"))).model_dump()
     except ValueError:

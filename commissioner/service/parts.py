@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, field
-from typing import Any
 
 from commissioner.service.access.accounts import Accounts
 from commissioner.service.access.sessions import Sessions
@@ -12,6 +11,7 @@ from commissioner.service.access.throttle import Throttle
 from commissioner.service.archive import Archive
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings
+from commissioner.service.contract.drives import CheckedDocument
 from commissioner.service.library import Library
 from commissioner.service.recordings import Recordings
 from commissioner.service.runs.desk import Desk
@@ -41,7 +41,7 @@ class Parts:
     warm: WarmUp
     login_tries: Throttle = field(default_factory=lambda: Throttle(LOGIN_TRIES, LOGIN_WITHIN_S))
     stop_tries: Throttle = field(default_factory=lambda: Throttle(STOPS, STOPS_WITHIN_S))
-    checks: dict[str, dict[str, Any]] = field(default_factory=dict)
+    checks: dict[str, CheckedDocument] = field(default_factory=dict)
     """Newest checks by drive and motor, for the page."""
     closing: asyncio.Event = field(default_factory=asyncio.Event)
 

@@ -12,8 +12,10 @@ import shutil
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, cast
 
+from commissioner.encoding import JsonObject
+from commissioner.service.contract.recordings import FailureDocument, RecordingDocument
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask
 
@@ -34,9 +36,9 @@ class Job:
     files: list[str]
     folder: Path
     begun_utc: str = field(default_factory=lambda: dt.datetime.now(dt.UTC).isoformat(timespec="seconds"))
-    document: dict[str, Any] = field(default_factory=dict)
+    document: JsonObject = field(default_factory=dict)
     exit_code: int | None = None
-    failure: dict[str, Any] | None = None
+    failure: FailureDocument | None = None
     task: asyncio.Task[None] | None = None
 
     @property
@@ -48,7 +50,7 @@ class Job:
         """The page with its pictures, where the verb makes one."""
         return next((p for p in sorted((self.folder / "out").glob("report*.html"))), None)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_document(self) -> RecordingDocument:
         return {
             "id": self.id,
             "verb": self.verb,
@@ -134,11 +136,11 @@ class Recordings:
             async with self._one_at_a_time:
                 job.exit_code, job.document = await ask(arguments, job.folder / "said.txt", LONGEST_S)
         except Refusal as refusal:
-            job.failure = refusal.problem.model_dump(mode="json")
+            job.failure = cast("FailureDocument", refusal.problem.model_dump(mode="json"))
         else:
             error = job.document.get("error")
             if isinstance(error, dict):
-                job.failure = {"title": error.get("what"), **error}
+                job.failure = cast("FailureDocument", {"title": error.get("what"), **error})
         _say_names(job)
 
     def _forget(self) -> None:

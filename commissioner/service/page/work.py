@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -14,13 +16,13 @@ from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.configuration import DriveTable
+from commissioner.service.contract.plates import JudgedPlate, SaidPlate
 from commissioner.service.library import (
     PLATE_FIELDS,
     SIMULATOR,
     Drive,
     Motor,
     judge_plate,
-    plate_document,
 )
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
@@ -119,9 +121,9 @@ async def motor(request: Request, drive: str, motor: str = "") -> Response:
     parts = parts_of(request)
     known = parts.library.drive(drive)
     chosen = next((m for m in parts.library.motors() if m.id == motor), None) or parts.library.motors()[0]
-    values = {key: _plain(value) for key, value in plate_document(chosen.plate).items()}
+    values = {key: _plain(value) for key, value in asdict(chosen.plate).items()}
     values["rated_power_kw"] = _plain(chosen.plate.rated_power_w / 1000)
-    return _motor_page(request, known, chosen, values, judge_plate(plate_document(chosen.plate)), chosen.name)
+    return _motor_page(request, known, chosen, values, judge_plate(asdict(chosen.plate)), chosen.name)
 
 
 def _motor_page(
@@ -129,7 +131,7 @@ def _motor_page(
     drive: Drive,
     chosen: Motor | None,
     values: dict[str, str],
-    judged: dict[str, Any],
+    judged: JudgedPlate,
     name: str,
     status: int = 200,
 ) -> Response:
@@ -148,13 +150,13 @@ def _motor_page(
     )
 
 
-def say_plate(judged: dict[str, Any], t: Texts) -> dict[str, Any]:
+def say_plate(judged: JudgedPlate, t: Texts) -> SaidPlate:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
         key: "" if field["ok"] else typeset(f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}")
         for key, field in judged["fields"].items()
     }
-    if judged["efficiency"] is None:
+    if judged["efficiency"] is None or judged["usual_efficiency"] is None:
         return {"ok": False, "fields": fields, "verdict": "", "reason": "", "is_odd": False}
     eta, is_odd = t.number(100 * judged["efficiency"], 1, "%"), bool(judged["questions"])
     if is_odd:
@@ -220,7 +222,7 @@ def _kept(parts: Parts, known: str, name: str, values: dict[str, str]) -> Motor:
     table = MotorFile.model_validate({key: _number(value) for key, value in _si(values).items()} | {"name": name})
     found = next((m for m in parts.library.motors() if m.id == known), None)
     plate = table.model_dump(exclude={"name"})
-    if found is not None and plate == plate_document(found.plate) and name in ("", found.name):
+    if found is not None and plate == asdict(found.plate) and name in ("", found.name):
         return found
     if found is not None and found.origin == "added" and name == found.name:
         return parts.library.put_motor(found.id, table)
@@ -322,7 +324,8 @@ async def run(request: Request, run: str) -> Response:
         document = live_document(state, live.feed.current_now_a)
         return render(request, LIVE, Place(run=run, drive=live.drive), state=state, live=document, run=live)
     entry = parts.archive.find(run)
-    asked, result = parts.archive.request(run), parts.archive.result(run)
+    asked = parts.archive.request(run)
+    result: Mapping[str, Any] = parts.archive.result(run)
     place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
     state = live.feed.state if live is not None else _told(entry)
     facts: dict[str, Any] = {

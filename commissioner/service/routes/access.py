@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,10 +11,20 @@ from pydantic import BaseModel, ConfigDict, Field
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.sessions import Session
 from commissioner.service.access.visitors import COOKIE, Visitor, check_token, parts_of, require, visitor_of
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.people import (
+    AccountDocument,
+    AccountsDocument,
+    AuditDocument,
+    ChainDocument,
+    LoggedIn,
+    LoggedOut,
+    RemovedAccount,
+)
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Administrator = Annotated[Visitor, Depends(require(Role.ADMINISTRATOR))]
 
@@ -30,7 +40,7 @@ class NewAccount(Credentials):
 
 
 @router.post("/api/login")
-async def login(request: Request, response: Response, credentials: Credentials) -> dict[str, Any]:
+async def login(request: Request, response: Response, credentials: Credentials) -> LoggedIn:
     """A session as a cookie; `csrf` goes into the header X-CSRF-Token of every request that changes something."""
     session = await log_in(request, credentials)
     set_cookie(parts_of(request), response, session)
@@ -82,7 +92,7 @@ def set_cookie(parts: Parts, response: Response, session: Session) -> None:
 
 
 @router.post("/api/logout")
-async def logout(request: Request, response: Response) -> dict[str, Any]:
+async def logout(request: Request, response: Response) -> LoggedOut:
     """The session ends."""
     who = visitor_of(request)
     check_token(who, request.headers.get("x-csrf-token", ""))
@@ -99,14 +109,14 @@ async def log_out(parts: Parts, who: Visitor) -> None:
 
 
 @router.get("/api/accounts")
-async def accounts(request: Request, _who: Administrator) -> dict[str, Any]:
+async def accounts(request: Request, _who: Administrator) -> AccountsDocument:
     """Names and roles."""
     known = await asyncio.to_thread(parts_of(request).accounts.all)
     return {"accounts": [{"name": account.name, "role": account.role.name.lower()} for account in known]}
 
 
 @router.post("/api/accounts", status_code=201)
-async def add_account(request: Request, wish: NewAccount, who: Administrator) -> dict[str, Any]:
+async def add_account(request: Request, wish: NewAccount, who: Administrator) -> AccountDocument:
     """Who may log in. The first one is added at the computer: `commissioner accounts add`."""
     parts = parts_of(request)
     await asyncio.to_thread(parts.accounts.add, wish.name, Role[wish.role.upper()], wish.password)
@@ -117,7 +127,7 @@ async def add_account(request: Request, wish: NewAccount, who: Administrator) ->
 
 
 @router.delete("/api/accounts/{name}")
-async def remove_account(request: Request, name: str, who: Administrator) -> dict[str, Any]:
+async def remove_account(request: Request, name: str, who: Administrator) -> RemovedAccount:
     """No longer an account; its sessions end."""
     parts = parts_of(request)
     await asyncio.to_thread(parts.accounts.remove, name)
@@ -127,10 +137,15 @@ async def remove_account(request: Request, name: str, who: Administrator) -> dic
 
 
 @router.get("/api/audit")
-async def audit(request: Request, _who: Operator, limit: Annotated[int, Query(ge=1, le=5000)] = 200) -> dict[str, Any]:
+async def audit(request: Request, _who: Operator, limit: Annotated[int, Query(ge=1, le=5000)] = 200) -> AuditDocument:
     """Newest first, and whether the whole chain is intact."""
     parts = parts_of(request)
     chain = await asyncio.to_thread(parts.audit.verify)
     entries = await asyncio.to_thread(parts.audit.newest, limit)
-    facts = {"lines": chain.lines, "head": chain.head, "is_intact": chain.is_intact, "broken_at": chain.broken_at}
+    facts: ChainDocument = {
+        "lines": chain.lines,
+        "head": chain.head,
+        "is_intact": chain.is_intact,
+        "broken_at": chain.broken_at,
+    }
     return {"chain": facts, "entries": entries}

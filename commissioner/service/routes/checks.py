@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import datetime as dt
-from typing import Annotated, Any
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.drives import CheckedDocument
 from commissioner.service.library import Drive, Motor
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask, refusal_from
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
 
@@ -29,13 +31,13 @@ class CheckWish(BaseModel):
 
 
 @router.post("/api/checks")
-async def checks(request: Request, wish: CheckWish, _who: Operator) -> dict[str, Any]:
+async def checks(request: Request, wish: CheckWish, _who: Operator) -> CheckedDocument:
     """The checks, each with value, limit and remedy; energises and writes nothing. 502: the drive does not answer."""
     parts = parts_of(request)
     return await make_checks(parts, parts.library.drive(wish.drive), parts.library.motor(wish.motor))
 
 
-async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> dict[str, Any]:
+async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> CheckedDocument:
     """The document of `commissioner check`, with the time it was made. Refusal: a run has the drive, or it is silent."""
     if not drive.url:
         raise Refusal(
@@ -71,7 +73,8 @@ async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> dict[str, Any
 
         raise refusal_from(code, json.dumps(document).encode(), log)
     document["checked_utc"] = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
-    parts.checks[f"{drive.id} {motor.id}"] = document
+    checked = cast("CheckedDocument", document)
+    parts.checks[f"{drive.id} {motor.id}"] = checked
     while len(parts.checks) > 200:
         parts.checks.pop(next(iter(parts.checks)))
-    return document
+    return checked

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
@@ -15,17 +15,21 @@ from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.requests import HTTPConnection
 
+from commissioner.encoding import JsonObject
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require, visitor_of
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.drives import ControlDocument
+from commissioner.service.contract.runs import Stopped, StopsDocument
 from commissioner.service.page.band import Place, band_of
 from commissioner.service.page.texts import texts_of, told
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Party
-from commissioner.service.runs.desk import LiveRun, Stopped
+from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.feed import Feed, Message
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
 """The band is sent anew so often: its age must not be older than a second, and a page hears of its service by it where no run's numbers
@@ -75,30 +79,23 @@ async def stop_runs(connection: HTTPConnection, reason: str, how: str, run: str 
 
 
 @router.post("/api/runs/{run}/stop")
-async def stop(request: Request, run: str, wish: StopWish | None = None) -> dict[str, Any]:
+async def stop(request: Request, run: str, wish: StopWish | None = None) -> Stopped:
     """The operator's stop. 200 says when the drive confirmed zero volts; 502: it did not. Needs no log-in."""
     parts = parts_of(request)
     if run not in parts.desk.runs:
         parts.archive.find(run)
-        return {
-            "run": run,
-            "asked_utc": None,
-            "zero_volts": True,
-            "confirmed_utc": None,
-            "after_s": 0.0,
-            "state": "ended before",
-        }
+        return Stopped(run, None, True, None, 0.0, "ended before")
     stopped = await stop_runs(request, wish.reason if wish else "", "POST", run)
     _check_confirmed(stopped)
-    return asdict(stopped[0])
+    return stopped[0]
 
 
 @router.post("/api/stop")
-async def stop_everything(request: Request, wish: StopWish | None = None) -> dict[str, Any]:
+async def stop_everything(request: Request, wish: StopWish | None = None) -> StopsDocument:
     """STOP for every run of this service, also one that is only starting. Needs no log-in."""
     stopped = await stop_runs(request, wish.reason if wish else "", "POST")
     _check_confirmed(stopped)
-    return {"stopped": [asdict(one) for one in stopped]}
+    return {"stopped": stopped}
 
 
 @router.post("/stop", include_in_schema=False)
@@ -125,14 +122,14 @@ def _check_confirmed(stopped: list[Stopped]) -> None:
 
 
 @router.post("/api/drives/{drive}/control")
-async def control(request: Request, drive: str, wish: ControlWish, who: Operator) -> dict[str, Any]:
+async def control(request: Request, drive: str, wish: ControlWish, who: Operator) -> ControlDocument:
     """Ask for control of a drive, or answer who asks."""
     parts = parts_of(request)
     parts.library.drive(drive)
     return change_control(parts, drive, wish.do, Party(who.session.id if who.session else "", who.person))
 
 
-def change_control(parts: Parts, drive: str, do: str, party: Party) -> dict[str, Any]:
+def change_control(parts: Parts, drive: str, do: str, party: Party) -> ControlDocument:
     """What there is to control, after the wish was granted or not."""
     held = parts.desk.control(drive)
     if do == "ask":
@@ -217,7 +214,7 @@ class _Socket:
                     if isinstance(said, dict):
                         await self._take(said)
 
-    async def _take(self, said: dict[str, Any]) -> None:
+    async def _take(self, said: JsonObject) -> None:
         if "stop" in said:
             run = self._run or str(said.get("run") or "")
             stopped = await stop_runs(self._socket, str(said["stop"] or "")[:300], "WebSocket", run, self._drive)
@@ -236,7 +233,7 @@ class _Socket:
             party = Party(self._who.session.id if self._who.session else "", self._who.person)
             await self._send({"control": change_control(self._parts, drive, do, party)})
 
-    async def _send(self, document: dict[str, Any] | str) -> None:
+    async def _send(self, document: Mapping[str, object] | str) -> None:
         text = document if isinstance(document, str) else json.dumps(document, separators=(",", ":"))
         async with self._sending:
             with contextlib.suppress(Exception):

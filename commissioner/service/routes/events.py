@@ -11,10 +11,11 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
 from commissioner.service.parts import Parts
 from commissioner.service.runs.feed import Feed, Message
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 
 

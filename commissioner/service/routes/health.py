@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter, Request
 
 from commissioner.service.access.visitors import parts_of
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.runs import Health
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 
 
 @router.get("/api/health")
-async def health(request: Request) -> dict[str, Any]:
+async def health(request: Request) -> Health:
     """Status, version, and the runs that go on. Needs no log-in."""
     parts = parts_of(request)
     return {

@@ -4,31 +4,35 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, Query, Request
 
+from commissioner.identify.contract import Measured
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.archive import Entry
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.history import ComparedDocument, TrendChange, TrendDocument, TrendPoint
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask, refusal_from
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Run = Annotated[str, Query(min_length=1, max_length=200)]
-_compared: dict[tuple[str, str], dict[str, Any]] = {}
+_compared: dict[tuple[str, str], ComparedDocument] = {}
 
 
 @router.get("/api/compare")
-async def compare(request: Request, a: Run, b: Run, _who: Viewer) -> dict[str, Any]:
+async def compare(request: Request, a: Run, b: Run, _who: Viewer) -> ComparedDocument:
     """Same motor, changed (which parameter, how significant), or another one."""
     return await compared(parts_of(request), a, b)
 
 
-async def compared(parts: Parts, a: str, b: str) -> dict[str, Any]:
+async def compared(parts: Parts, a: str, b: str) -> ComparedDocument:
     """What `commissioner runs compare` says of the two, the earlier one first."""
     first, second = sorted((parts.archive.find(a).run, parts.archive.find(b).run))
     if first == second:
@@ -48,35 +52,31 @@ async def compared(parts: Parts, a: str, b: str) -> dict[str, Any]:
             raise refusal_from(code, json.dumps(document).encode(), log)
         if len(_compared) > 500:
             _compared.clear()
-        _compared[first, second] = document
+        _compared[first, second] = cast("ComparedDocument", document)
     return _compared[first, second]
 
 
 @router.get("/api/motors/{motor}/trend")
-async def trend(request: Request, motor: str, _who: Viewer) -> dict[str, Any]:
+async def trend(request: Request, motor: str, _who: Viewer) -> TrendDocument:
     """Every accepted result of a motor with its standard errors, oldest first."""
     parts = parts_of(request)
     return await asyncio.to_thread(trend_of, parts, motor)
 
 
-def trend_of(parts: Parts, motor: str) -> dict[str, Any]:
+def trend_of(parts: Parts, motor: str) -> TrendDocument:
     """The points, and of each parameter the change from the first to the last in units of their joint standard error."""
-    entries = [
-        e
-        for e in parts.archive.entries(limit=1000)
-        if e.motor == motor and e.parameters and e.outcome == "commissioned"
-    ]
-    points = [_point(entry) for entry in reversed(entries)]
+    entries = [e for e in parts.archive.entries(limit=1000) if e.motor == motor and e.outcome == "commissioned"]
+    points = [_point(entry, entry.parameters) for entry in reversed(entries) if entry.parameters]
     changes = {name: _change(points, name) for name in PARAMETERS} if len(points) > 1 else {}
     return {"motor": motor, "points": points, "changes": changes}
 
 
-def _point(entry: Entry) -> dict[str, Any]:
-    return {"run": entry.run, "utc": entry.utc, "flux_wb": entry.flux_wb, "parameters": entry.parameters}
+def _point(entry: Entry, parameters: Mapping[str, Measured]) -> TrendPoint:
+    return {"run": entry.run, "utc": entry.utc, "flux_wb": entry.flux_wb, "parameters": parameters}
 
 
-def _change(points: list[dict[str, Any]], name: str) -> dict[str, float]:
+def _change(points: list[TrendPoint], name: str) -> TrendChange:
     first, last = points[0]["parameters"][name], points[-1]["parameters"][name]
-    joint = (first["std"] ** 2 + last["std"] ** 2) ** 0.5
+    joint = ((first["std"] or 0.0) ** 2 + (last["std"] or 0.0) ** 2) ** 0.5
     change = last["value"] - first["value"]
     return {"relative": change / first["value"], "sigmas": abs(change) / joint if joint > 0 else 0.0}

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from commissioner.operations.history.share import Moved
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.incoming import KeptPiece, OfferedRun
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.incoming import FILE, LARGEST, MOST_FILES, RUN
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Run = Annotated[str, Path(pattern=RUN)]
 File = Annotated[str, Path(pattern=FILE)]
@@ -31,7 +33,7 @@ class Arrival(BaseModel):
 @router.get("/api/incoming/{run}")
 async def offered(
     request: Request, run: Run, _who: Operator, journal_bytes: Annotated[int, Query(ge=0, le=LARGEST)] = 0
-) -> dict[str, Any]:
+) -> OfferedRun:
     """What is here of a run that somebody wants to push, so that only the rest is sent."""
     return await asyncio.to_thread(parts_of(request).incoming.offered, run, journal_bytes)
 
@@ -39,7 +41,7 @@ async def offered(
 @router.put("/api/incoming/{run}/{file}")
 async def piece(
     request: Request, run: Run, file: File, _who: Operator, start: Annotated[int, Query(ge=0, le=LARGEST)] = 0
-) -> dict[str, Any]:
+) -> KeptPiece:
     """The body is a piece of the file, from byte `start` on; what stood there goes. 409: a piece before it is missing."""
     body = await request.body()
     held = await asyncio.to_thread(parts_of(request).incoming.keep, run, file, start, body)
@@ -47,7 +49,7 @@ async def piece(
 
 
 @router.post("/api/incoming/{run}")
-async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -> dict[str, Any]:
+async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -> Moved:
     """Everything is here: proved by its chain, then put in place. `what`: copied, updated, there already, newer there, left, conflict."""
     parts = parts_of(request)
     _check_at_rest(parts, run)
@@ -55,7 +57,7 @@ async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -
     await asyncio.to_thread(
         parts.audit.write, who.person, who.address, "took in a pushed run", run=run, reason=moved.what
     )
-    return asdict(moved)
+    return moved
 
 
 def _check_at_rest(parts: Parts, run: str) -> None:

@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated
 
 from fastapi import APIRouter, Body, Depends, Request
 from pydantic import BaseModel, ConfigDict
 
+from commissioner.encoding import JsonObject
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.configuration import DriveTable, Identifier
-from commissioner.service.library import SIMULATOR, judge_plate, plate_document
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.drives import (
+    DrivesDocument,
+    DriveStateDocument,
+    MotorDocument,
+    MotorsDocument,
+    ProceduresDocument,
+)
+from commissioner.service.contract.plates import JudgedPlate
+from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
 from commissioner.settings import CONFIG_FOLDER, MotorFile
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
@@ -38,25 +48,25 @@ class SimulatorWish(BaseModel):
 
 
 @router.get("/api/drives")
-async def drives(request: Request, _who: Viewer) -> dict[str, Any]:
+async def drives(request: Request, _who: Viewer) -> DrivesDocument:
     """All drives; addresses without what is secret."""
     from commissioner.link.wire.url import without_secrets
 
     parts = parts_of(request)
-    return {"drives": [asdict(d) | {"url": without_secrets(d.url)} for d in parts.library.drives()]}
+    return {"drives": [replace(d, url=without_secrets(d.url)) for d in parts.library.drives()]}
 
 
 @router.post("/api/drives", status_code=201)
-async def add_drive(request: Request, table: DriveTable, who: Operator) -> dict[str, Any]:
+async def add_drive(request: Request, table: DriveTable, who: Operator) -> Drive:
     """Check and keep a drive. It is not asked for yet: POST /api/checks does."""
     parts = parts_of(request)
     drive = parts.library.add_drive(table)
     await asyncio.to_thread(parts.audit.write, who.person, who.address, "added a drive", drive=drive.id)
-    return asdict(drive)
+    return drive
 
 
 @router.get("/api/drives/{drive}/state")
-async def drive_state(request: Request, drive: str, _who: Viewer) -> dict[str, Any]:
+async def drive_state(request: Request, drive: str, _who: Viewer) -> DriveStateDocument:
     """The drive's own word while no run has it, and how old that is. The first call begins to look."""
     parts = parts_of(request)
     found = _drive(parts.library, drive)
@@ -72,30 +82,28 @@ async def drive_state(request: Request, drive: str, _who: Viewer) -> dict[str, A
     watch = parts.desk.watch(found)
     watch.want()
     live = parts.desk.live_on(found.id)
-    return describe(watch.seen) | {"run": live.id if live else None}
+    return {**describe(watch.seen), "run": live.id if live else None}
 
 
 @router.get("/api/motors")
-async def motors(request: Request, _who: Viewer) -> dict[str, Any]:
+async def motors(request: Request, _who: Viewer) -> MotorsDocument:
     """All motors with their plates."""
-    found = parts_of(request).library.motors()
-    return {
-        "motors": [
-            {"id": m.id, "name": m.name, "origin": m.origin, "nameplate": plate_document(m.plate)} for m in found
-        ]
-    }
+    return {"motors": [_motor(motor) for motor in parts_of(request).library.motors()]}
+
+
+def _motor(motor: Motor) -> MotorDocument:
+    return {"id": motor.id, "name": motor.name, "origin": motor.origin, "nameplate": motor.plate}
 
 
 @router.post("/api/motors", status_code=201)
-async def put_motor(request: Request, motor: NewMotor, _who: Operator) -> dict[str, Any]:
+async def put_motor(request: Request, motor: NewMotor, _who: Operator) -> MotorDocument:
     """Check and keep a plate."""
     table = MotorFile(**motor.model_dump(exclude={"id"}))
-    kept = parts_of(request).library.put_motor(motor.id, table)
-    return {"id": kept.id, "name": kept.name, "origin": kept.origin, "nameplate": plate_document(kept.plate)}
+    return _motor(parts_of(request).library.put_motor(motor.id, table))
 
 
 @router.get("/api/procedures")
-async def procedures(_who: Viewer) -> dict[str, Any]:
+async def procedures(_who: Viewer) -> ProceduresDocument:
     """The procedure that ships with the product, as its file says."""
     import tomllib
 
@@ -104,18 +112,18 @@ async def procedures(_who: Viewer) -> dict[str, Any]:
 
 
 @router.post("/api/nameplates/validate")
-async def validate(plate: Annotated[dict[str, Any], Body()], _who: Viewer) -> dict[str, Any]:
+async def validate(plate: Annotated[JsonObject, Body()], _who: Viewer) -> JudgedPlate:
     """Per field: ok, or what is wrong and the remedy; then what the whole plate implies."""
     return judge_plate(plate)
 
 
 @router.post("/api/simulator", status_code=201)
-async def simulator(request: Request, wish: SimulatorWish, who: Operator) -> dict[str, Any]:
+async def simulator(request: Request, wish: SimulatorWish, who: Operator) -> Drive:
     """Start the packaged simulator, or change what it is."""
     return await start_simulator(request, wish.scenario, who)
 
 
-async def start_simulator(request: Request, scenario: str, who: Visitor) -> dict[str, Any]:
+async def start_simulator(request: Request, scenario: str, who: Visitor) -> Drive:
     """The simulator's drive. Refusal where a run has it."""
     parts = parts_of(request)
     if scenario not in SCENARIOS:
@@ -140,10 +148,10 @@ async def start_simulator(request: Request, scenario: str, who: Visitor) -> dict
     await parts.simulator.start(scenario)
     if is_new:
         await asyncio.to_thread(parts.audit.write, who.person, who.address, "started the simulator", scenario=scenario)
-    return asdict(parts.library.drive(SIMULATOR))
+    return parts.library.drive(SIMULATOR)
 
 
-def _drive(library: Any, identifier: str) -> Any:
+def _drive(library: Library, identifier: str) -> Drive:
     from commissioner.errors import UsageError
 
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, File, Form, Request, UploadFile
 from fastapi.responses import FileResponse, Response
@@ -11,11 +11,13 @@ from fastapi.responses import FileResponse, Response
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.recordings import RecordingDocument
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.recordings import Job
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 PIECE = 1 << 20
@@ -28,10 +30,10 @@ async def upload(
     files: Annotated[list[UploadFile], File(max_length=12)],
     verb: Annotated[Literal["identify", "diagnose", "monitor"], Form()] = "identify",
     motor: Annotated[str, Form(max_length=60)] = "",
-) -> dict[str, Any]:
+) -> RecordingDocument:
     """Keep the files and begin; GET the id for the result."""
     job = await take(parts_of(request), files, verb, motor)
-    return job.as_dict()
+    return job.as_document()
 
 
 async def take(parts: Parts, files: list[UploadFile], verb: str, motor: str) -> Job:
@@ -51,9 +53,9 @@ async def _pieces(file: UploadFile) -> AsyncIterator[bytes]:
 
 
 @router.get("/api/recordings/{recording}")
-async def one(request: Request, recording: str, _who: Viewer) -> dict[str, Any]:
+async def one(request: Request, recording: str, _who: Viewer) -> RecordingDocument:
     """How far it is; the verb's own document once it is done."""
-    return parts_of(request).recordings.find(recording).as_dict()
+    return parts_of(request).recordings.find(recording).as_document()
 
 
 @router.get("/api/recordings/{recording}/report", response_class=Response)

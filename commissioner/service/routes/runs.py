@@ -14,6 +14,8 @@ from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.archive import Entry
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument
 from commissioner.service.library import Drive, Motor
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
@@ -22,7 +24,7 @@ from commissioner.service.runs.control import Party
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.live import live_document
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Angle = Annotated[float, Field(ge=-360, le=360)]
@@ -40,7 +42,7 @@ class RunWish(BaseModel):
 
 
 @router.post("/api/runs", status_code=201)
-async def start(request: Request, wish: RunWish, who: Operator) -> dict[str, Any]:
+async def start(request: Request, wish: RunWish, who: Operator) -> Begun:
     """Energises the motor, after the run has made its checks. 409 names who has the drive."""
     run = await start_run(parts_of(request), wish, who)
     return {"id": run.id, "url": f"/runs/{run.id}"}
@@ -81,7 +83,7 @@ async def runs(
     outcome: Annotated[str, Query(max_length=40)] = "",
     since: Annotated[str, Query(max_length=32, pattern=r"^[0-9TZ:.+\-]*$")] = "",
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-) -> dict[str, Any]:
+) -> RunsDocument:
     """The archive, newest first."""
     parts = parts_of(request)
     found = await asyncio.to_thread(
@@ -91,7 +93,7 @@ async def runs(
 
 
 @router.get("/api/runs/{run}")
-async def one(request: Request, run: str, _who: Viewer) -> dict[str, Any]:
+async def one(request: Request, run: str, _who: Viewer) -> RunAnswer:
     """The result document; of a run that goes on, its state under `live`."""
     parts = parts_of(request)
     live = parts.desk.runs.get(run)
@@ -145,7 +147,7 @@ async def _exported(parts: Parts, entry: Entry, ending: str) -> Path:
     return target
 
 
-def _row(entry: Entry) -> dict[str, Any]:
+def _row(entry: Entry) -> RunRow:
     return {
         "run": entry.run,
         "utc": entry.utc,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,12 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from commissioner.registers.tuning import MOST_REPEATS, REPEATS
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.runs import Answered, Begun
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.routes.runs import begin
 from commissioner.service.runs.desk import LiveRun
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
 
@@ -43,7 +45,7 @@ class Answer(BaseModel):
 
 
 @router.post("/api/tunings", status_code=201)
-async def start(request: Request, wish: TuneWish, who: Operator) -> dict[str, Any]:
+async def start(request: Request, wish: TuneWish, who: Operator) -> Begun:
     """Lets the drive energise the motor by its own tuning. 409 names who has the drive."""
     run = await start_tuning(parts_of(request), wish, who)
     return {"id": run.id, "url": f"/runs/{run.id}"}
@@ -59,7 +61,7 @@ async def start_tuning(parts: Parts, wish: TuneWish, who: Visitor) -> LiveRun:
 
 
 @router.post("/api/runs/{run}/answer")
-async def answer(request: Request, run: str, said: Answer, who: Operator) -> dict[str, Any]:
+async def answer(request: Request, run: str, said: Answer, who: Operator) -> Answered:
     """What the person at the drive has done, or not. 409: that question is not asked."""
     await give_answer(parts_of(request), run, said, who)
     return {"run": run, "number": said.number, "done": said.done}

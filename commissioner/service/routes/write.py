@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, cast
 
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from commissioner.encoding import JsonObject
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.contract.description import Typed
+from commissioner.service.contract.writing import RestoredDocument, WritePlan, WrittenDocument
 from commissioner.service.library import Drive
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask, refusal_from
 
-router = APIRouter()
+router = APIRouter(route_class=Typed)
 Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Act = Literal["write-back", "restore"]
 PLAN_S, ACT_S = 120.0, 1800.0
@@ -32,38 +35,38 @@ class Agreement(BaseModel):
 
 
 @router.get("/api/runs/{run}/write-back")
-async def write_back_table(request: Request, run: str, _who: Operator) -> dict[str, Any]:
+async def write_back_table(request: Request, run: str, _who: Operator) -> WritePlan:
     """Register, now, will be, unit and convention in the drive, and the token of this table. Writes nothing."""
     return await plan(parts_of(request), run, "write-back")
 
 
 @router.get("/api/runs/{run}/restore")
-async def restore_table(request: Request, run: str, _who: Operator) -> dict[str, Any]:
+async def restore_table(request: Request, run: str, _who: Operator) -> WritePlan:
     """The same for the set that the run found."""
     return await plan(parts_of(request), run, "restore")
 
 
 @router.post("/api/runs/{run}/write-back")
-async def write_back(request: Request, run: str, agreement: Agreement, who: Operator) -> dict[str, Any]:
+async def write_back(request: Request, run: str, agreement: Agreement, who: Operator) -> WrittenDocument:
     """Write the accepted values: only if the drive still holds what the table showed; read back, stored."""
-    return await act(parts_of(request), run, "write-back", agreement.token, who)
+    return cast("WrittenDocument", await act(parts_of(request), run, "write-back", agreement.token, who))
 
 
 @router.post("/api/runs/{run}/restore")
-async def restore(request: Request, run: str, agreement: Agreement, who: Operator) -> dict[str, Any]:
+async def restore(request: Request, run: str, agreement: Agreement, who: Operator) -> RestoredDocument:
     """Write the set that the run found."""
-    return await act(parts_of(request), run, "restore", agreement.token, who)
+    return cast("RestoredDocument", await act(parts_of(request), run, "restore", agreement.token, who))
 
 
-async def plan(parts: Parts, run: str, what: Act) -> dict[str, Any]:
+async def plan(parts: Parts, run: str, what: Act) -> WritePlan:
     """The table, read from the drive afresh."""
     entry = parts.archive.find(run)
     drive = drive_of(parts, run)
     arguments = [what, entry.run, *_address(drive), "--plan", *_runs(parts), "--json"]
-    return await _with_drive(parts, drive, arguments, PLAN_S)
+    return cast("WritePlan", await _with_drive(parts, drive, arguments, PLAN_S))
 
 
-async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> dict[str, Any]:
+async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> WrittenDocument | RestoredDocument:
     """Write what the table of `token` showed; the audit has it before and after."""
     entry = parts.archive.find(run)
     drive = drive_of(parts, run)
@@ -72,10 +75,10 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> di
     done = await _with_drive(parts, drive, arguments, ACT_S)
     rows = (done.get("report") or done).get("written") or []
     await asyncio.to_thread(parts.audit.write, who.person, who.address, DONE[what], run=run, registers=len(rows))
-    return done
+    return cast("WrittenDocument | RestoredDocument", done)
 
 
-async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], within_s: float) -> dict[str, Any]:
+async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], within_s: float) -> JsonObject:
     if drive is not None and (parts.desk.live_on(drive.id) or parts.desk.is_starting(drive.id)):
         raise Refusal(
             409,

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import JsonObject
 from commissioner.run.stopping.dead_man import BEAT_S
 from commissioner.service.problems import Refusal
 
@@ -116,7 +117,7 @@ class Child:
         return refusal_from(code, text, self._log)
 
 
-async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, dict[str, Any]]:
+async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, JsonObject]:
     """A verb with --json as a process: exit code and document. Refusal where it answered none."""
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("wb") as errors:
@@ -144,7 +145,7 @@ async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> 
 
 def refusal_from(code: int, text: bytes, log: Path) -> Refusal:
     """What a verb says under `error`, as a refusal."""
-    document: dict[str, Any] = {}
+    document: JsonObject = {}
     with contextlib.suppress(ValueError):
         read = json.loads(text)
         document = read if isinstance(read, dict) else {}

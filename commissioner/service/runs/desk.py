@@ -15,6 +15,7 @@ from commissioner.run.stopping.dead_man import SERVICE
 from commissioner.run.stopping.stop_file import ask_to_stop
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings
+from commissioner.service.contract.runs import Stopped
 from commissioner.service.library import Drive, Library, Motor
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import Child
@@ -58,18 +59,6 @@ class LiveRun:
     def is_cut_off(self) -> bool:
         """Its process is gone, and it has no end."""
         return self.is_over and self.feed.state.end is None
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """What became of a STOP. `after_s`: from the asking until the service had read the journalled word of the drive; 0 where it was off before."""
-
-    run: str
-    asked_utc: str
-    zero_volts: bool
-    confirmed_utc: str
-    after_s: float
-    state: str
 
 
 @dataclass

@@ -7,12 +7,12 @@ import shutil
 import time
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
 
 from commissioner.operations.history import share
 from commissioner.run.archive.documents import open_no_link
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL
+from commissioner.service.contract.incoming import FileHere, JournalHere, OfferedRun
 from commissioner.service.problems import Refusal
 
 RUN = r"^[0-9]{8}-[0-9]{6}-[\w.\-]{1,150}$"
@@ -29,11 +29,12 @@ class Incoming:
     def __init__(self, root: Path, runs: Path) -> None:
         self._root, self._runs = root, runs
 
-    def offered(self, run: str, journal_bytes: int) -> dict[str, Any]:
+    def offered(self, run: str, journal_bytes: int) -> OfferedRun:
         """What is here of a run: its journal in the archive (bytes, and the digest of at most `journal_bytes` of them), whether
         that lies damaged, and the files that an earlier push began."""
         self._forget()
-        path, there = self._runs / run / JOURNAL, None
+        path = self._runs / run / JOURNAL
+        there: JournalHere | None = None
         if path.is_file():
             held = path.read_bytes()
             there = {
@@ -79,6 +80,6 @@ class Incoming:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-def _state(path: Path) -> dict[str, Any]:
+def _state(path: Path) -> FileHere:
     with path.open("rb") as file:
         return {"bytes": path.stat().st_size, "sha256": hashlib.file_digest(file, "sha256").hexdigest()}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from commissioner.service.contract.live import LiveDocument, LiveTest, LiveTuning
 from commissioner.service.runs.state import AxisTest, OwnTuning, RunState
 
 
-def live_document(state: RunState, current_now_a: float) -> dict[str, Any]:
+def live_document(state: RunState, current_now_a: float) -> LiveDocument:
     """The newest numbers. `estimate`: time, four values, four standard errors of the running test, SI."""
     k = state.current
     return {
@@ -40,13 +39,13 @@ def history_document(state: RunState) -> list[list[float]]:
     return state.history
 
 
-def _tuning(tuning: OwnTuning | None) -> dict[str, Any] | None:
+def _tuning(tuning: OwnTuning | None) -> LiveTuning | None:
     if tuning is None:
         return None
-    return {"done": len(tuning.done), "question": tuning.question and tuning.question["number"]}
+    return {"done": len(tuning.done), "question": tuning.question["number"] if tuning.question else None}
 
 
-def _test(test: AxisTest) -> dict[str, Any]:
+def _test(test: AxisTest) -> LiveTest:
     return {
         "axis_deg": test.axis_deg,
         "state": test.state,

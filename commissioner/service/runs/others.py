@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import time
 from pathlib import Path
-from typing import Any
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError
 from commissioner.run.archive.folder import read_document
 from commissioner.service.library import Drive, Library
@@ -30,7 +30,7 @@ def going_on(runs: Path, holding: frozenset[str]) -> list[Path]:
     return found
 
 
-def request_of(folder: Path) -> dict[str, Any]:
+def request_of(folder: Path) -> JsonObject:
     """What a run was asked to do; empty as long as that is not written down."""
     with contextlib.suppress(OSError):
         return read_document((folder / "request.json").read_text("utf-8"))

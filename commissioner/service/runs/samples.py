@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from commissioner.motor.space_vector import axis_current_a
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import Placed
+from commissioner.service.contract.live import SamplesEvent
 
 BIN_S = 0.01
 
@@ -23,24 +23,22 @@ class Envelope:
         self._segment, self._time_s, self.blocks = -1, 0.0, 0
         self.energised_s = 0.0
 
-    def of(self, blocks: Sequence[Placed]) -> list[dict[str, Any]]:
+    def of(self, blocks: Sequence[Placed]) -> list[SamplesEvent]:
         """One event for each segment among the blocks; `t_s` runs on over all segments of the run."""
-        events: list[dict[str, Any]] = []
+        events: list[SamplesEvent] = []
         self.blocks += len(blocks)
         for segment, block in _joined(blocks):
             is_new = segment != self._segment
             if is_new or not events:
                 events.append(
                     {"segment": segment, "axis_deg": block.axis_deg, "bin_s": BIN_S, "is_new": is_new, "t_s": [], "low_a": [],
-                     "high_a": []}
+                     "high_a": [], "blocks": self.blocks}
                 )  # fmt: skip
                 self._segment = segment
             self._add(events[-1], block)
-        for event in events:
-            event["blocks"] = self.blocks
         return events
 
-    def _add(self, event: dict[str, Any], block: SampleBlock) -> None:
+    def _add(self, event: SamplesEvent, block: SampleBlock) -> None:
         current = axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
         self._time_s += block.lost_before * block.sample_period_s
         edges = np.arange(0, current.size, max(1, round(BIN_S / block.sample_period_s)))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from typing import Any
 
 from commissioner.errors import CommissionerError
 from commissioner.records import DriveIdentity, DriveStatus
+from commissioner.service.contract.drives import DriveWord
 
 EVERY_S = 0.4
 INTEREST_S = 5.0
@@ -134,7 +134,7 @@ class DriveWatch:
             self._wake.wait_for(lambda: not self._may_look, seconds)
 
 
-def describe(seen: Seen) -> dict[str, Any]:
+def describe(seen: Seen) -> DriveWord:
     """For the API: what the drive said, and how old that is."""
     status, identity = seen.status, seen.identity
     return {

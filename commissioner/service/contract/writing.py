@@ -1,0 +1,70 @@
+"""What would be written into a drive, and what was."""
+
+from __future__ import annotations
+
+from typing_extensions import TypedDict
+
+
+class PlannedRowDocument(TypedDict):
+    """One register: what the drive holds now and would hold, in the drive's own unit and convention."""
+
+    name: str
+    register: int
+    now: float | None
+    will_be: float | None
+    unit: str
+    convention: str
+
+
+class WritePlan(TypedDict):
+    """A table that somebody is asked to agree to. `token` stands for exactly this table."""
+
+    run: str
+    what: str
+    drive_type: str
+    serial_number: int | None
+    rows: list[PlannedRowDocument]
+    token: str
+
+
+class ReadBackRow(TypedDict):
+    """One parameter in the drive's own unit and convention: before, as written, as read back."""
+
+    name: str
+    register: int
+    before: float | None
+    after: float | None
+    read_back: float | None
+
+
+class WriteReportDocument(TypedDict):
+    """`written` is empty where the drive had the values already; `store_count`: of the drive's memory, null where it does not count."""
+
+    written: list[ReadBackRow]
+    is_stored: bool
+    store_count_before: int | None
+    store_count_after: int | None
+    endurance_writes: int | None
+    fault: str
+
+
+class WrittenDocument(TypedDict):
+    """The accepted result of a run, written."""
+
+    outcome: str
+    reason: str
+    run: str
+    report: WriteReportDocument
+
+
+class RestoredDocument(TypedDict):
+    """The set that the run found, written back. `wear_fraction`: of the drive's memory."""
+
+    outcome: str
+    reason: str
+    run: str
+    written: list[ReadBackRow]
+    store_count: int | None
+    wear_fraction: float | None
+    is_stored: bool
+    fault: str
