@@ -12,6 +12,18 @@ from commissioner.encoding import JsonObject
 
 ANSWER = "application/json"
 REFERENCE = "#/components/schemas/{model}"
+_KINDS = {
+    "text/html": {"type": "string"},
+    "text/csv": {"type": "string"},
+    "text/event-stream": {"type": "string"},
+    ANSWER: {"type": "object"},
+}
+
+
+def sends(*media_types: str) -> dict[int | str, JsonObject]:
+    """For OpenAPI, of a route that answers with a file or a stream of one of these kinds."""
+    content = {kind: {"schema": _KINDS.get(kind, {"type": "string", "format": "binary"})} for kind in media_types}
+    return {200: {"description": "The file, or the stream.", "content": content}}
 
 
 class Typed(APIRoute):

@@ -11,7 +11,7 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
-from commissioner.service.contract.description import Typed
+from commissioner.service.contract.description import Typed, sends
 from commissioner.service.parts import Parts
 from commissioner.service.runs.feed import Feed, Message
 
@@ -19,7 +19,7 @@ router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 
 
-@router.get("/api/runs/{run}/events", response_class=EventSourceResponse)
+@router.get("/api/runs/{run}/events", response_class=EventSourceResponse, responses=sends("text/event-stream"))
 async def events(
     request: Request, run: str, _who: Viewer, last_event_id: Annotated[str, Header(max_length=20)] = ""
 ) -> EventSourceResponse:

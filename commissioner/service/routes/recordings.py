@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse, Response
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Visitor, parts_of, require
-from commissioner.service.contract.description import Typed
+from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.recordings import RecordingDocument
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
@@ -58,7 +58,7 @@ async def one(request: Request, recording: str, _who: Viewer) -> RecordingDocume
     return parts_of(request).recordings.find(recording).as_document()
 
 
-@router.get("/api/recordings/{recording}/report", response_class=Response)
+@router.get("/api/recordings/{recording}/report", response_class=Response, responses=sends("text/html"))
 async def report(request: Request, recording: str, _who: Viewer) -> Response:
     """The report with its pictures, as one HTML file."""
     path = parts_of(request).recordings.find(recording).report

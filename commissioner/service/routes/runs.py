@@ -14,7 +14,7 @@ from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.archive import Entry
-from commissioner.service.contract.description import Typed
+from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument
 from commissioner.service.library import Drive, Motor
 from commissioner.service.parts import Parts
@@ -102,7 +102,7 @@ async def one(request: Request, run: str, _who: Viewer) -> RunAnswer:
     return parts.archive.result(run)
 
 
-@router.get("/api/runs/{run}/report", response_class=Response)
+@router.get("/api/runs/{run}/report", response_class=Response, responses=sends("text/html"))
 async def report(request: Request, run: str, _who: Viewer) -> Response:
     """The report as one HTML file; made again where the run could not make it."""
     parts = parts_of(request)
@@ -119,7 +119,11 @@ async def report(request: Request, run: str, _who: Viewer) -> Response:
     )
 
 
-@router.get("/api/runs/{run}/export/{format}", response_class=Response)
+@router.get(
+    "/api/runs/{run}/export/{format}",
+    response_class=Response,
+    responses=sends("text/csv", "application/json", "application/octet-stream"),
+)
 async def export(
     request: Request, run: str, format: Literal["csv", "json", "mat", "parquet"], _who: Viewer
 ) -> Response:

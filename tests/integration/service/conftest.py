@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.support.service.browser import chromium
+from tests.support.service.described import Description
 from tests.support.service.service_process import ServiceProcess
 
 PAGE_LOST_S = 5.0
@@ -15,6 +16,8 @@ PAGE_LOST_S = 5.0
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess]:
     settings = f"page_lost_s = {PAGE_LOST_S}\nhand_over_s = 60.0\naxes_deg = [0]"
     with ServiceProcess(tmp_path_factory.mktemp("service"), settings=settings) as made:
+        described = Description(made.client.get("/openapi.json").json())
+        made.client.event_hooks["response"].append(described.watch)
         made.start_simulator()
         yield made
 
