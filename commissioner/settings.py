@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.motor.nameplate import Nameplate, check, connection_of
 from commissioner.paths import no_file
@@ -127,7 +128,7 @@ def load_procedure(
     )
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> JsonObject:
     """The document in a TOML file of bounded size."""
     if not path.is_file():
         raise no_file(path, "read configuration", "an existing TOML file")

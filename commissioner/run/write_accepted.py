@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from commissioner.errors import Aborted, DataRefused, IdentityMismatch, UsageError
 from commissioner.link.drive.facts import WriteReport
@@ -21,6 +21,7 @@ from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.records import DriveIdentity, ParameterSnapshot, drive_words
 from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
+from commissioner.report.run.contract import PlanRow, WritePlan
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.folder import RunFolder, read_journal, read_saved
@@ -234,6 +235,13 @@ def _row(profile: DriveProfile, name: str, now: float, will_be: float) -> Planne
     return PlannedRow(name, item.place, now, will_be, item.unit, item.convention)
 
 
-def as_document(plan: Plan) -> dict[str, Any]:
+def as_document(plan: Plan) -> WritePlan:
     """The plan with its token."""
-    return asdict(plan) | {"token": plan.token}
+    return {
+        "run": plan.run,
+        "what": plan.what,
+        "drive_type": plan.drive_type,
+        "serial_number": plan.serial_number,
+        "rows": [cast("PlanRow", asdict(row)) for row in plan.rows],
+        "token": plan.token,
+    }

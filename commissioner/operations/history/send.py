@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.history.share import (
     CONFLICT,
@@ -131,7 +132,7 @@ class _Service:
     def __exit__(self, *_: object) -> None:
         self._connection.close()
 
-    def ask(self, method: str, path: str, body: bytes | None = None, kind: str = "") -> dict[str, Any]:
+    def ask(self, method: str, path: str, body: bytes | None = None, kind: str = "") -> JsonObject:
         """The answer's document. CommissionerError: none came, or a refusal, in the service's own words."""
         headers = self._headers | ({"Content-Type": kind} if kind else {})
         try:

@@ -95,3 +95,25 @@ class RunDocument(TypedDict):
     link: NotRequired[dict[str, Any]]
     longer_test: NotRequired[dict[str, Any]]
     plate_match: NotRequired[PlateMatchDocument]
+
+
+class PlanRow(TypedDict):
+    """One register: what the drive holds now and would hold, in the drive's own unit and convention."""
+
+    name: str
+    register: int
+    now: float | None
+    will_be: float | None
+    unit: str
+    convention: str
+
+
+class WritePlan(TypedDict):
+    """A table that somebody is asked to agree to. `token` stands for exactly this table."""
+
+    run: str
+    what: str
+    drive_type: str
+    serial_number: int | None
+    rows: list[PlanRow]
+    token: str

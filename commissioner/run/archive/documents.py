@@ -6,8 +6,9 @@ import json
 import os
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError, DataRefused
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from commissioner.report.run.contract import RunDocument
 
 
-def read_document(text: str) -> dict[str, Any]:
+def read_document(text: str) -> JsonObject:
     """The JSON object in `text`; empty where it holds none, or one nested deeper than any of ours."""
     try:
         document = json.loads(text)
@@ -25,7 +26,7 @@ def read_document(text: str) -> dict[str, Any]:
     return document if isinstance(document, dict) else {}
 
 
-def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
+def read_saved(folder: Path, name: str, *needed: str) -> JsonObject:
     """The JSON document `name` of a run. DataRefused: missing, damaged, or without one of the `needed` keys."""
     path = folder / name
     document = read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
@@ -37,7 +38,7 @@ def read_saved(folder: Path, name: str, *needed: str) -> dict[str, Any]:
     return document
 
 
-def read_result(folder: Path) -> dict[str, Any] | None:
+def read_result(folder: Path) -> JsonObject | None:
     """What the run's `result.json` says; None where it has none. DataRefused: damaged, or a value of another kind than promised;
     what is not there, or null, may be an older version's."""
     if not (folder / "result.json").is_file():

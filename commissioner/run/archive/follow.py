@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from commissioner.encoding import JsonObject
 from commissioner.run.archive.blocks import Placed, follow_blocks
 from commissioner.run.archive.documents import read_document
 
@@ -15,7 +15,7 @@ class JournalFollower:
     def __init__(self, path: Path, offset: int = 0) -> None:
         self._path, self.offset = path, offset
 
-    def new(self) -> list[dict[str, Any]]:
+    def new(self) -> list[JsonObject]:
         """The whole records since the last call; a line that is still being written waits for the next one."""
         try:
             with self._path.open("rb") as file:

@@ -12,7 +12,7 @@ import hmac
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from commissioner.errors import UsageError
 
@@ -21,6 +21,13 @@ CLOSED = "folder_closed"
 SHORTEST_KEY = 16
 NOT_COVERED = ("journal.jsonl", "blocks.bin", "summary.json")
 """The first two by the chain itself, the third follows from the last record."""
+
+
+class Covered(TypedDict):
+    """One file as it was when the folder was closed."""
+
+    bytes: int
+    sha256: str
 
 
 def read_key(path: Path) -> bytes:
@@ -40,14 +47,14 @@ def read_key(path: Path) -> bytes:
     return key
 
 
-def cover(path: Path) -> dict[str, Any]:
+def cover(path: Path) -> Covered:
     """Size and SHA-256 of one file."""
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     return {"bytes": path.stat().st_size, "sha256": found}
 
 
-def covers(folder: Path, names: Iterable[str]) -> dict[str, Any]:
+def covers(folder: Path, names: Iterable[str]) -> dict[str, Covered]:
     """Of each of the files that is there and that the chain does not cover by itself."""
     wanted = [name for name in sorted(names) if name not in NOT_COVERED]
     return {name: cover(folder / name) for name in wanted if (folder / name).is_file()}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import DataRefused
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
 from commissioner.run.archive.documents import read_document, read_result
@@ -32,7 +33,7 @@ class RunSummary:
     drive: str
     energised_s: float
     written: str
-    result: dict[str, Any] | None = None
+    result: JsonObject | None = None
     serial_number: int | None = None
     started_utc: str = ""
     ended_utc: str = ""
@@ -129,7 +130,7 @@ def unreadable(folder: Path, error: Exception) -> RunSummary:
     return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", 0.0, "not known")
 
 
-def sound_result(folder: Path) -> dict[str, Any] | None:
+def sound_result(folder: Path) -> JsonObject | None:
     """The run's result where it has one that can be read, and is of the form that was promised."""
     try:
         return read_result(folder)
@@ -137,7 +138,7 @@ def sound_result(folder: Path) -> dict[str, Any] | None:
         return None
 
 
-def read_file(path: Path) -> dict[str, Any]:
+def read_file(path: Path) -> JsonObject:
     """The JSON object in the file; empty where there is none."""
     return read_document(path.read_text("utf-8", errors="replace")) if path.is_file() else {}
 

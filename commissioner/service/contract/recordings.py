@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired
+from typing import Annotated, Any, NotRequired
 
+from pydantic import Field
 from typing_extensions import TypedDict
 
 from commissioner.diagnose.contract import DiagnosisDocument
@@ -27,6 +28,35 @@ class FailureDocument(TypedDict):
     what: NotRequired[str]
 
 
+class ErrorDocument(TypedDict):
+    """`kind`: of the errors of the manual; step, value, limit and remedy as everywhere."""
+
+    kind: str
+    what: str
+    step: str
+    value: Any
+    limit: Any
+    remedy: str
+
+
+class FailedVerb(TypedDict):
+    """What a verb prints that could not do it."""
+
+    outcome: str
+    reason: str
+    error: ErrorDocument
+
+
+class NothingYet(TypedDict):
+    """It works, or waits for another one."""
+
+
+Said = IdentifiedDocument | DiagnosisDocument | MonitoringDocument | PartialMonitoring | RefusedMonitoring
+OfAnotherKind = Annotated[
+    JsonObject, Field(description="What was identified on a running motor or from test sheets; chapter `running`.")
+]
+
+
 class RecordingDocument(TypedDict):
     """`verb`: identify | diagnose | monitor. `result`: the verb's own document, empty until it is done; `exit_code`: as on the command
     line, null while it works; `report`: where the page with its pictures is."""
@@ -37,8 +67,6 @@ class RecordingDocument(TypedDict):
     begun_utc: str
     is_done: bool
     exit_code: int | None
-    result: (
-        IdentifiedDocument | DiagnosisDocument | MonitoringDocument | PartialMonitoring | RefusedMonitoring | JsonObject
-    )
+    result: Said | FailedVerb | NothingYet | OfAnotherKind
     problem: FailureDocument | None
     report: str | None

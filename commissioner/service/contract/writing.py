@@ -1,30 +1,8 @@
-"""What would be written into a drive, and what was."""
+"""What was written into a drive; what would be: `report.run.contract.WritePlan`."""
 
 from __future__ import annotations
 
 from typing_extensions import TypedDict
-
-
-class PlannedRowDocument(TypedDict):
-    """One register: what the drive holds now and would hold, in the drive's own unit and convention."""
-
-    name: str
-    register: int
-    now: float | None
-    will_be: float | None
-    unit: str
-    convention: str
-
-
-class WritePlan(TypedDict):
-    """A table that somebody is asked to agree to. `token` stands for exactly this table."""
-
-    run: str
-    what: str
-    drive_type: str
-    serial_number: int | None
-    rows: list[PlannedRowDocument]
-    token: str
 
 
 class ReadBackRow(TypedDict):

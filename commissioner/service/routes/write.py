@@ -10,10 +10,11 @@ from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.encoding import JsonObject
+from commissioner.report.run.contract import WritePlan
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Visitor, parts_of, require
 from commissioner.service.contract.description import Typed
-from commissioner.service.contract.writing import RestoredDocument, WritePlan, WrittenDocument
+from commissioner.service.contract.writing import RestoredDocument, WrittenDocument
 from commissioner.service.library import Drive
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
