@@ -88,6 +88,7 @@ class RunDocument(TypedDict):
     rated_flux_wb: NotRequired[RatedFlux]
     inverter: NotRequired[Inverter]
     delay_s: NotRequired[Measured]
+    time_shift_periods: NotRequired[Measured]
     magnetizing_curve: NotRequired[list[CurvePoint]]
     stator_resistance_20degc_ohm: NotRequired[Measured | None]
     gaps: NotRequired[Gaps]
