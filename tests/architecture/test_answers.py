@@ -22,7 +22,7 @@ NOT_YET = {
     "diagnose/diagnosis.py:written_steps",
     "diagnose/export/model_file.py:model_document",
     "diagnose/export/model_file.py:plain",
-    "diagnose/export/scenario.py:scenario",
+    "diagnose/export/scenario.py:scenario", "diagnose/export/scenario.py:plain_scenario",
     "diagnose/search/journal.py:written",
     "operations/recordings/running.py:diagnosed",
     "operations/recordings/running.py:identified",
