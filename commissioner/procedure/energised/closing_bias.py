@@ -17,6 +17,9 @@ from commissioner.safety.commands import Command, SetBias, SetScale, Tell
 SECONDS = 1.3
 """Time on the bias, for rotor time constants up to 0.5 s; before it the tones come down."""
 
+COME_DOWN_S = 0.1
+"""After the bias was asked for: by then the tones have surely come down."""
+
 
 def under_bias(
     job: Job, findings: Findings, step: str, axis_deg: float, excitation: Excitation, test: UnderTest, seconds: float
@@ -50,6 +53,8 @@ def under_bias(
             yield SetBias(plan.voltage_v)
         block = yield from next_block(findings, step, axis_deg)
         since.take(block)
+        has_come_down = has_bias and since.seconds > COME_DOWN_S + job.link_latency_s
+        test.require_asked(block, plan.scale if has_come_down else None, plan.voltage_v if has_bias else 0.0)
         ends_s = (block.first_index + block.count) * block.sample_period_s
         reached_wb, predicted_wb = guard.advance(along_axis(block) - test.offset_a, ends_s, block.lost_before)
         reading = test.take_biased(block, reached_wb, predicted_wb)

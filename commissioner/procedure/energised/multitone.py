@@ -35,6 +35,9 @@ KNOWN_LOG_STD = 0.05
 KNEES, EXCITED = 8.0, 0.3
 """The observer adapts once the current reaches this many knees of the inverter's error, or this share of the designed
 peak: below, the dead band takes most of the command and the samples tell about its shape, not about the motor."""
+MOST_APPLIED, ROOM, SLACK = 1.25, 0.1, 3
+"""Voltage that a block may show: of the largest amplitude asked for in this session, at these instants and as many periods before and after;
+and besides of that amplitude's tones all at their peaks. Another master that raises the amplitude is seen so before the poll for it."""
 COMPENSATION_ROWS = 1025
 WARM_UP_SAMPLES, FITTED_SAMPLES = 6000, 600
 
@@ -61,7 +64,8 @@ class UnderTest:
         first = min(job.plan.excitation.first_scale, self._guard.safe_scale)
         if findings.is_measured:
             first = self._guard.begin_known(start, log_std, job.scale_ramp_per_s)
-        self.scale = first
+        self.scale = self._most_asked = first
+        self._excitation = chosen.excitation
         self._wakes_a = min(KNEES * inverter.knee_a, EXCITED * chosen.peak_current_a)
         self._is_awake = False
         self.offset_a = 0.0
@@ -90,6 +94,7 @@ class UnderTest:
         current = along_axis(block) - self.offset_a
         self._is_awake |= float(np.max(np.abs(current))) >= self._wakes_a
         voltage_v = on_its_period(block.voltage_axis_v, block.averaged)
+        self.require_asked(block)
         self._estimate = self._observer.advance(voltage_v, current, block.lost_before, adapts=self._is_awake)
         taken_s = duration_s(block)
         self.time_s += taken_s
@@ -126,7 +131,22 @@ class UnderTest:
         if not is_new or (reading.advice is FluxAdvice.RAISE and self._present_scale < self.scale):
             return None
         self.scale = min(1.0, reading.permitted_scale)
+        self._most_asked = max(self._most_asked, self.scale)
         return self.scale
+
+    def require_asked(self, block: SampleBlock, scale: float | None = None, bias_v: float = 0.0) -> None:
+        """Aborted: the drive applies more than the tones at this amplitude, else at the largest asked for in this session, and the bias."""
+        scale = self._most_asked if scale is None else scale
+        instants = block.first_index + np.arange(-SLACK, block.voltage_axis_v.size + SLACK)
+        tones_v = np.abs(self._excitation.over_scale(instants * block.sample_period_s)(scale))
+        peaks_v = scale * sum(t.amplitude_v for t in self._excitation.tones)
+        most_v = abs(bias_v) + MOST_APPLIED * float(np.max(tones_v)) + ROOM * peaks_v
+        seen_v = float(np.max(np.abs(block.voltage_axis_v)))
+        if seen_v > most_v:
+            raise Aborted(
+                "the drive applies more than it was asked for", step=f"multitone test, axis {self._axis_deg:g} deg", value=seen_v,
+                limit=most_v, remedy="see that nothing else writes to this drive: a second master, a panel, a program on another computer",
+            )  # fmt: skip
 
     def is_done(self, longest_s: float) -> bool:
         """The planned time is up and the estimate at rest, or no more time is allowed."""

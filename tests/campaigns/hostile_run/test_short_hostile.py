@@ -46,6 +46,17 @@ def test_a_slow_link_that_does_nothing_wrong_is_commissioned(tmp_path, motor):
     assert judged.flux < 0.95
 
 
+@pytest.mark.timeout(300)
+def test_another_master_that_raises_the_amplitude_on_a_bias_is_seen_in_the_voltage(tmp_path):
+    """Sevenfold, where the direct current alone is near the limit: at the next poll the true flux was at 1.24 of it."""
+    amplitude = [name for name, _ in FOREIGN].index("amplitude_scale")
+    trouble = Trouble("second_master", 4, 3.2307, 0.0, amplitude)
+    judged = run_one(650, "4k_slow_switching", trouble, tmp_path, BUSY_HOST)
+    assert not judged.broken, judged
+    assert judged.reason == "the drive applies more than it was asked for"
+    assert judged.flux < 0.95
+
+
 def test_a_runner_without_its_guards_is_seen(tmp_path, monkeypatch):
     """Nothing but the drive's own ceilings is left: the campaign must see what the guards were for."""
     monkeypatch.setattr(runner, "stop_if", lambda _reason: None)
