@@ -23,6 +23,9 @@ MISFIT = 0.12
 """Largest misfit of a phase, of the axis current: gains that differ by a tenth leave 0.04 and legs that do as much again. The
 phase that carries the whole axis current leaves only (g - 1) / (2 g + 1) of a gain g: 0.2 where it shows twice its current."""
 SIGMAS = 6.0
+NOISES = 5.0
+"""Standard deviations of a sensor's noise that the drive's word may be off beside: it may be of the neighbouring sample. Where no current flowed, a
+magnitude of 0.037 A against 0.004 A ended a sound run."""
 SCALE, SCALE_FLOOR = 0.1, 0.004
 """How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""
 UNSEEN = 3
@@ -71,7 +74,8 @@ class SensorWatch:
         if place < 0:
             return None
         shown = float(np.max(np.abs(_three(phases)[:, place])))
-        floor_a = SCALE_FLOOR * self.current_limit_a * (1 if len(phases) == 3 else UNSEEN)
+        noise_a = NOISES * float(np.max(self._zero.noise_a)) if self._zero else 0.0
+        floor_a = (SCALE_FLOOR * self.current_limit_a + noise_a) * (1 if len(phases) == 3 else UNSEEN)
         if abs(shown - claimed) <= SCALE * max(shown, claimed) + floor_a:
             return None
         return _distrusted(

@@ -269,3 +269,14 @@ def test_a_drive_that_says_nothing_is_not_compared(magnitude, produced, energise
 
 def test_one_sample_is_a_claim():
     assert claimed(a_block(first_index=0), 8.0, 1)[1] is not None
+
+
+@pytest.mark.parametrize("noise_a", [0.0, 0.01])
+@pytest.mark.parametrize(("over", "passes"), [(0.999, True), (1.001, False)])
+def test_the_drives_word_may_be_a_neighbours_by_five_standard_deviations_of_noise(noise_a, over, passes):
+    """Where no current flows: what is left of a tenth, 0.004 of the limit, and five times the noise seen at rest."""
+    watch = SensorWatch(LIMIT_A)
+    watch._zero = _Zero(np.zeros(3), np.array([0.0, noise_a, 0.0]))
+    said_a = over * (0.004 * LIMIT_A + 5.0 * noise_a) / 0.9
+    watch.claim(replace(STATUS, is_energised=True, current_magnitude_a=said_a, samples_produced=104))
+    assert (watch.judge(a_block(peak_a=0.0)) is None) is passes
