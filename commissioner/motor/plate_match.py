@@ -21,7 +21,8 @@ CURRENT_RATIO = (0.66, 1.66)
 """Computed over rated current: 0.83 ... 1.59 in the table, widened: upwards by 5 % (a cold rotor adds a fifth to what most
 have), downwards by a fifth for the iron that is less saturated in the test than at rated voltage."""
 SURE, LEAST_SHARE = 2.0, 0.01
-"""Standard errors by which R_s must contradict the plate; what of it is left at the least."""
+"""Standard errors by which R_s, or a first current's inductance, must contradict the plate: beside large sensors a small current tells little;
+what of R_s is left at the least."""
 MOST_INDUCTIVE = 1.95
 """Unsaturated static stator inductance over the plate's typical one: 0.63 ... 1.33 in the table at rated flux; iron that is
 not saturated shows up to 1.4 times as much, and a value from few levels is a tenth off. There is no lower bound: behind an

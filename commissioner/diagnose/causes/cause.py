@@ -218,12 +218,14 @@ class Cause:
             return False
         sizes = self.sizes(setting, values)
         has_own_sign = any(t.lower < 0.0 for t in self.exchanged_in(values))
-        has_right_sign = not self.sign or not sizes or has_own_sign or next(iter(sizes.values()))[0] * self.sign > 0
-        return has_right_sign and self.is_possible(sizes, model, setting)
+        return (has_own_sign or self.has_its_sign(sizes)) and self.is_possible(sizes, model, setting)
 
     def promises_its_sign(self, setting: Setting, values: Numbers) -> bool:
         """Whether the sizes of these numbers, a step that no fit has made yet, have the sign that physics demands."""
-        sizes = self.sizes(setting, values)
+        return not self.sign or self.has_its_sign(self.sizes(setting, values))
+
+    def has_its_sign(self, sizes: Sizes) -> bool:
+        """Whether the first size, if there is one, has the sign that physics demands, if it demands one."""
         return not self.sign or not sizes or next(iter(sizes.values()))[0] * self.sign > 0
 
     def is_possible(self, sizes: Sizes, model: Model, setting: Setting) -> bool:

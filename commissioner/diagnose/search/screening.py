@@ -152,7 +152,7 @@ def _score(name: str, terms: Sequence[Term], gram: Array, slope: Array, setting:
     step = bounded_step(gram, slope, lower, upper, 1e-9)
     entry = CATALOGUE[name]
     values = {t.symbol: float(x) * t.step for t, x in zip(terms, step, strict=True)}
-    if entry.sign and not entry.promises_its_sign(setting, values):
+    if not entry.promises_its_sign(setting, values):
         return Score(name, 0.0, len(terms), np.zeros(len(terms)), tuple(terms))
     gain = float(2.0 * step @ slope - step @ gram @ step)
     return Score(name, max(promised(gain, len(terms), times), 0.0), len(terms), step, tuple(terms))

@@ -20,7 +20,7 @@ from commissioner.identify.inverter.settling import Approach, Settled, settle
 from commissioner.identify.inverter.staircase import DcLevel, StaircaseLimits
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
-from commissioner.motor.plate_match import inductance_mismatch
+from commissioner.motor.plate_match import SURE, inductance_mismatch
 from commissioner.motor.standstill import poles_per_s
 from commissioner.procedure.energised import ceilings
 from commissioner.procedure.energised.direct_current import STEER_S, DirectCurrent
@@ -49,8 +49,6 @@ FIRST_SECONDS, FIRST_END_S = 2.2, 0.05
 LEAST_HELD, FIRST_LEAST_HELD = 0.2, 1.3
 """Of the plate's slow time constant: what a level is held at least, however long the climb took. A first current whose levels were held
 for 0.3 of it, over a link that steers slowly, said 1.7 times the inductance, and that it was another motor's."""
-SURE = 2.0
-"""Standard errors by which a first current must show another motor: beside large sensors a small one tells little."""
 FIRST_KEEPS = 0.6
 """Of the climb's voltage: what the first current is held at, at the least; a slow motor's climb is nearly all induction."""
 IDLE_S = 4.0
