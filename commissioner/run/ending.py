@@ -8,7 +8,15 @@ import traceback
 from contextlib import suppress
 from pathlib import Path
 
-from commissioner.errors import CommissionerError, DriveError, DriveFault, UsageError, WriteBackFailed
+from commissioner.errors import (
+    Aborted,
+    CommissionerError,
+    DriveError,
+    DriveFault,
+    ForeignMaster,
+    UsageError,
+    WriteBackFailed,
+)
 from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
@@ -71,6 +79,21 @@ def _is_of_disk(failure: OSError, folder: Path) -> bool:
     if failure.filename is not None:
         return Path(os.fsdecode(failure.filename)).absolute().is_relative_to(folder.absolute())
     return failure.errno in OF_DISK
+
+
+def with_master(error: CommissionerError, inverter: Inverter) -> CommissionerError:
+    """What stopped the run, as the other master whose writes the drive shows once its output is off: a guard sees the voltage or the
+    flux of such a write before the next status would have told of it."""
+    if not isinstance(error, Aborted):
+        return error
+    try:
+        inverter.read_status()
+    except ForeignMaster as other:
+        other.what += f"; before that was seen: {error.what}"
+        return other
+    except CommissionerError:
+        return error
+    return error
 
 
 def with_host(error: CommissionerError, gap_s: float, watchdog_s: float | None) -> CommissionerError:

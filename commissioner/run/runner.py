@@ -18,7 +18,17 @@ from commissioner.procedure.findings import ChecksJudged, EstimateUpdated, Param
 from commissioner.records import DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.run.acting import set_up
 from commissioner.run.archive.folder import RunFolder
-from commissioner.run.ending import as_error, ended_by, let_go, note, still_live, taken_as_live, with_host, write_lost
+from commissioner.run.ending import (
+    as_error,
+    ended_by,
+    let_go,
+    note,
+    still_live,
+    taken_as_live,
+    with_host,
+    with_master,
+    write_lost,
+)
 from commissioner.run.holding.priority import raised_priority
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
 from commissioner.run.stream import Stream, stop_if
@@ -97,6 +107,8 @@ class Runner:
                 live = self._disarm(error.what if error is not None else "the run has ended")
                 if self._progress.granted is not None:  # zero volts came first
                     note(self._folder, kind_of(self._progress.granted), self._progress.granted)
+                elif error is not None and self._progress.segment >= 0:
+                    error = with_master(error, self._inverter)
         if live is not None:
             ended, error = None, still_live(live, error)
         if ended is None:

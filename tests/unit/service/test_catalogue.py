@@ -18,7 +18,7 @@ from commissioner.service.simulator import SCENARIOS
 PRODUCT = Path(commissioner.__file__).parent
 PAGE = PRODUCT / "service" / "page"
 SAID = ("procedure/checks.py", "procedure/verdict.py", "safety/watch.py", "safety/sensors.py", "procedure/energised", "run/runner.py",
-        "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
+        "link/drive/foreign.py", "run/stopping", "run/holding/mastery.py", "service/routes", "service/runs", "service/access/visitors.py", "service/archive.py",
         "service/problems.py")  # fmt: skip
 """Where the core's and the service's own sentences come from that every technician may meet."""
 FACTS = ("what", "title", "remedy")
