@@ -97,6 +97,7 @@ class Victim:
         job, profile = make_job(write_back=True, tests=1), load_profile(PROFILE)
         folder = RunFolder.create(self.runs, "victim")
         folder.save("request.json", {"url": self.url, "profile": PROFILE, "nameplate": plate()})
+        os.write(self.ledger, b"journal run_started\n")  # by which the folder begins
         self._wrap(folder, "journal", self._journalled)
         self._wrap(folder, "append", self._appended)
         port = open_port(parse_url(self.url), profile, reply_timeout_s=REPLY_TIMEOUT_S)
