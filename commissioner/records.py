@@ -15,6 +15,8 @@ def drive_words(drive_type: str, serial_number: int | None) -> str:
 
 
 Signal = NDArray[np.float64]
+RPM = 30.0 / np.pi
+"""1/min per rad/s."""
 POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
 DIRECT_TEST, IDLE_TEST, LOCKED_TEST = 0.0, 1.0, 2.0

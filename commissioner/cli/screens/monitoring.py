@@ -11,9 +11,8 @@ from commissioner.cli.screens.screen import err, out, quantity, table, text
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.trend.trend import Verdict
+from commissioner.records import RPM
 
-RPM = 30 / 3.141592653589793
-"""1/min per rad/s."""
 SHOWN = (
     ("R_s", "stator_resistance_ohm", 1, "ohm"),
     ("R_R", "rotor_resistance_ohm", 1, "ohm"),
@@ -42,7 +41,7 @@ def show_partial(document: Mapping[str, Any]) -> None:
     _states(document, out)
     rows = []
     for label, key, scale, unit in (
-        ("mean speed", "mean_speed_rad_per_s", 9.549296585513721, "1/min"),
+        ("mean speed", "mean_speed_rad_per_s", RPM, "1/min"),
         ("mean torque", "mean_torque_nm", 1.0, "N m"),
     ):
         if document[key] is not None:

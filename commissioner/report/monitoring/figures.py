@@ -11,14 +11,13 @@ from commissioner.monitor.chain import Observation
 from commissioner.monitor.periods.periods import SIGNIFICANT, VISIBLE
 from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import History, Verdict
-from commissioner.records import Signal
+from commissioner.records import RPM, Signal
 from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PLOT_STYLE, PURPLE, RED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED, INK)
-RPM = 30 / np.pi
 MOST_POINTS = 1500
 MOST_NAMED = 12
 

@@ -10,11 +10,11 @@ from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import History, Verdict
+from commissioner.records import RPM
 from commissioner.report import band
 from commissioner.report.monitoring import figures
 from commissioner.report.page import Page, Section, Table, Tone, picture
 
-RPM = 30 / 3.141592653589793
 _WIRING = {"crossed_channels": "channels are crossed", "polarity": "a channel is inverted"}
 _MOTOR = (
     ("stator resistance R_s", 1.0, "Ω"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from commissioner.estimation.fit import problem_of, simulate
+from commissioner.records import RPM
 from commissioner.report.page import BLUE, MUTED, Page, Section, Table, picture
 from commissioner.report.running.figures import SHOWN_S, panels
 from commissioner.report.running.page import NAMES
@@ -13,8 +14,6 @@ from commissioner.running.identification import Identified
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-PER_MINUTE = 9.549296585513721
 
 
 def page_of(seen: Identified, document: Document, name: str) -> Page:
@@ -66,7 +65,7 @@ def _drawn(seen: Identified) -> Figure:
         whole = slice(None, None, every) if column == 0 else part
         drawn[2, column].plot(
             window.time_s[whole],
-            PER_MINUTE * shaft[whole, 0] / problem.record.scales.pole_pairs,
+            RPM * shaft[whole, 0] / problem.record.scales.pole_pairs,
             color=BLUE,
             linewidth=1.0,
         )
