@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from enum import Enum
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
+from typing_extensions import TypeAliasType
+
+Json = TypeAliasType("Json", "bool | int | float | str | list[Json] | dict[str, Json] | None")
+"""Whatever JSON can say."""
 JsonObject: TypeAlias = dict[str, Any]
 """A JSON object that another version, another process or a person wrote: of no shape that could be promised, and passed on as it is."""
 HIDDEN = MappingProxyType({"is_hidden": True})
 """Metadata of a field that is no part of the JSON."""
 
 
-def plain(value: Any) -> Any:
-    """A record as JSON types; arrays become lists, NaN and infinity become null."""
+def plain(value: Any, *, without: Container[str] = ()) -> Any:
+    """A record as JSON types, `without` these of its own fields; arrays become lists, NaN and infinity become null."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        shown = [f for f in dataclasses.fields(value) if not f.metadata.get("is_hidden")]
+        shown = [f for f in dataclasses.fields(value) if not f.metadata.get("is_hidden") and f.name not in without]
         return {f.name: plain(getattr(value, f.name)) for f in shown}
     if isinstance(value, Enum):
         return value.name.lower()

@@ -26,8 +26,21 @@ from __future__ import annotations
 
 import reprlib
 
+from typing_extensions import TypedDict
+
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
+
+
+class ErrorDocument(TypedDict):
+    """An error as JSON: `kind` is its class; `value` and `limit` are numbers, words, or whatever else was seen and allowed."""
+
+    kind: str
+    what: str
+    step: str
+    value: object
+    limit: object
+    remedy: str
 
 
 class CommissionerError(Exception):
@@ -44,7 +57,7 @@ class CommissionerError(Exception):
         self.limit = limit
         self.remedy = remedy
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> ErrorDocument:
         """The error as the JSON object that every verb prints under `error`."""
         return {
             "kind": type(self).__name__,

@@ -66,6 +66,6 @@ def recordings_import(
     for kind, order in document["phase_order"].items():
         screen.out.print(f"{kind}s follow each other as {order}")
     for change in document["changes"]:
-        screen.out.print(f"- {screen.text(change['what'])}")
+        screen.out.print(f"- {screen.text(change.what)}")
     for name, path in document.get("files", {}).items():
         screen.out.print(f"{name} {screen.text(path)}")

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NotRequired
+from typing import NotRequired, TypeAlias
 
 from typing_extensions import TypedDict
+
+from commissioner.encoding import Json
+from commissioner.errors import ErrorDocument
+from commissioner.identify.contract import SheetValue, Silence, StatedValue
+from commissioner.motor.nameplate import Plate
 
 
 class Measured(TypedDict):
@@ -39,6 +44,8 @@ class CauseDocument(TypedDict):
     alternatives: NotRequired[dict[str, float]]
     found_by: NotRequired[str]
     p_value: NotRequired[float | None]
+    form: NotRequired[str]
+    is_of_measurement: NotRequired[bool]
 
 
 class Gain(TypedDict):
@@ -72,15 +79,54 @@ class UncertainName(TypedDict):
     is_seen: bool
 
 
-class DiagnosisDocument(TypedDict):
-    """Of recordings (`kind` recording) or of a table of test points (`points`); of several tables each one under `tables`.
+class Limit(TypedDict):
+    """The smallest size of a cause that the data would have shown; `of`: which of its sizes, where the name above does not say it."""
 
-    `search`: every record of the search (`search.journal`), from which its choices follow again.
+    value: float
+    unit: str
+    of: NotRequired[str]
+
+
+class NextExperiment(TypedDict):
+    """The test that tells apart what `splits` names: `steps` for a person, `command` for afterwards."""
+
+    splits: list[str]
+    do: str
+    predicted_sigma: NotRequired[float | None]
+    steps: list[str]
+    command: str
+    repeats: int
+    changes_values: NotRequired[str]
+
+
+SearchRecord: TypeAlias = dict[str, Json]
+"""One record of the search: `step` names its kind, and that one's fields (`search.journal`) are beside."""
+
+
+class NothingRecorded(TypedDict):
+    """Of data that were refused."""
+
+
+class Excitation(TypedDict):
+    """What a running recording has that separates causes: seconds of each state, what was measured."""
+
+    seconds: dict[str, float]
+    has_speed: bool
+    has_three_currents: bool
+    has_start: bool
+
+
+class DiagnosisDocument(TypedDict):
+    """Of recordings (`kind` recording; `test` running where the motor ran) or of a table of test points (`points`); of several tables
+    each one under `tables`.
+
+    `search`: every record of the search, from which its choices follow again. From `method` on: of test sheets and of a
+    manufacturer's sheet, as in the identification of one.
     """
 
     verdict: str
     reason: str
-    error: NotRequired[dict[str, Any]]
+    error: NotRequired[ErrorDocument]
     kind: str
     test: NotRequired[str]
     convention: str
@@ -88,9 +134,9 @@ class DiagnosisDocument(TypedDict):
     gain: Gain
     noise: NotRequired[NoiseDocument | None]
     parameters_before: dict[str, Measured]
-    parameters_after: dict[str, Measured]
+    parameters_after: Mapping[str, Measured | StatedValue]
     below_materiality: NotRequired[list[str]]
-    detection_limits: NotRequired[Mapping[str, Any]]
+    detection_limits: NotRequired[Mapping[str, Limit | dict[str, Limit]]]
     cannot_tell: NotRequired[list[str]]
     line_levels_db: NotRequired[dict[str, float | None]]
     audit: NotRequired[list[str]]
@@ -100,7 +146,20 @@ class DiagnosisDocument(TypedDict):
     points: NotRequired[list[dict[str, float | None]]]
     uncertain: NotRequired[list[UncertainName]]
     dc_link_v: NotRequired[float | None]
-    search: NotRequired[list[dict[str, Any]]]
-    next_experiment: dict[str, Any] | None
+    search: NotRequired[list[SearchRecord]]
+    left_by_state_over_noise: NotRequired[dict[str, float | None]]
+    excitation: NotRequired[Excitation | NothingRecorded]
+    next_experiment: NextExperiment | None
     model_file: str | None
     tables: NotRequired[dict[str, DiagnosisDocument]]
+    method: NotRequired[str]
+    t_circuit: NotRequired[Mapping[str, float | StatedValue]]
+    textbook: NotRequired[dict[str, float]]
+    at_terminals: NotRequired[dict[str, float]]
+    losses: NotRequired[Mapping[str, float | StatedValue | None]]
+    holds_for_stator_flux_wb: NotRequired[float]
+    withheld: NotRequired[dict[str, str]]
+    double_cage: NotRequired[dict[str, StatedValue]]
+    values: NotRequired[list[SheetValue]]
+    assumed: NotRequired[tuple[Silence, ...]]
+    nameplate: NotRequired[Plate | None]

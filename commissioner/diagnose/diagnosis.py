@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from commissioner.diagnose.causes import CATALOGUE, LINEAR
 from commissioner.diagnose.causes.inverter.legs import tail_of_legs
+from commissioner.diagnose.contract import NextExperiment, SearchRecord
+from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
 from commissioner.diagnose.fit.gauss_newton import Fit, inverse
@@ -68,8 +69,8 @@ class Diagnosis:
     left: LackOfFit | None = None
     parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
     parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
-    next_experiment: Mapping[str, object] | None = None
-    model: Mapping[str, object] = field(default_factory=dict)
+    next_experiment: NextExperiment | None = None
+    model: ModelDocument | None = None
     found: Found | None = None
     split: Split | None = None
     explained_share: float = 0.0
@@ -83,7 +84,7 @@ class Diagnosis:
     """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
 
     @property
-    def written_steps(self) -> list[dict[str, Any]]:
+    def written_steps(self) -> list[SearchRecord]:
         """The same as a document holds them."""
         return written(self.steps)
 

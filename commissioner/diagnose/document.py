@@ -54,7 +54,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
         "remarks": list(seen.remarks),
         "is_complete": seen.is_complete,
         "search": seen.written_steps,
-        "next_experiment": dict(seen.next_experiment) if seen.next_experiment else None,
+        "next_experiment": seen.next_experiment,
         "model_file": model_file,
     }
     if seen.refusal is not None:

@@ -7,24 +7,31 @@ import io
 import json
 from collections.abc import Iterator
 
+from typing_extensions import TypedDict
+
 from commissioner.export.found import CONVENTION, Found
 
-COLUMNS = (
-    "name",
-    "value",
-    "std",
-    "unit",
-    "circuit",
-    "at_stator_flux_wb",
-    "register",
-    "drive_before",
-    "drive_after",
-    "drive_read_back",
-)
+
+class ParameterRow(TypedDict):
+    """One value under the contract's name; the drive's before and after in SI, null where it was not written."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    circuit: str
+    at_stator_flux_wb: float | None
+    register: int | None
+    drive_before: float | None
+    drive_after: float | None
+    drive_read_back: float | None
+
+
+COLUMNS = tuple(ParameterRow.__annotations__)
 _UNITS = {"ohm": "ohm", "h": "H", "s": "s"}
 
 
-def rows(found: Found) -> Iterator[dict[str, object]]:
+def rows(found: Found) -> Iterator[ParameterRow]:
     """SI values under the contract's names; the drive's are SI, too."""
     written = {row["field"]: row for row in found.drive if row.get("field")}
     for circuit, values in (("inverse-Gamma", found.parameters), (f"T, {found.t_assumption}", found.t_model)):

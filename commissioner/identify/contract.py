@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NotRequired
 
 from typing_extensions import TypedDict
+
+from commissioner.motor.nameplate import Plate
 
 
 class Measured(TypedDict):
@@ -146,3 +149,106 @@ class IdentifiedDocument(IdentificationDocument):
 
     flux_guard: FluxReached
     written: list[str]
+
+
+class Covariance(TypedDict):
+    """Of the values named in `of`, row by row."""
+
+    of: list[str]
+    matrix: list[list[float]]
+
+
+class RunningDocument(TypedDict):
+    """`identify` of a running motor: `bound_std` is what the noise allows at best; `seconds` of each state."""
+
+    outcome: str
+    reason: str
+    kind: str
+    convention: str
+    estimator: str
+    parameters: dict[str, Measured]
+    inertia_kg_m2: Measured | None
+    load: dict[str, float]
+    bound_std: dict[str, float]
+    covariance: Covariance
+    holds_for_stator_flux_wb: float
+    t_model: TModel
+    residual_over_noise: float
+    left_over_noise: float
+    speed: str
+    seconds: dict[str, float]
+    duration_s: float
+    remarks: list[str]
+    written: list[str]
+
+
+class ThreeTestsDocument(TypedDict):
+    """`identify` of test sheets: direct current, no load, locked rotor. `t_circuit` and `losses` by their SI names; null: the tests do
+    not tell it; `rows`: of each test."""
+
+    kind: str
+    method: str
+    convention: str
+    parameters: dict[str, Measured]
+    t_circuit: dict[str, float]
+    textbook: dict[str, float]
+    at_terminals: dict[str, float]
+    losses: dict[str, float | None]
+    rows: dict[str, int]
+    remarks: list[str]
+
+
+class ErrorParts(TypedDict):
+    """Standard deviations whose squares make that of the whole."""
+
+    rounding: float
+    assumptions: float
+    tolerances: float
+
+
+StatedValue = TypedDict("StatedValue", {"value": float, "std": float, "std_of_type": float, "from": ErrorParts})
+"""`std`: of a motor of this type; `std_of_type`: without the tolerances."""
+
+
+class SheetValue(TypedDict):
+    """A value of the sheet as printed and as the circuit has it; `is_fitted`: whether it was used."""
+
+    key: str
+    given: float
+    reproduced: float
+    is_fitted: bool
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Silence:
+    """A number the sheet leaves open: what was assumed, how far it may be off, how much of that the sheet took away."""
+
+    name: str
+    words: str
+    value: float
+    factor: float
+    left: float
+    source: str
+
+
+class SheetDocument(TypedDict):
+    """`identify` of a manufacturer's sheet; `withheld`: what each parameter that it does not tell would need."""
+
+    kind: str
+    method: str
+    convention: str
+    parameters: dict[str, StatedValue]
+    holds_for_stator_flux_wb: float
+    withheld: dict[str, str]
+    t_circuit: dict[str, StatedValue]
+    double_cage: dict[str, StatedValue]
+    losses: dict[str, StatedValue]
+    values: list[SheetValue]
+    assumed: tuple[Silence, ...]
+    nameplate: Plate | None
+    remarks: list[str]
+
+
+AnyIdentification = IdentifiedDocument | RunningDocument | ThreeTestsDocument | SheetDocument

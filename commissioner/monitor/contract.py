@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired
+from collections.abc import Mapping
+from typing import NotRequired, TypeAlias
 
 from typing_extensions import TypedDict
+
+from commissioner.errors import ErrorDocument
 
 
 class Measured(TypedDict):
@@ -29,6 +32,116 @@ class LoadPeriod(TypedDict):
     speed_ripple_rms_rad_per_s: float
 
 
+class LineRow(TypedDict):
+    """A line of the currents of part of the data."""
+
+    frequency_hz: float
+    above_floor: float
+
+
+class WatchedRow(TypedDict):
+    """One indicator against its range over the healthy recordings; `distance` in standard deviations of a single one."""
+
+    name: str
+    value: float
+    healthy_mean: float
+    healthy_std: float
+    distance: float
+    threshold: float
+    alarms: bool
+
+
+class TrendDocument(TypedDict):
+    """Against the recordings of the baseline at the same operating point."""
+
+    state: str
+    sentence: str
+    compared_with: int
+    alarms: list[str]
+    false_alarm_per_indicator: float
+    healthy_recordings_that_alarm_against_the_others: int
+    healthy_recordings_at_other_operating_points: int
+    watched: list[WatchedRow]
+
+
+class FindingRow(TypedDict):
+    """What the audit saw: `kind` note | corrected | refused; its number, what was allowed, what to do."""
+
+    code: str
+    kind: str
+    what: str
+    value: float | str | None
+    limit: float | str | None
+    remedy: str
+
+
+class AuditDocument(TypedDict):
+    """`channels`: which column was taken for which."""
+
+    sample_period_s: float
+    channels: dict[str, str]
+    findings: list[FindingRow]
+
+
+class SideBands(TypedDict):
+    """Of the rotor, beside the supply's line."""
+
+    offset_hz: float
+    level_db: float
+    above_floor_db: float
+
+
+Indicators: TypeAlias = Mapping[str, Measured | SideBands | float | bool | str | None]
+"""By name; the unit is in it. What the fundamental alone says, and what was made out of the motor's state."""
+
+
+class OpenDirection(TypedDict):
+    """The combination of parameters that is least known, and how much of it is prior."""
+
+    combination: str
+    relative_std: float
+    share_from_prior: float
+    sentence: str
+
+
+class SensorsDocument(TypedDict):
+    """What was found of the sensors' own errors, and what was taken where one recording shows nothing."""
+
+    gain_std: float
+    current_to_voltage_skew_std_s: float
+    current_delay_s: Measured
+    asymmetry: float | None
+    sentence: str
+
+
+class TModel(TypedDict):
+    """Under `assumption`."""
+
+    stator_resistance_ohm: Measured
+    rotor_resistance_ohm: Measured
+    magnetizing_inductance_h: Measured
+    stator_leakage_h: Measured
+    rotor_leakage_h: Measured
+    assumption: str
+
+
+class LoadTorque(TypedDict):
+    """Of the waveform."""
+
+    rms_std_nm: float
+
+
+class Waveforms(TypedDict):
+    """`load_torque`: its error, or in words why it is not given."""
+
+    speed_rms_std_rad_per_s: float
+    electromagnetic_torque_rms_std_nm: float
+    load_torque: LoadTorque | str
+    starts_at_s: float
+    shaft_angle: str
+    contains: str
+
+
 class PartialMonitoring(TypedDict):
     """What part of the data says (`outcome`: partial): numbers that could be had, and under `withheld` why others could not."""
 
@@ -36,12 +149,12 @@ class PartialMonitoring(TypedDict):
     mean_speed_rad_per_s: Measured | None
     mean_torque_nm: Measured | None
     parameters: None
-    periods: list[dict[str, Any]]
-    indicators: dict[str, Any]
+    periods: list[LineRow]
+    indicators: Indicators
     withheld: dict[str, str]
-    trend: dict[str, Any] | None
+    trend: TrendDocument | None
     states: list[State]
-    audit: dict[str, Any]
+    audit: AuditDocument
     quantities: str
     files: NotRequired[dict[str, str]]
 
@@ -70,20 +183,20 @@ class MonitoringDocument(TypedDict):
     mean_speed_rad_per_s: Measured
     mean_torque_nm: Measured
     used: dict[str, float]
-    sensors: dict[str, Any]
+    sensors: SensorsDocument
     slip: float
     segment: dict[str, float]
     parameters: dict[str, Measured]
-    t_model: dict[str, Any]
+    t_model: TModel
     parameters_from: str
-    cannot_be_fixed: dict[str, Any]
+    cannot_be_fixed: OpenDirection
     periods: list[LoadPeriod]
-    waveforms: dict[str, Any]
+    waveforms: Waveforms
     current_resimulation_error: dict[str, float | None]
     reference_speed: dict[str, float] | None
-    indicators: dict[str, Any]
-    trend: dict[str, Any] | None
-    audit: dict[str, Any]
+    indicators: Indicators
+    trend: TrendDocument | None
+    audit: AuditDocument
     quantities: str
     files: NotRequired[dict[str, str]]
     states: NotRequired[list[State]]
@@ -94,8 +207,8 @@ class Refusal(TypedDict):
 
     code: str
     what: str
-    value: Any
-    limit: Any
+    value: float | str | None
+    limit: float | str | None
     remedy: str
 
 
@@ -109,8 +222,8 @@ class RefusedMonitoring(TypedDict):
     parameters: None
     periods: list[LoadPeriod]
     current_resimulation_error: None
-    indicators: dict[str, Any]
-    audit: dict[str, Any]
+    indicators: Indicators
+    audit: AuditDocument
     reason: NotRequired[str]
     states: NotRequired[list[State]]
-    error: NotRequired[dict[str, Any]]
+    error: NotRequired[ErrorDocument]

@@ -7,7 +7,21 @@ from collections.abc import Mapping
 import numpy as np
 
 from commissioner.monitor.chain import Observation, Refused
-from commissioner.monitor.contract import Measured, MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
+from commissioner.monitor.contract import (
+    AuditDocument,
+    Indicators,
+    LoadTorque,
+    Measured,
+    MonitoringDocument,
+    OpenDirection,
+    PartialMonitoring,
+    RefusedMonitoring,
+    SensorsDocument,
+    SideBands,
+    State,
+    TModel,
+    TrendDocument,
+)
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
 from commissioner.monitor.partial import Partial
@@ -38,7 +52,7 @@ def as_document(
 ) -> MonitoringDocument:
     """The contract's `monitor` result. All quantities SI, per-phase star equivalent, referred to the stator."""
     period = observation.period
-    load = None
+    load: LoadTorque | None = None
     if period.load_torque_nm is not None and period.load_torque_std is not None:
         load = {"rms_std_nm": float(np.sqrt(np.mean(period.load_torque_std**2)))}
     return {
@@ -150,7 +164,7 @@ def entry_of_part(part: Partial, source: str) -> Entry | None:
     return Entry(source, part.speed_rad_per_s.value, part.by_slip_nm, part.supply_hz, watched)
 
 
-def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
+def cannot_be_fixed(fitted: Fitted) -> OpenDirection:
     """The combination of parameters that is least known, in words, and how much of it is prior."""
     parts = [
         f"{WORDS[name]}^{weight:+.2f}"
@@ -173,10 +187,8 @@ def cannot_be_fixed(fitted: Fitted) -> dict[str, object]:
     }
 
 
-def indicator_document(
-    observation: Observation, pulses: Pulses | None, indicators: list[Indicator]
-) -> dict[str, object]:
-    document: dict[str, object] = {
+def indicator_document(observation: Observation, pulses: Pulses | None, indicators: list[Indicator]) -> Indicators:
+    document: dict[str, Measured | SideBands | float | bool | str | None] = {
         indicator.name: quantity(indicator.quantity.value, indicator.quantity.std) for indicator in indicators
     }
     document["pulses_per_turn"] = None if pulses is None else pulses.per_turn
@@ -210,7 +222,7 @@ def entry_of(observation: Observation, indicators: list[Indicator], source: str)
     )
 
 
-def verdict_document(verdict: Verdict) -> dict[str, object]:
+def verdict_document(verdict: Verdict) -> TrendDocument:
     return {
         "state": verdict.state.name.lower(),
         "sentence": verdict.state.value,
@@ -234,7 +246,7 @@ def verdict_document(verdict: Verdict) -> dict[str, object]:
     }
 
 
-def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> dict[str, object]:
+def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> AuditDocument:
     return {
         "sample_period_s": audited.sample_period_s,
         "channels": dict(audited.channel_map),
@@ -245,7 +257,7 @@ def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> dict[str,
     }
 
 
-def _sensors(observation: Observation) -> dict[str, object]:
+def _sensors(observation: Observation) -> SensorsDocument:
     """What was found of the sensors' own errors, and what was taken where one recording shows nothing."""
     trust, fitted = observation.audited.sensors, observation.fitted
     return {
@@ -258,7 +270,7 @@ def _sensors(observation: Observation) -> dict[str, object]:
     }
 
 
-def _terminal(audited: Audited) -> dict[str, object]:
+def _terminal(audited: Audited) -> Indicators:
     """What the fundamental alone says."""
     f = audited.fundamental
     if f is None:
@@ -303,19 +315,18 @@ def _parameters(fitted: Fitted) -> dict[str, Measured]:
     return out
 
 
-def _t_model(fitted: Fitted) -> dict[str, object]:
+def _t_model(fitted: Fitted) -> TModel:
     c = fitted.circuit
     std = np.sqrt(np.diag(fitted.log_covariance))
-    out: dict[str, object] = {
+    share = c.stator_leakage_h / (c.stator_leakage_h + c.rotor_leakage_h)
+    return {
         "stator_resistance_ohm": quantity(c.stator_resistance_ohm, std[0] * c.stator_resistance_ohm),
         "rotor_resistance_ohm": quantity(c.rotor_resistance_ohm, std[1] * c.rotor_resistance_ohm),
         "magnetizing_inductance_h": quantity(c.magnetizing_inductance_h, std[2] * c.magnetizing_inductance_h),
         "stator_leakage_h": quantity(c.stator_leakage_h, std[3] * c.stator_leakage_h),
         "rotor_leakage_h": quantity(c.rotor_leakage_h, std[3] * c.rotor_leakage_h),
+        "assumption": EQUAL_LEAKAGE if abs(share - 0.5) < 1e-9 else f"{share:.2f} of the leakage in the stator",
     }
-    share = c.stator_leakage_h / (c.stator_leakage_h + c.rotor_leakage_h)
-    out["assumption"] = EQUAL_LEAKAGE if abs(share - 0.5) < 1e-9 else f"{share:.2f} of the leakage in the stator"
-    return out
 
 
 def with_reference(document: MonitoringDocument, comparison: Mapping[str, float]) -> MonitoringDocument:

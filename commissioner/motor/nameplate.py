@@ -6,8 +6,12 @@ import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from commissioner.motor.circuit import InverseGamma
+
+Plate: TypeAlias = dict[str, float | int | str]
+"""Of a nameplate what is known, by its fields' names."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,10 @@ class Nameplate:
     pole_pairs: int
     connection: str  # "star" | "delta"; `connection_of` reads what plates and drives write
     inertia_kg_m2: float | None = None
+
+    def known(self) -> Plate:
+        """Its values without those that are not known."""
+        return {name: value for name, value in vars(self).items() if value is not None}
 
     @property
     def rated_frequency_rad_per_s(self) -> float:

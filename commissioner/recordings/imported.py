@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import NotRequired
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from commissioner.errors import ConfigurationError, DataRefused
 from commissioner.monitor.intake.states.stretches import states
@@ -16,6 +16,7 @@ from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.mapping import ChannelMap
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
+    ColumnReading,
     Table,
     check_ending,
     sample_period,
@@ -24,6 +25,7 @@ from commissioner.recordings.table import (
     write_table,
 )
 from commissioner.recordings.whole import whole_file
+from commissioner.records import ReadingNote
 from commissioner.report import band
 from commissioner.report.page import BLUE, GREEN, ORANGE, PLOT_STYLE, Page, Picture, Section, picture, render
 from commissioner.report.page import Table as Rows
@@ -31,25 +33,56 @@ from commissioner.report.page import Table as Rows
 MOST_DRAWN = 4000
 
 
-def understand(path: Path, mapping: ChannelMap | None = None) -> tuple[Table, dict[str, Any]]:
+class ColumnRow(TypedDict):
+    """A column of the file: what it was taken as (null: not used), its unit there, the factor to SI, and what it holds, as text."""
+
+    name: str
+    meaning: str | None
+    unit: str
+    factor: float
+    rms: NotRequired[str]
+    range: NotRequired[str]
+
+
+class StateRow(TypedDict):
+    """A stretch of the recording, in its own time; `current_a`: rms."""
+
+    state: str
+    start_s: float
+    end_s: float
+    current_a: float
+
+
+class Understood(TypedDict):
+    """What `recordings import` prints. `kind`: standstill | running | points | unknown; `files`: what was written."""
+
+    file: str
+    kind: str
+    rows: int
+    sample_period_s: float | None
+    columns: list[ColumnRow]
+    metadata: dict[str, float | str]
+    changes: list[ReadingNote]
+    states: list[StateRow]
+    phase_order: dict[str, str]
+    files: NotRequired[dict[str, str]]
+
+
+def understand(path: Path, mapping: ChannelMap | None = None) -> tuple[Table, Understood]:
     """(the table in SI, what was understood of it). Raises what `contract_table` raises."""
     table = contract_table(path, mapping)
     time = table.columns.get("time_s")
     period = None
     if time is not None and time.size > 1:
         period = sample_period(table, table.columns.get("segment", np.zeros(time.size)))
-    columns = [
-        {"name": r.name, "meaning": r.meaning, "unit": r.unit, "factor": r.factor, **_range(table, r.meaning)}
-        for r in table.readings
-    ]
     return table, {
         "file": str(path),
         "kind": kind_of(table),
         "rows": 0 if time is None else int(time.size),
         "sample_period_s": period,
-        "columns": columns,
+        "columns": [_column(table, r) for r in table.readings],
         "metadata": dict(table.metadata),
-        "changes": [{"code": note.code, "what": note.what} for note in table.notes],
+        "changes": list(table.notes),
         "states": _states(table, period),
         "phase_order": {kind: order for kind in ("current", "voltage") if (order := _order(table, kind, period))},
     }
@@ -65,11 +98,11 @@ def kind_of(table: Table) -> str:
     return "running" if any(n.startswith("voltage_") for n in names & CONTRACT_COLUMNS) else "unknown"
 
 
-def store(table: Table, document: Mapping[str, Any], out: Path) -> dict[str, str]:
+def store(table: Table, document: Understood, out: Path) -> dict[str, str]:
     """Writes the contract's form to `out`, with what was changed among its keys, and a page with the picture beside it."""
     check_ending(out)
     kept = {name: values for name, values in table.columns.items() if name in CONTRACT_COLUMNS}
-    changes = "; ".join(change["what"] for change in document["changes"])
+    changes = "; ".join(change.what for change in document["changes"])
     metadata = {k: v for k, v in table.metadata.items() if ":" not in k and "\n" not in str(v)}
     metadata |= {"imported_from": Path(table.source).name} | ({"import_changes": changes} if changes else {})
     write_table(out, kept, metadata)
@@ -79,13 +112,13 @@ def store(table: Table, document: Mapping[str, Any], out: Path) -> dict[str, str
     return {"recording": str(out), "picture": str(page)}
 
 
-def page_of(table: Table, document: Mapping[str, Any]) -> Page:
+def page_of(table: Table, document: Understood) -> Page:
     """The page: every column as it was taken, what was changed, the signals over time."""
     rows = [
         (c["name"], c["meaning"] or "not used", c["unit"], f"{c['factor']:g}", c.get("rms", ""))
         for c in document["columns"]
     ]
-    said = [change["what"] for change in document["changes"]] or ["Nothing was changed."]
+    said = [change.what for change in document["changes"]] or ["Nothing was changed."]
     parts: list[str | Rows | Picture] = [Rows(("column", "taken as", "unit", "factor to SI", "rms"), rows), *said]
     pictures: list[str | Rows | Picture] = [p for p in (_drawn(table, document["states"]),) if p is not None]
     period = document["sample_period_s"]
@@ -98,7 +131,7 @@ def page_of(table: Table, document: Mapping[str, Any]) -> Page:
     return Page("Recording", Path(table.source).name, "plain", facts, sections)
 
 
-def _states(table: Table, period: float | None) -> list[dict[str, Any]]:
+def _states(table: Table, period: float | None) -> list[StateRow]:
     """The stretches of a recording over time; nothing of tables that are none."""
     if period is None or "time_s" not in table.columns:
         return []
@@ -115,14 +148,14 @@ def _states(table: Table, period: float | None) -> list[dict[str, Any]]:
     ]
 
 
-def _at_standstill(table: Table) -> list[dict[str, Any]]:
+def _at_standstill(table: Table) -> list[StateRow]:
     """Of each segment: off without voltage and current, residual with current alone, else standstill; lost between them."""
     time, volts = table.columns["time_s"], np.nan_to_num(table.columns["voltage_axis_v"])
     segment = table.columns.get("segment", np.zeros(time.size))
     currents = [np.abs(np.nan_to_num(v)) for n, v in table.columns.items() if n.startswith("current_")]
     size = np.max(currents, axis=0) if currents else np.zeros(time.size)
     edges = [0, *(np.flatnonzero(np.diff(segment) != 0.0) + 1).tolist(), time.size]
-    out: list[dict[str, Any]] = []
+    out: list[StateRow] = []
     for a, b in pairwise(edges):
         is_on, flows = bool(np.any(volts[a:b])), bool(size[a:b].max() > 0.02 * max(size.max(), 1e-12))
         name = "standstill" if is_on else "residual" if flows else "off"
@@ -135,12 +168,14 @@ def _at_standstill(table: Table) -> list[dict[str, Any]]:
     return out
 
 
-def _range(table: Table, meaning: str | None) -> dict[str, str]:
-    values = table.columns.get(meaning or "")
+def _column(table: Table, reading: ColumnReading) -> ColumnRow:
+    row: ColumnRow = {"name": reading.name, "meaning": reading.meaning, "unit": reading.unit, "factor": reading.factor}
+    values = table.columns.get(reading.meaning or "")
     good = values[np.isfinite(values)] if values is not None else np.zeros(0)
-    if not good.size or meaning in ("time_s", "segment", "axis_deg"):
-        return {}
-    return {"rms": f"{np.sqrt(np.mean(good**2)):.4g}", "range": f"{good.min():.4g} ... {good.max():.4g}"}
+    if good.size and reading.meaning not in ("time_s", "segment", "axis_deg"):
+        row["rms"] = f"{np.sqrt(np.mean(good**2)):.4g}"
+        row["range"] = f"{good.min():.4g} ... {good.max():.4g}"
+    return row
 
 
 def _order(table: Table, kind: str, period: float | None) -> str | None:
@@ -159,7 +194,7 @@ def _order(table: Table, kind: str, period: float | None) -> str | None:
     return "u-v-w" if forward > 2 * backward else "u-w-v" if backward > 2 * forward else None
 
 
-def _drawn(table: Table, stretches: list[dict[str, Any]]) -> Picture | None:
+def _drawn(table: Table, stretches: list[StateRow]) -> Picture | None:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from commissioner.motor.circuit import Quantity
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis, NamedCause
+
+if TYPE_CHECKING:
+    from commissioner.diagnose.contract import (
+        CauseDocument,
+        DiagnosisDocument,
+        Excitation,
+        Limit,
+        Measured,
+        NothingRecorded,
+    )
 
 CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation; magnetizing inductance at no flux where saturation is named"
 NEVER_NAMEABLE = (
@@ -17,10 +27,10 @@ NEVER_NAMEABLE = (
 )
 
 
-def as_document(seen: Diagnosis, model_file: str | None = None) -> dict[str, Any]:
+def as_document(seen: Diagnosis, model_file: str | None = None) -> DiagnosisDocument:
     """Plain JSON types."""
     gain, left, found, record = seen.gain, seen.left, seen.found, seen.record
-    document: dict[str, Any] = {
+    document: DiagnosisDocument = {
         "verdict": seen.verdict.value,
         "reason": seen.reason,
         "kind": "recording",
@@ -60,7 +70,7 @@ def as_document(seen: Diagnosis, model_file: str | None = None) -> dict[str, Any
     return document
 
 
-def _excitation(seen: Diagnosis) -> dict[str, Any]:
+def _excitation(seen: Diagnosis) -> Excitation | NothingRecorded:
     """What the recording has that separates causes: seconds of each state, speed measured, currents measured."""
     record = seen.record
     if record is None:
@@ -79,7 +89,7 @@ def _excitation(seen: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _cause(c: NamedCause) -> dict[str, Any]:
+def _cause(c: NamedCause) -> CauseDocument:
     entry = CATALOGUE[c.name]
     return {
         "name": c.name,
@@ -97,11 +107,11 @@ def _cause(c: NamedCause) -> dict[str, Any]:
     }
 
 
-def _limits(seen: Diagnosis) -> dict[str, dict[str, Any]]:
+def _limits(seen: Diagnosis) -> dict[str, Limit | dict[str, Limit]]:
     """Smallest size of what was not found, six standard deviations beside all that was."""
     if seen.found is None or seen.record is None:
         return {}
-    out = {}
+    out: dict[str, Limit | dict[str, Limit]] = {}
     for name, number in seen.found.limits.items():
         if not number < 1e3:
             continue
@@ -112,5 +122,5 @@ def _limits(seen: Diagnosis) -> dict[str, dict[str, Any]]:
     return out
 
 
-def _quantities(values: Mapping[str, Quantity]) -> dict[str, dict[str, float]]:
+def _quantities(values: Mapping[str, Quantity]) -> dict[str, Measured]:
     return {name: {"value": q.value, "std": q.std} for name, q in values.items()}

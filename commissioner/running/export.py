@@ -3,23 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from commissioner.estimation.fit import Machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 from commissioner.estimation.record import Record
 from commissioner.motor.circuit import Gamma, InverseGamma
-from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.nameplate import Nameplate, Plate
 from commissioner.running.causes import CATALOGUE
+from commissioner.running.causes.cause import Entry
 from commissioner.running.search import Found
 
 FORMAT = "commissioner extended running model 1"
 
 
-def model_document(found: Found, record: Record) -> dict[str, Any]:
+class RunningScenario(TypedDict):
+    """The simulator's document: Gamma circuit, mains, a start with load steps (s, N m), noise, the causes' sizes."""
+
+    kind: str
+    nameplate: Plate
+    machine: dict[str, float]
+    supply: dict[str, float]
+    course: dict[str, float | list[list[float]]]
+    sensors: dict[str, float]
+    effects: dict[str, Entry]
+
+
+class RunningModel(TypedDict):
+    """What `model.json` of a running diagnosis holds. `numbers`: those of the machine that are not none, by name."""
+
+    format: str
+    kind: str
+    nameplate: Plate
+    sample_period_s: float
+    numbers: dict[str, float]
+    has_shaft: bool
+    effects: list[str]
+    effect_numbers: dict[str, list[str]]
+    scenario: RunningScenario
+
+
+def model_document(found: Found, record: Record) -> RunningModel:
     """What `model.json` holds. `numbers`: those of the machine that are not none; relative ones as in the chapter `running`."""
     machine = found.fit.machine
     values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
@@ -27,7 +54,7 @@ def model_document(found: Found, record: Record) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "kind": "running",
-        "nameplate": {k: v for k, v in asdict(record.plate).items() if v is not None},
+        "nameplate": record.plate.known(),
         "sample_period_s": record.period_s,
         "numbers": kept,
         "has_shaft": machine.has_shaft,
@@ -37,7 +64,7 @@ def model_document(found: Found, record: Record) -> dict[str, Any]:
     }
 
 
-def scenario(found: Found, record: Record) -> dict[str, Any]:
+def scenario(found: Found, record: Record) -> RunningScenario:
     """The simulator's document: Gamma circuit, mains of the plate, a start with two load steps, the causes' sizes."""
     machine, scales, plate = found.fit.machine, record.scales, record.plate
     values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
@@ -54,7 +81,7 @@ def scenario(found: Found, record: Record) -> dict[str, Any]:
     }
     return {
         "kind": "running",
-        "nameplate": {k: v for k, v in asdict(plate).items() if v is not None and k != "inertia_kg_m2"},
+        "nameplate": {k: v for k, v in plate.known().items() if k != "inertia_kg_m2"},
         "machine": {
             "stator_resistance_ohm": gamma.stator_resistance_ohm, "rotor_resistance_ohm": gamma.rotor_resistance_ohm,
             "leakage_inductance_h": gamma.leakage_inductance_h, "inductance_h": gamma.stator_inductance_h,

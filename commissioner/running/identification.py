@@ -16,6 +16,7 @@ from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
 from commissioner.estimation.numbers import AT, NAMES
 from commissioner.estimation.record import STATES, Record, first_part, prepare
+from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
@@ -202,7 +203,7 @@ def _remarks(record: Record, left: Lack, fit: Fit) -> tuple[str, ...]:
     return tuple(out)
 
 
-def as_document(seen: Identified) -> dict[str, object]:
+def as_document(seen: Identified) -> RunningDocument:
     """The contract's keys, and the inertia, the bound and the covariance beside them."""
     flux = seen.stator_flux_wb
     at_flux = ("magnetizing_inductance_h", "rotor_time_constant_s")
@@ -217,8 +218,8 @@ def as_document(seen: Identified) -> dict[str, object]:
         "kind": "running",
         "convention": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
         "estimator": "least squares on a running machine",
-        "parameters": {k: {"value": q.value, "std": q.std} | ({"at_stator_flux_wb": flux} if k in at_flux else {}) for k, q in seen.parameters.items()},
-        "inertia_kg_m2": None if seen.inertia is None else {"value": seen.inertia.value, "std": seen.inertia.std},
+        "parameters": {k: _measured(q, flux if k in at_flux else None) for k, q in seen.parameters.items()},
+        "inertia_kg_m2": None if seen.inertia is None else _measured(seen.inertia),
         "load": dict(seen.load),
         "bound_std": dict(seen.bound),
         "covariance": {"of": [f"log {k}" for k in PARAMETERS], "matrix": seen.covariance.tolist()},
@@ -238,5 +239,8 @@ def as_document(seen: Identified) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _measured(q: Quantity) -> dict[str, float]:
-    return {"value": q.value, "std": q.std}
+def _measured(q: Quantity, at_stator_flux_wb: float | None = None) -> Measured:
+    made: Measured = {"value": q.value, "std": q.std}
+    if at_stator_flux_wb is not None:
+        made["at_stator_flux_wb"] = at_stator_flux_wb
+    return made

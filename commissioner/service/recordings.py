@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from commissioner.encoding import JsonObject
-from commissioner.service.contract.recordings import FailureDocument, RecordingDocument
+from commissioner.service.contract.recordings import FailureDocument, RecordingDocument, SaidOfIt
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask
 
@@ -58,7 +58,7 @@ class Job:
             "begun_utc": self.begun_utc,
             "is_done": self.is_done,
             "exit_code": self.exit_code,
-            "result": self.document,
+            "result": cast("SaidOfIt", self.document),
             "problem": self.failure,
             "report": f"/api/recordings/{self.id}/report" if self.report else None,
         }

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from commissioner.encoding import HIDDEN
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.study.rows import Rows
 from commissioner.study.simulators import simulator
@@ -47,7 +48,7 @@ class Studied:
     per_minute: float
     table: str
     report: str
-    summary: Summary
+    summary: Summary = field(metadata=HIDDEN)
 
 
 def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lambda _ended: None) -> Studied:

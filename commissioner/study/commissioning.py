@@ -24,6 +24,7 @@ from commissioner.run.job import bounds, make_job, open_drive, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.settings import load_procedure
 from commissioner.study.own_process import simulated_inverter
+from commissioner.study.rows import Row
 from commissioner.study.simulators import Drawn, simulator
 from commissioner.study.specification import Case
 
@@ -42,7 +43,7 @@ class NoArchive:
     def save(self, name: str, document: object) -> None: ...
 
 
-def commissioned(case: Case) -> dict[str, Any]:
+def commissioned(case: Case) -> Row:
     """The row of one case. A case that cannot be drawn or carried out is a row that says so."""
     began = time.process_time()
     row: dict[str, Any] = {
@@ -55,7 +56,7 @@ def commissioned(case: Case) -> dict[str, Any]:
             case.motor, case.seed, spread=case.spread, effects=case.effects, noise_a=case.noise_a, faults=case.faults
         )
     except ValueError as error:
-        return row | {"reason": str(error), "cpu_s": time.process_time() - began}
+        return cast("Row", row | {"reason": str(error), "cpu_s": time.process_time() - began})
     row |= {"effects": " ".join(drawn.effects), "motor": drawn.motor}
     plate = Nameplate(**drawn.plate)
     warm_up(plate)
@@ -69,7 +70,8 @@ def commissioned(case: Case) -> dict[str, Any]:
             highest_flux_wb = drawn.highest_flux_wb
     except CommissionerError as error:
         ended, highest_flux_wb = RunEnded(error.outcome, error.what, 0.0, error.as_dict()), drawn.highest_flux_wb
-    return row | _told(drawn, findings, ended, highest_flux_wb) | {"cpu_s": time.process_time() - began}
+    told = row | _told(drawn, findings, ended, highest_flux_wb) | {"cpu_s": time.process_time() - began}
+    return cast("Row", told)
 
 
 def _in_memory(drawn: Drawn, plate: Nameplate, plan: ProcedurePlan, findings: Findings) -> RunEnded:

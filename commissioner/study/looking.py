@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from commissioner.errors import CommissionerError
 from commissioner.motor.circuit import PARAMETERS
+from commissioner.study.rows import Row
 from commissioner.study.specification import Case
 
 
-def looked_at(case: Case) -> dict[str, Any]:
+def looked_at(case: Case) -> Row:
     """The row of one file. One that is refused is a row that says why."""
     began = time.process_time()
     row: dict[str, Any] = {"case": case.number, "file": Path(case.file).name, "outcome": "", "reason": ""}
@@ -19,7 +20,7 @@ def looked_at(case: Case) -> dict[str, Any]:
         row |= {"identify": _identified, "diagnose": _diagnosed, "monitor": _monitored}[case.kind](Path(case.file))
     except CommissionerError as error:
         row |= {"outcome": error.outcome, "reason": error.what}
-    return row | {"cpu_s": time.process_time() - began}
+    return cast("Row", row | {"cpu_s": time.process_time() - began})
 
 
 def _identified(path: Path) -> dict[str, Any]:

@@ -5,14 +5,48 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, cast
+
+from typing_extensions import TypedDict
 
 from commissioner.encoding import plain
 from commissioner.errors import UsageError
+from commissioner.monitor.contract import Measured
 from commissioner.recordings.whole import whole_file
 
 ENDED, TABLE, ASKED = "ended.jsonl", "cases.parquet", "study.json"
-Row = dict[str, Any]
+
+
+class Row(TypedDict):
+    """Of one case: what the kind of the study has, `None` where the case did not get so far. SI units; `peak_flux_fraction` of the
+    guard's limit; of a parameter what is true, the value found and its standard deviation."""
+
+    case: int
+    outcome: str
+    reason: str
+    seed: NotRequired[int]
+    motor: NotRequired[str]
+    effects: NotRequired[str]
+    energised_s: NotRequired[float | None]
+    peak_flux_fraction: NotRequired[float | None]
+    stator_resistance_ohm_true: NotRequired[float | None]
+    stator_resistance_ohm_value: NotRequired[float | None]
+    stator_resistance_ohm_std: NotRequired[float | None]
+    rotor_resistance_ohm_true: NotRequired[float | None]
+    rotor_resistance_ohm_value: NotRequired[float | None]
+    rotor_resistance_ohm_std: NotRequired[float | None]
+    leakage_inductance_h_true: NotRequired[float | None]
+    leakage_inductance_h_value: NotRequired[float | None]
+    leakage_inductance_h_std: NotRequired[float | None]
+    magnetizing_inductance_h_true: NotRequired[float | None]
+    magnetizing_inductance_h_value: NotRequired[float | None]
+    magnetizing_inductance_h_std: NotRequired[float | None]
+    file: NotRequired[str]
+    causes: NotRequired[str]
+    held_out: NotRequired[float | None]
+    mean_speed_rad_per_s: NotRequired[Measured]
+    mean_torque_nm: NotRequired[Measured]
+    cpu_s: NotRequired[float]
 
 
 class Rows:
@@ -46,7 +80,7 @@ class Rows:
     def add(self, row: Row) -> None:
         """One case has ended; its line is with the operating system when this returns."""
         if row["case"] not in self.ended:
-            self.ended[row["case"]] = plain(row)
+            self.ended[row["case"]] = cast("Row", plain(row))
             self._file.write(json.dumps(plain(row), allow_nan=False) + "\n")
             self._file.flush()
 
@@ -71,4 +105,4 @@ def _whole_lines(path: Path) -> Iterable[Row]:
         except ValueError:
             continue
         if isinstance(row, dict) and isinstance(row.get("case"), int):
-            yield row
+            yield cast("Row", row)

@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from commissioner.errors import CommissionerError, UsageError
+from commissioner.study.rows import Row
 from commissioner.study.specification import Case
 
 AHEAD = 4
@@ -20,7 +21,7 @@ MOST_BREAKS = 3
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def carried_out(case: Case) -> dict[str, Any]:
+def carried_out(case: Case) -> Row:
     """The row of a case, whatever it is. Nothing is raised: a defect is a row that names it."""
     from commissioner.study.commissioning import commissioned
     from commissioner.study.looking import looked_at
@@ -40,7 +41,7 @@ def carried_out(case: Case) -> dict[str, Any]:
         return {"case": case.number, "seed": case.seed, "motor": case.motor, "outcome": "defect", "reason": reason}
 
 
-def here(cases: Sequence[Case], workers: int) -> Iterator[dict[str, Any]]:
+def here(cases: Sequence[Case], workers: int) -> Iterator[Row]:
     """Rows as they end, from `workers` processes of one thread each."""
     left = {case.number: case for case in cases}
     breaks: dict[int, int] = {}
@@ -69,9 +70,9 @@ def here(cases: Sequence[Case], workers: int) -> Iterator[dict[str, Any]]:
                 os.environ[name] = value
 
 
-def _pool(cases: Sequence[Case], workers: int) -> Iterator[dict[str, Any]]:
+def _pool(cases: Sequence[Case], workers: int) -> Iterator[Row]:
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting: set[Future[dict[str, Any]]] = set()
+        waiting: set[Future[Row]] = set()
         rest = iter(cases)
         try:
             while True:
@@ -89,7 +90,7 @@ def _pool(cases: Sequence[Case], workers: int) -> Iterator[dict[str, Any]]:
                 future.cancel()
 
 
-def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[dict[str, Any]]:
+def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
     """Rows as they end, from the workers of a Dask scheduler. UsageError: Dask is not installed, or nobody answers there."""
     try:
         distributed: Any = import_module("distributed")

@@ -10,8 +10,7 @@ def study(request: StudyRequest, *, as_json: bool) -> None:
     """Progress on stderr's terminal, the summary on stdout."""
     done = carry_out(request, lambda ended: None if as_json else _progress(ended))
     if as_json:
-        keys = ("cases", "outcomes", "per_minute", "table", "report")
-        screen.emit({key: getattr(done, key) for key in keys})
+        screen.emit(done)
     else:
         _show(done)
 

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from commissioner.diagnose.causes import CATALOGUE
+from commissioner.diagnose.export.contract import DictionaryEntry, ModelDocument, Nominal, TermRow
 from commissioner.diagnose.export.scenario import scenario
 from commissioner.diagnose.kernels import kinds
 from commissioner.diagnose.plant.model import Layout, Model, Term
+from commissioner.encoding import JsonObject
 
 FORMAT = 5
 """2: a lag is its sum and its shape, no longer two time constants. 3: tilts of L_sigma and L_M are what they become together.
@@ -25,22 +27,16 @@ FORMAT = 5
 KINDS = frozenset(v for k, v in vars(kinds).items() if k.isupper() and isinstance(v, int))
 
 
-def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
+def model_document(found: Any, causes: Sequence[Any]) -> ModelDocument:
     """A JSON/TOML-ready document of the fitted model."""
     model = found.fit.model
     for cause in CATALOGUE.values():
         model = cause.without_recorded(model, found.record)
-    r_s, r_r, l_sigma, l_m = model.nominal
     kept = [(t, v) for t, v in zip(model.terms, model.values, strict=True) if v]
     return {
         "kind": "extended_model",
         "format": FORMAT,
-        "nominal": {
-            "stator_resistance_ohm": r_s,
-            "rotor_resistance_ohm": r_r,
-            "leakage_inductance_h": l_sigma,
-            "magnetizing_inductance_h": l_m,
-        },
+        "nominal": nominal_of(model.nominal),
         "nameplate": {k: v for k, v in found.record.facts.metadata.items() if not isinstance(v, bool)},
         "effects": {c.name: {key: value for key, (value, _, _) in c.sizes.items()} for c in causes},
         "terms": [_term(t, v) for t, v in kept],
@@ -50,7 +46,16 @@ def model_document(found: Any, causes: Sequence[Any]) -> dict[str, Any]:
     }
 
 
-def _term(term: Term, value: float) -> dict[str, Any]:
+def nominal_of(values: tuple[float, float, float, float]) -> Nominal:
+    """R_s, R_R, L_sigma, L_M by their names."""
+    r_s, r_r, l_sigma, l_m = values
+    return {
+        "stator_resistance_ohm": r_s, "rotor_resistance_ohm": r_r, "leakage_inductance_h": l_sigma,
+        "magnetizing_inductance_h": l_m,
+    }  # fmt: skip
+
+
+def _term(term: Term, value: float) -> TermRow:
     return {
         "effect": term.effect,
         "symbol": term.symbol,
@@ -63,8 +68,8 @@ def _term(term: Term, value: float) -> dict[str, Any]:
     }
 
 
-def _dictionary(layout: Layout) -> dict[str, Any]:
-    out: dict[str, Any] = {}
+def _dictionary(layout: Layout) -> dict[str, DictionaryEntry]:
+    out: dict[str, DictionaryEntry] = {}
     for key, value in ((f.name, getattr(layout, f.name)) for f in fields(layout)):
         if isinstance(value, np.ndarray):
             out[key] = value.tolist()
@@ -117,6 +122,6 @@ def _layout(entry: Mapping[str, Any]) -> Layout:
     return Layout(**values)
 
 
-def plain(document: Mapping[str, Any]) -> dict[str, Any]:
-    """A nominal-only copy of a document."""
+def plain(document: Mapping[str, Any]) -> JsonObject:
+    """A nominal-only copy of a document that was read."""
     return {**document, "effects": {}, "terms": [], "dictionary": {}}

@@ -11,7 +11,9 @@ from math import sqrt
 from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE, Setting
+from commissioner.diagnose.export.contract import Entry, Scenario
 from commissioner.diagnose.plant.model import Model
+from commissioner.motor.nameplate import Plate
 
 PLATE = (
     "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
@@ -21,12 +23,12 @@ FULL_SCALE = 3.0
 """Sensor range of the scenario over the rated peak current; half again what the diagnosis calls full scale."""
 
 
-def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str, Any]:
+def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> Scenario:
     """The document `python -m sim --scenario` reads: an ideal drive but for the causes."""
     plate = {k: setting.facts.metadata[k] for k in PLATE if k in setting.facts.metadata}
     if "pole_pairs" in plate:
         plate["pole_pairs"] = int(plate["pole_pairs"])
-    effects = {}
+    effects: dict[str, Entry] = {}
     for cause in causes:
         sizes = {key: value for key, (value, _, _) in cause.sizes.items()}
         if entry := CATALOGUE[cause.name].to_scenario(sizes, model.of(cause.name), setting, model):
@@ -35,16 +37,14 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> dict[str,
     return _document(plate, machine, setting.facts.rated_current_peak_a, effects)
 
 
-def plain_scenario(nominal: Iterable[float], plate: Mapping[str, Any]) -> dict[str, Any]:
+def plain_scenario(nominal: Iterable[float], plate: Mapping[str, Any]) -> Scenario:
     """Of a motor by its four numbers alone, behind an ideal drive."""
     kept = {k: plate[k] for k in PLATE if k in plate}
     peak_a = sqrt(2.0) * float(plate["rated_current_a"])
     return _document(kept, {**gamma_machine(nominal), "saturation_at_rated_flux": 0.0}, peak_a, {})
 
 
-def _document(
-    plate: Mapping[str, Any], machine: Mapping[str, float], rated_peak_a: float, effects: Mapping[str, Any]
-) -> dict[str, Any]:
+def _document(plate: Plate, machine: dict[str, float], rated_peak_a: float, effects: Mapping[str, Entry]) -> Scenario:
     return {
         "nameplate": plate,
         "machine": machine,

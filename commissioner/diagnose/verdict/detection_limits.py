@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from commissioner.diagnose import contract
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.rules import RULES
 from commissioner.diagnose.search.screening import Screening
@@ -13,7 +14,7 @@ from commissioner.diagnose.verdict.evidence import sizes_with_spread
 Limit = tuple[str, tuple[float, str]]
 
 
-def detection_limits(found: Found) -> dict[str, dict[str, dict[str, float | str]]]:
+def detection_limits(found: Found) -> dict[str, contract.Limit | dict[str, contract.Limit]]:
     """Smallest size of each effect that these data would have shown beside the named causes: the first of its sizes."""
     screened = {name: one for one in (found.first_screening, found.screening) for name in one.scores}
     limits = {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from commissioner.diagnose.causes import CATALOGUE, CONFOUNDED, TOGETHER, between
 from commissioner.diagnose.causes.cause import READ_BOTH, SAME, Procedure
+from commissioner.diagnose.contract import NextExperiment
 from commissioner.diagnose.intake.record import Facts, Record
 
 HALF, PLENTY_SIGMAS = 0.5, 10.0
@@ -17,7 +18,7 @@ def what_decides(name: str, record: Record) -> str:
     return CATALOGUE[name].what_decides(record) if name in CATALOGUE else ""
 
 
-def next_experiment(verdict: str, causes: Sequence[Any], record: Record) -> Mapping[str, object] | None:
+def next_experiment(verdict: str, causes: Sequence[Any], record: Record) -> NextExperiment | None:
     """The most useful next test, or None where nothing is open."""
     if verdict == "unexplained":
         how = Procedure(
@@ -56,7 +57,7 @@ def procedure(names: Sequence[str], facts: Facts) -> Procedure:
     return Procedure((*steps, SAME, READ_BOTH))
 
 
-def _plan(names: Sequence[str], do: str, how: Procedure, sigma: float | None) -> Mapping[str, object]:
+def _plan(names: Sequence[str], do: str, how: Procedure, sigma: float | None) -> NextExperiment:
     return {
         "splits": list(names),
         "do": do,

@@ -14,6 +14,7 @@ from commissioner.identify.catalogue.evidence import LINEAR, Evidence, evidence_
 from commissioner.identify.catalogue.fit import Fit, fit
 from commissioner.identify.catalogue.machine import Array, at, breakdown, cages, inverse_gamma, loaded, performance
 from commissioner.identify.catalogue.sheet import KEYS, Sheet, pole_pairs, synchronous_rpm
+from commissioner.identify.contract import Silence
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.nameplate import Nameplate
 
@@ -58,18 +59,6 @@ class Row:
     given: float
     reproduced: float
     is_fitted: bool
-
-
-@dataclass(frozen=True)
-class Silence:
-    """A number the sheet leaves open: what was assumed, how far it may be off, how much of that the sheet took away."""
-
-    name: str
-    words: str
-    value: float
-    factor: float
-    left: float
-    source: str
 
 
 @dataclass(frozen=True)

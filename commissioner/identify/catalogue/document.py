@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
-from typing import Any
-
-from commissioner.identify.catalogue.answer import UNMET, Answer, Stated
+from commissioner.identify.catalogue.answer import UNMET, Answer, Row, Stated
 from commissioner.identify.catalogue.sheet import KEYS
+from commissioner.identify.contract import SheetDocument, SheetValue, StatedValue
 from commissioner.identify.document import CONVENTION
 
 KIND = "manufacturer's sheet"
@@ -17,7 +14,7 @@ WORDS = {
 }  # fmt: skip
 
 
-def document(found: Answer) -> dict[str, Any]:
+def document(found: Answer) -> SheetDocument:
     """Plain JSON types. `std` of a parameter is that of a motor of this type, `std_of_type` without the tolerances."""
     return {
         "kind": KIND,
@@ -29,9 +26,9 @@ def document(found: Answer) -> dict[str, Any]:
         "t_circuit": {k: _stated(v) for k, v in found.t_circuit.items()},
         "double_cage": {k: _stated(v) for k, v in found.cages.items()},
         "losses": {k: _stated(v) for k, v in found.losses.items()},
-        "values": [asdict(row) | {"name": KEYS[row.key][0], "unit": KEYS[row.key][1]} for row in found.rows],
-        "assumed": [asdict(one) for one in found.assumed],
-        "nameplate": None if found.plate is None else {k: v for k, v in asdict(found.plate).items() if v is not None},
+        "values": [_met(row) for row in found.rows],
+        "assumed": found.assumed,
+        "nameplate": None if found.plate is None else found.plate.known(),
         "remarks": remarks(found),
     }
 
@@ -72,7 +69,14 @@ def remarks(found: Answer) -> list[str]:
     ]  # fmt: skip
 
 
-def _stated(value: Stated) -> Mapping[str, Any]:
+def _met(row: Row) -> SheetValue:
+    name, unit = KEYS[row.key]
+    return {
+        "key": row.key, "given": row.given, "reproduced": row.reproduced, "is_fitted": row.is_fitted, "name": name, "unit": unit,
+    }  # fmt: skip
+
+
+def _stated(value: Stated) -> StatedValue:
     return {
         "value": value.value, "std": value.std, "std_of_type": value.of_type,
         "from": {"rounding": value.rounding, "assumptions": value.assumptions, "tolerances": value.tolerances},

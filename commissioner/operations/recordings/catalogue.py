@@ -11,7 +11,8 @@ from typing import Any, cast
 import numpy as np
 
 from commissioner.diagnose.contract import DiagnosisDocument
-from commissioner.diagnose.export.model_file import FORMAT
+from commissioner.diagnose.export.contract import ModelDocument
+from commissioner.diagnose.export.model_file import FORMAT, nominal_of
 from commissioner.diagnose.export.scenario import plain_scenario
 from commissioner.encoding import plain
 from commissioner.errors import DataRefused, UsageError
@@ -21,6 +22,7 @@ from commissioner.identify.catalogue.answer import Answer, answer
 from commissioner.identify.catalogue.contradictions import settled, with_plate
 from commissioner.identify.catalogue.document import KIND, document
 from commissioner.identify.catalogue.sheet import Sheet
+from commissioner.identify.contract import SheetDocument
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS, InverseGamma, Quantity, to_t_model
 from commissioner.recordings.catalogue.reading import sheet_in
 from commissioner.recordings.whole import whole_file, write_texts
@@ -51,7 +53,7 @@ def answered(sheet: Sheet, motor: str | None, trust: str | None) -> Answer:
     return answer(settled(sheet, words))
 
 
-def identified(sheet: Sheet, motor: str | None, trust: str | None, out: Path | None) -> dict[str, Any]:
+def identified(sheet: Sheet, motor: str | None, trust: str | None, out: Path | None) -> SheetDocument:
     """The document; with `out` the report, the model for `simulate`, `sim` and `--motor`, and its other forms are written there."""
     found = answered(sheet, motor, trust)
     made = document(found)
@@ -100,7 +102,7 @@ def _circuit(found: Answer) -> InverseGamma:
     return InverseGamma(*(found.parameters[name].value for name in PARAMETERS))
 
 
-def model_document(found: Answer) -> dict[str, Any]:
+def model_document(found: Answer) -> ModelDocument:
     """The plain model that `commissioner simulate` and `python -m sim --scenario` play. DataRefused: the sheet tells a part only."""
     if found.plate is None or found.withheld:
         raise DataRefused(
@@ -108,9 +110,9 @@ def model_document(found: Answer) -> dict[str, Any]:
             limit="all four parameters, speed and power factor", remedy="add what `commissioner identify` names",
         )  # fmt: skip
     circuit = _circuit(found)
-    plate = {k: v for k, v in asdict(found.plate).items() if v is not None}
+    plate = found.plate.known()
     return {
-        "kind": "extended_model", "format": FORMAT, "nominal": dict(zip(PARAMETERS, circuit.as_tuple(), strict=True)), "nameplate": plate,
+        "kind": "extended_model", "format": FORMAT, "nominal": nominal_of(circuit.as_tuple()), "nameplate": plate,
         "effects": {}, "terms": [], "dictionary": {}, "lines_hz": {}, "scenario": plain_scenario(circuit.as_tuple(), plate),
     }  # fmt: skip
 
@@ -129,6 +131,6 @@ def _found(found: Answer, name: str) -> Found:
     model = asdict(to_t_model(_circuit(found), errors))
     assumption = str(model.pop("assumption", EQUAL_LEAKAGE))
     return Found(
-        name, "", "identified", {k: v for k, v in asdict(found.plate).items() if v is not None}, quantities,
+        name, "", "identified", found.plate.known(), quantities,
         {k: Quantity(*v) for k, v in model.items()}, assumption, found.stator_flux_wb, (), (), None, (),
     )  # fmt: skip

@@ -13,6 +13,7 @@ from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.diagnosis import Diagnosis
 from commissioner.diagnose.diagnosis import diagnose as analyse
 from commissioner.diagnose.document import as_document, points_document, refused_document
+from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.intake.points import Points
 from commissioner.diagnose.points.diagnosis import diagnose_points as analyse_points
 from commissioner.diagnose.points.table import read_points
@@ -94,7 +95,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     require_whole_sheets(tables)
     if any(is_running(t) for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
-        return Diagnosed(cast("DiagnosisDocument", document), request.out, running=running)
+        return Diagnosed(document, request.out, running=running)
     return _recordings(tables, request, observe, go_on)
 
 
@@ -196,7 +197,7 @@ def _write_points(
 
     for one, file in zip(documents, names, strict=True):
         name = str(Path(file).with_suffix(""))
-        _write(out, document, {}, render(points_page(one, name)), f"report_{name.replace('/', '_')}.html")
+        _write(out, document, None, render(points_page(one, name)), f"report_{name.replace('/', '_')}.html")
 
 
 def _joined(documents: Sequence[DiagnosisDocument], names: Sequence[str]) -> DiagnosisDocument:
@@ -219,9 +220,9 @@ def _names(tables: Sequence[Table]) -> list[str]:
     return [p.name if names.count(p.name) == 1 else f"{p.parent.name}/{p.name}" for p in paths]
 
 
-def _write(out: Path, document: Mapping[str, Any], model: Mapping[str, Any], page: str, page_name: str) -> None:
+def _write(out: Path, document: Mapping[str, Any], model: ModelDocument | None, page: str, page_name: str) -> None:
     texts = {page_name: page, "diagnosis.json": json.dumps(plain(document), indent=2)}
-    if model:
+    if model is not None:
         texts["model.json"] = json.dumps(plain(model), indent=1)
     for name, text in texts.items():
         with whole_file(out / name) as temporary:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -14,7 +14,13 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused
 from commissioner.identify.analysis import Identification
 from commissioner.identify.analysis import identify as analyse
-from commissioner.identify.contract import FluxReached, IdentifiedDocument
+from commissioner.identify.contract import (
+    FluxReached,
+    IdentifiedDocument,
+    RunningDocument,
+    SheetDocument,
+    ThreeTestsDocument,
+)
 from commissioner.identify.document import document as identification_document
 from commissioner.identify.estimate.axis import Estimator
 from commissioner.identify.intake.plate import nameplate_from
@@ -67,7 +73,7 @@ class Identified:
 class IdentifiedRunning:
     """Of a running motor; nothing is written into a drive from it."""
 
-    document: Mapping[str, Any]
+    document: RunningDocument
     files: tuple[Path, ...]
 
 
@@ -75,7 +81,7 @@ class IdentifiedRunning:
 class IdentifiedCatalogue:
     """Of a manufacturer's sheet; nothing is written into a drive from it."""
 
-    document: Mapping[str, Any]
+    document: SheetDocument
     files: tuple[Path, ...]
 
 
@@ -83,7 +89,7 @@ class IdentifiedCatalogue:
 class IdentifiedSheets:
     """Of test sheets: direct current, no load, locked rotor; nothing is written into a drive from them."""
 
-    document: Mapping[str, Any]
+    document: ThreeTestsDocument
     files: tuple[Path, ...]
 
 

@@ -9,9 +9,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.search.journal import Said
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, DataRefused
+from commissioner.identify.contract import RunningDocument
 from commissioner.motor.nameplate import Nameplate
 from commissioner.operations.events import GoOn, Observe
 from commissioner.recordings.plate import plate_of
@@ -51,7 +53,7 @@ def readable(tables: Sequence[Table], motor: str | None, step: str) -> tuple[lis
 
 def diagnosed(
     tables: Sequence[Table], motor: str | None, out: Path | None, excluded: Sequence[str], observe: Observe, go_on: GoOn
-) -> tuple[dict[str, Any], Diagnosis]:
+) -> tuple[DiagnosisDocument, Diagnosis]:
     """The document and what it was made from; with `out` the page, the model and the document are written there."""
     from commissioner.running.contract import as_document
     from commissioner.running.diagnosis import diagnose
@@ -88,7 +90,7 @@ def diagnosed(
     return document, seen
 
 
-def identified(tables: Sequence[Table], motor: str | None, out: Path | None = None) -> dict[str, Any]:
+def identified(tables: Sequence[Table], motor: str | None, out: Path | None = None) -> RunningDocument:
     """The document of an identification from a start, load steps or several steady loads. DataRefused where they cannot carry it.
 
     `out`: a folder for its report.
@@ -97,7 +99,7 @@ def identified(tables: Sequence[Table], motor: str | None, out: Path | None = No
 
     recordings, plate = readable(tables, motor, "identify")
     found = identify(recordings, plate)
-    document = cast("dict[str, Any]", plain(as_document(found)))
+    document = cast("RunningDocument", plain(as_document(found)))
     if out is not None:
         from commissioner.report.page import render
         from commissioner.report.running.identified import page_of

@@ -12,6 +12,7 @@ from commissioner.diagnose.document import CONVENTION
 from commissioner.diagnose.points.table import is_points_table
 from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
 from commissioner.errors import DataRefused
+from commissioner.identify.contract import Measured, ThreeTestsDocument
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.plate_match import contradiction, doubt, rated_point
@@ -50,7 +51,7 @@ def are_three(tables: Sequence[Table]) -> bool:
     return are_three_tests([t.columns for t in tables])
 
 
-def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> dict[str, Any]:
+def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) -> ThreeTestsDocument:
     """The circuit's document. DataRefused: a test is missing or impossible, or contradicts the plate and nobody decided."""
     plate = plate_metadata(motor)
     found = solve([t.columns for t in tables], [{**t.metadata, **plate} for t in tables])
@@ -60,7 +61,9 @@ def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) 
     circuit = found.circuit
     std = None if found.slow is None else found.slow.std_ohm
     values = dict(zip(PARAMETERS, circuit.as_tuple(), strict=True))
-    parameters = {n: {"value": v, "std": std if n == "rotor_resistance_ohm" else None} for n, v in values.items()}
+    parameters: dict[str, Measured] = {
+        n: {"value": v, "std": std if n == "rotor_resistance_ohm" else None} for n, v in values.items()
+    }
     parameters["rotor_time_constant_s"] = {"value": circuit.rotor_time_constant_s, "std": None}
     return {
         "kind": "three tests",

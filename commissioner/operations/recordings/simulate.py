@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -149,7 +149,7 @@ def _motor(name: str, plain: bool) -> _Motor:
         return _of_document(catalogue.model_document(catalogue.answered(sheet, None, None)))
     plate = load_motor(name)
     typical = prior(plate).typical.as_tuple()
-    return _Motor(Model(typical), None, {}, {k: v for k, v in asdict(plate).items() if v is not None})
+    return _Motor(Model(typical), None, {}, plate.known())
 
 
 def _extended(path: Path, plain: bool) -> _Motor:

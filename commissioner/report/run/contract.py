@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NotRequired
 
 from typing_extensions import TypedDict
 
+from commissioner.diagnose.contract import Gain, Limit, NextExperiment, Size
+from commissioner.errors import ErrorDocument
 from commissioner.identify.contract import (
     AxesFinding,
     Axis,
@@ -17,6 +20,18 @@ from commissioner.identify.contract import (
     RatedFlux,
     TModel,
 )
+
+
+class IdentityDocument(TypedDict):
+    """Who answers. Null or empty: the drive file knows no register for it."""
+
+    drive_type: str
+    serial_number: int | None
+    firmware_version: str
+    map_version: int | None
+    rated_drive_current_a: float | None
+    control_period_s: float | None
+    switching_frequency_hz: float | None
 
 
 class GuardDocument(TypedDict):
@@ -60,23 +75,71 @@ class PlateMatchDocument(TypedDict):
     unseen_gain: list[float]
 
 
+class Objection(TypedDict):
+    """One reason why the result is not good enough."""
+
+    what: str
+    value: Any
+    limit: Any
+    remedy: str
+
+
+class ClosingCause(TypedDict):
+    """A cause that the closing diagnosis names."""
+
+    name: str
+    title: str
+    parameters: dict[str, Size]
+    confidence: float
+    equivalent: list[str]
+    strength_over_noise: float | None
+
+
+class Moved(TypedDict):
+    """What a parameter would have come out as without its `cause`."""
+
+    parameter: str
+    four_parameters: float
+    with_causes: float
+    cause: str
+
+
+class ClosingDiagnosis(TypedDict):
+    """Of the run's own samples; the whole of it is in `file`."""
+
+    verdict: str
+    reason: str
+    causes: list[ClosingCause]
+    moved: list[Moved]
+    file: str | None
+    is_complete: bool
+    gain: NotRequired[Gain]
+    parameters_before: NotRequired[dict[str, Measured]]
+    parameters_after: NotRequired[dict[str, Measured]]
+    detection_limits: NotRequired[Mapping[str, Limit | dict[str, Limit]]]
+    below_materiality: NotRequired[list[str]]
+    cannot_tell: NotRequired[list[str]]
+    next_experiment: NotRequired[NextExperiment | None]
+    remarks: NotRequired[list[str]]
+
+
 class RunDocument(TypedDict):
     """`parameters` is empty, and what comes of an identification missing, where a run did not get so far."""
 
     run: str
     outcome: str
     reason: str
-    error: dict[str, Any] | None
+    error: ErrorDocument | None
     energised_s: float
     duration_s: float
-    drive: dict[str, Any] | None
+    drive: IdentityDocument | None
     checks: list[CheckRow]
     before: dict[str, float | None] | None
     written: list[WrittenRow]
-    objections: list[Any]
+    objections: Sequence[Objection]
     parameters: Parameters | dict[str, Measured]
     remarks: list[str]
-    diagnosis: dict[str, Any] | None
+    diagnosis: ClosingDiagnosis | None
     flux_guard: GuardDocument
     convention: NotRequired[str]
     estimator: NotRequired[str]

@@ -32,7 +32,7 @@ from commissioner.run.archive.journal import Journal, read_journal
 from commissioner.run.archive.origin import machine_part, this_process
 from commissioner.run.archive.seal import CLOSED, covers, seal
 from commissioner.run.archive.summary import NAME as SUMMARY
-from commissioner.run.archive.summary import summary_of
+from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.index import note
 
 __all__ = [
@@ -112,7 +112,7 @@ class RunFolder:
         """Journal the digest of every file as it is now, sealed where there is a key, and keep the run's summary."""
         blocks = {"bytes": self._blocks_bytes, "sha256": self._blocks_digest.hexdigest()}
         records = read_journal(self.path / "journal.jsonl")
-        summary = plain(summary_of(self.path, records).kept())
+        summary = plain(summary_of(self.path, records), without=NOT_KEPT)
         self._covered |= covers(self.path, self._saved)
         self._saved.clear()
         record: dict[str, Any] = {"files": self._covered, "blocks": blocks, "summary": summary, "seal": None}

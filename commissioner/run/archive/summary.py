@@ -15,6 +15,8 @@ from commissioner.run.archive.documents import read_document, read_result
 from commissioner.run.archive.journal import Record, read_journal
 
 NAME = "summary.json"
+NOT_KEPT = frozenset({"folder", "result"})
+"""Fields of a summary that `summary.json` is without: where the folder lies, the whole result."""
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
 RESTORED, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before (restored)", "old or new", "cut off", "unreadable"
@@ -66,10 +68,6 @@ class RunSummary:
     def is_unknown(self) -> bool:
         """Only the drive can tell which parameter set it holds."""
         return self.written.startswith(OLD_OR_NEW)
-
-    def kept(self) -> dict[str, Any]:
-        """What `summary.json` keeps: not where the folder lies, nor the whole result."""
-        return {name: value for name, value in vars(self).items() if name not in ("folder", "result")}
 
 
 def summarise(folder: Path) -> RunSummary:

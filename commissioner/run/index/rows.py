@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from commissioner.encoding import plain
-from commissioner.run.archive.summary import OLD_OR_NEW, RunSummary
+from commissioner.run.archive.summary import NOT_KEPT, OLD_OR_NEW, RunSummary
 
 SCHEMA = 1
 """Of a SQLite index; one of another number is built anew from the folders."""
@@ -123,7 +123,7 @@ def select(wanted: Wanted, place: str, *, is_shared: bool) -> tuple[str, str, di
 
 def row_of(summary: RunSummary, place: str, stamp: tuple[int, int]) -> Row:
     """The summary as a row; `stamp`: size and time of the journal that it was made from."""
-    document = _rounded(plain(summary.kept())) | {"folder": summary.folder, "standing": summary.standing}
+    document = _rounded(plain(summary, without=NOT_KEPT)) | {"folder": summary.folder, "standing": summary.standing}
     return Row(
         place, summary.run, summary.folder, *stamp, summary.started_utc or utc_of(summary.run), summary.outcome, summary.standing,
         summary.reason, summary.drive, OLD_OR_NEW if summary.is_unknown else "", summary.person, summary.motor_id,

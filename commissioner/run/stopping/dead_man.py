@@ -10,9 +10,9 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
+from commissioner.encoding import JsonObject
 from commissioner.errors import Aborted
 from commissioner.run.archive.folder import read_document
 from commissioner.run.stopping.operator_stop import OperatorStop
@@ -30,7 +30,7 @@ class DeadMan:
         self._descriptor, self._stop, self._clock = descriptor, stop, clock
         self._heard = clock()
         self._begun = threading.Event()
-        self._origin: Mapping[str, Any] = {}
+        self._origin: JsonObject = {}
         self._answers: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
         self.is_gone = False
         """The service went away or fell silent: nobody answers any more."""
@@ -41,7 +41,7 @@ class DeadMan:
         for work in (self._read, self._count):
             threading.Thread(target=work, name="dead man", daemon=True).start()
 
-    def wait_for_begin(self) -> Mapping[str, Any]:
+    def wait_for_begin(self) -> JsonObject:
         """What the service says about the run it wants. Aborted: it went away, or stopped, before it wanted one."""
         while not self._begun.wait(0.05):
             if self._stop.asked:

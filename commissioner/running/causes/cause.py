@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,8 @@ from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record
 
 Values = Mapping[str, float]
+Entry = Mapping[str, float | str]
+"""A cause in the simulator's catalogue, in that one's units."""
 Sizes = dict[str, tuple[float, str]]
 """Name to value and unit; the first one is the size that is spoken of."""
 PHASES = "uvw"
@@ -57,7 +58,7 @@ class Cause:
     sizes: Callable[[Values, Scales], Sizes]
     range: tuple[float, float]
     confounders: tuple[Confounder, ...] = ()
-    scenario: Callable[[Values, Scales], dict[str, Any]] | None = None
+    scenario: Callable[[Values, Scales], Entry] | None = None
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
     allows: Callable[[Values], bool] = field(default=lambda _: True)

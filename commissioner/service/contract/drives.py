@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing_extensions import TypedDict
 
 from commissioner.motor.nameplate import Nameplate
-from commissioner.report.run.contract import CheckRow
+from commissioner.report.run.contract import CheckRow, IdentityDocument
 from commissioner.service.library import Drive
 
 
@@ -62,18 +62,6 @@ class ProceduresDocument(TypedDict):
     procedures: list[ProcedureDocument]
 
 
-class IdentityDocument(TypedDict):
-    """Who answers. Null or empty: the drive file knows no register for it."""
-
-    drive_type: str
-    serial_number: int | None
-    firmware_version: str
-    map_version: int | None
-    rated_drive_current_a: float | None
-    control_period_s: float | None
-    switching_frequency_hz: float | None
-
-
 class UncheckedRow(TypedDict):
     """What could not be judged, and why."""
 
@@ -98,8 +86,8 @@ class RunLimitsDocument(TypedDict):
     watchdog_s: float
 
 
-class CheckedDocument(TypedDict):
-    """`outcome`: passed | rejected. `limits`: null of a drive that cannot energise for us. `nameplate_in_drive` and
+class CheckDocument(TypedDict):
+    """`check`. `outcome`: passed | rejected. `limits`: null of a drive that cannot energise for us. `nameplate_in_drive` and
     `parameters_in_drive` by the drive file's names and in its units."""
 
     outcome: str
@@ -111,6 +99,11 @@ class CheckedDocument(TypedDict):
     checks: list[CheckRow]
     not_checked: list[UncheckedRow]
     limits: RunLimitsDocument | None
+
+
+class CheckedDocument(CheckDocument):
+    """With the time at which the service asked."""
+
     checked_utc: str
 
 

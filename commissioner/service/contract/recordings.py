@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NotRequired
+from typing import Any, NotRequired
 
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from commissioner.diagnose.contract import DiagnosisDocument
-from commissioner.encoding import JsonObject
-from commissioner.identify.contract import IdentifiedDocument
+from commissioner.errors import ErrorDocument
+from commissioner.identify.contract import AnyIdentification
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring
 
 
@@ -28,17 +27,6 @@ class FailureDocument(TypedDict):
     what: NotRequired[str]
 
 
-class ErrorDocument(TypedDict):
-    """`kind`: of the errors of the manual; step, value, limit and remedy as everywhere."""
-
-    kind: str
-    what: str
-    step: str
-    value: Any
-    limit: Any
-    remedy: str
-
-
 class FailedVerb(TypedDict):
     """What a verb prints that could not do it."""
 
@@ -51,10 +39,15 @@ class NothingYet(TypedDict):
     """It works, or waits for another one."""
 
 
-Said = IdentifiedDocument | DiagnosisDocument | MonitoringDocument | PartialMonitoring | RefusedMonitoring
-OfAnotherKind = Annotated[
-    JsonObject, Field(description="What was identified on a running motor or from test sheets; chapter `running`.")
-]
+SaidOfIt = (
+    AnyIdentification
+    | DiagnosisDocument
+    | MonitoringDocument
+    | PartialMonitoring
+    | RefusedMonitoring
+    | FailedVerb
+    | NothingYet
+)
 
 
 class RecordingDocument(TypedDict):
@@ -67,6 +60,6 @@ class RecordingDocument(TypedDict):
     begun_utc: str
     is_done: bool
     exit_code: int | None
-    result: Said | FailedVerb | NothingYet | OfAnotherKind
+    result: SaidOfIt
     problem: FailureDocument | None
     report: str | None

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from fastapi import Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -51,13 +51,19 @@ def environment() -> Environment:
 
 
 @cache
-def words_of(language: str) -> Mapping[str, Any]:
+def words_of(language: str) -> Mapping[str, Callable[..., Any] | Texts | Words]:
     """What templates say and write numbers with, in one language."""
     texts = Texts(language)
     scratch = Environment(extensions=["jinja2.ext.i18n"])
     scratch.install_gettext_callables(texts.gettext, texts.ngettext, newstyle=True)  # type: ignore[attr-defined]
-    gettext = scratch.globals["gettext"]
-    said = {"gettext": gettext, "_": gettext, "tell": texts.tell, "t": texts, "w": Words(texts)}
+    gettext = cast("Callable[..., str]", scratch.globals["gettext"])
+    said: dict[str, Callable[..., Any] | Texts | Words] = {
+        "gettext": gettext,
+        "_": gettext,
+        "tell": texts.tell,
+        "t": texts,
+        "w": Words(texts),
+    }
     return said | {"n": texts.number, "signed": texts.signed, "short": texts.short}
 
 

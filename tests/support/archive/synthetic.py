@@ -11,7 +11,7 @@ from typing import Any
 from commissioner.encoding import plain
 from commissioner.run.archive.journal import Journal, digest, read_journal
 from commissioner.run.archive.seal import CLOSED
-from commissioner.run.archive.summary import summary_of
+from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.rows import utc_of
 
 PLATE = {
@@ -72,7 +72,7 @@ def make_run(
         if result is not None:
             (folder / "result.json").write_text(json.dumps(result), "utf-8")
         (folder / "blocks.bin").write_bytes(b"")
-        summary = plain(summary_of(folder, read_journal(folder / "journal.jsonl")).kept())
+        summary = plain(summary_of(folder, read_journal(folder / "journal.jsonl")), without=NOT_KEPT)
         record = {"files": files, "blocks": {"bytes": 0, "sha256": digest(b"")}, "summary": summary, "seal": None}
         journal.write(CLOSED, record, blocks, durable=False)
         facts = {"bytes": (folder / "journal.jsonl").stat().st_size, "records": journal.records, "head": journal.head}

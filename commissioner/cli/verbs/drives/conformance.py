@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
-
 from rich.markup import escape
+from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.conformance.kit import Conformance, chosen, run_conformance
-from commissioner.conformance.records import Outcome, RuleResult
+from commissioner.conformance.records import Exchange, Outcome, RuleResult
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.url import parse_url
+from commissioner.registers.codec import Value
 
 MARKS = {Outcome.PASS: "[green]✓[/]", Outcome.FAIL: "[red]✗[/]", Outcome.NOT_TESTED: "[yellow]–[/]"}
 SOME_FAILED = 3
@@ -41,7 +40,31 @@ def conformance(
         raise SystemExit(SOME_FAILED)
 
 
-def as_document(done: Conformance) -> dict[str, Any]:
+class RuleRow(TypedDict):
+    """A rule and how it ended: `outcome` pass | fail | not tested; `evidence`: its last exchanges, the deciding one last."""
+
+    name: str
+    claim: str
+    source: str
+    energises: bool
+    outcome: str
+    reason: str
+    requests: int
+    evidence: tuple[Exchange, ...]
+
+
+class ConformanceDocument(TypedDict):
+    """`outcome` passed | rejected; `drive`: what answered; `counts` by the rules' outcomes."""
+
+    outcome: str
+    reason: str
+    drive: dict[str, Value]
+    energised: bool
+    counts: dict[str, int]
+    rules: list[RuleRow]
+
+
+def as_document(done: Conformance) -> ConformanceDocument:
     """The JSON of `--json`: outcome, counts and every rule with its evidence."""
     return {
         "outcome": "passed" if done.conforms else "rejected",
@@ -49,8 +72,15 @@ def as_document(done: Conformance) -> dict[str, Any]:
         "drive": done.drive,
         "energised": done.energised,
         "counts": {outcome.value: done.count(outcome) for outcome in Outcome},
-        "rules": [asdict(result) | {"outcome": result.outcome.value} for result in done.results],
+        "rules": [_row(result) for result in done.results],
     }
+
+
+def _row(result: RuleResult) -> RuleRow:
+    return {
+        "name": result.name, "claim": result.claim, "source": result.source, "energises": result.energises, "outcome": result.outcome.value,
+        "reason": result.reason, "requests": result.requests, "evidence": result.evidence,
+    }  # fmt: skip
 
 
 def _counts(done: Conformance) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import NotRequired
 
 from rich.markup import escape
+from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.link.files.drive_file import known_drives, load_profile
@@ -18,6 +19,33 @@ WORKS = {
     "restore": "restore",
 }
 """What a capability in a drive file means for a person at the command line."""
+
+
+class WorksRow(TypedDict):
+    """Whether a verb works with the drive, and how far or why not."""
+
+    verb: str
+    works: bool
+    how: str
+
+
+class DriveRow(TypedDict):
+    """A drive file; `drive` is the name inside. `tune`: form of the drive's own tuning. `show` adds what the file does not know, by
+    topic, and where it lies; `validate` the outcome."""
+
+    name: str
+    drive: str
+    kind: str
+    capabilities: list[str]
+    items: int
+    tune: str | None
+    proved_on: list[str]
+    worked_examples: int
+    works: list[WorksRow]
+    unknown: NotRequired[dict[str, str]]
+    file: NotRequired[str]
+    outcome: NotRequired[str]
+    reason: NotRequired[str]
 
 
 def list_drives(*, as_json: bool) -> None:
@@ -77,7 +105,7 @@ def validate_drive(file: Path, *, as_json: bool) -> None:
     screen.out.print(f"[green]{document['reason']}[/]: {escape(profile.name)}, {len(profile.items)} items")
 
 
-def _summary(name: str, profile: DriveProfile) -> dict[str, Any]:
+def _summary(name: str, profile: DriveProfile) -> DriveRow:
     return {
         "name": name,
         "drive": profile.name,
