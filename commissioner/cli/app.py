@@ -675,9 +675,10 @@ def replay(run: Run = "last", salvage: Salvage = False, runs: Runs = RUNS, json:
 
 @app.command()
 def docs(
-    name: Annotated[str | None, typer.Argument(help="Chapter; all are listed without it.")] = None, json: Json = False
+    name: Annotated[str | None, typer.Argument(help="Chapter, or schema; all are listed without it.")] = None,
+    json: Json = False,
 ) -> None:
-    """The manual: its chapters, or one of them."""
+    """The manual: its chapters and the JSON schemas, or one of them."""
     from commissioner.cli.verbs.docs import docs as verb
 
     verb(name, as_json=json)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib.resources import files
 
 ENDING = ".md"
+SCHEMAS, SCHEMA_ENDING = "schemas", ".schema.json"
+"""Folder of the JSON schemas; `commissioner.schemas` makes them."""
 
 
 def chapter_names() -> tuple[str, ...]:
@@ -24,3 +26,16 @@ def read_chapter(name: str) -> str:
 def chapter_title(name: str) -> str:
     """The chapter's first heading, without its mark. Raises KeyError where there is no chapter of that name."""
     return read_chapter(name).partition("\n")[0].removeprefix("#").strip()
+
+
+def schema_names() -> tuple[str, ...]:
+    """Names of the documents that have a schema, in alphabetical order."""
+    found = (entry.name for entry in (files(__name__) / SCHEMAS).iterdir())
+    return tuple(sorted(name.removesuffix(SCHEMA_ENDING) for name in found if name.endswith(SCHEMA_ENDING)))
+
+
+def read_schema(name: str) -> str:
+    """The JSON schema of a document, as text. Raises KeyError where there is none of that name."""
+    if name not in schema_names():
+        raise KeyError(name)
+    return (files(__name__) / SCHEMAS / f"{name}{SCHEMA_ENDING}").read_text(encoding="utf-8")

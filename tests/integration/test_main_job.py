@@ -13,6 +13,7 @@ import pytest
 from commissioner.recordings.table import read_table, to_standstill
 from tests.campaigns.combinations import CASES, run_case
 from tests.support.command_line import COMMAND, at_flux, call, truth
+from tests.support.service.described import judge
 from tests.support.sim_process import SimProcess
 
 
@@ -44,6 +45,11 @@ def job(tmp_path_factory):
         "checked": checked,
         "key": truth("default"),
     }
+
+
+@pytest.mark.parametrize(("name", "said"), [("run", "answer"), ("restore", "restored"), ("check", "checked")])
+def test_what_is_printed_is_as_its_schema_says(job, name, said):
+    judge(name, job[said].json)
 
 
 def test_a_good_run_exits_with_zero_and_says_commissioned(job):
@@ -150,6 +156,7 @@ def test_identify_offline_gives_the_runs_answer_from_its_samples(job):
     (folder,) = job["runs"].iterdir()
     offline = call("identify", str(folder / "recording.parquet"), "--motor", "motor_2kw2", "--json")
     assert offline.code == 0
+    judge("identify", offline.json)
     for name, quantity in job["answer"].json["parameters"].items():
         assert offline.json["parameters"][name]["value"] == pytest.approx(quantity["value"], rel=1e-6)
 

@@ -123,6 +123,23 @@ class ClosingDiagnosis(TypedDict):
     remarks: NotRequired[list[str]]
 
 
+class LinkDocument(TypedDict):
+    """What a slow link carried: `averaged` control periods in each sample's mean; `captured`: the same of a test that the drive kept, 0:
+    none was."""
+
+    channels: list[str]
+    averaged: int
+    captured: int
+
+
+class LongerTestDocument(TypedDict):
+    """Relative standard errors of (R_s, R_R, L_sigma, L_M), `(4,)` each, now and after tests of `seconds` each."""
+
+    seconds: float
+    now: list[float]
+    then: list[float]
+
+
 class RunDocument(TypedDict):
     """`parameters` is empty, and what comes of an identification missing, where a run did not get so far."""
 
@@ -156,8 +173,8 @@ class RunDocument(TypedDict):
     stator_resistance_20degc_ohm: NotRequired[Measured | None]
     gaps: NotRequired[Gaps]
     winding_temperature_degc: NotRequired[float | None]
-    link: NotRequired[dict[str, Any]]
-    longer_test: NotRequired[dict[str, Any]]
+    link: NotRequired[LinkDocument]
+    longer_test: NotRequired[LongerTestDocument | None]
     plate_match: NotRequired[PlateMatchDocument]
 
 

@@ -10,6 +10,7 @@ from commissioner.diagnose.plant.model import Model
 from sim.recordings.hidden import draw
 from sim.recordings.standstill import record, write_table
 from tests.support.command_line import call, truth
+from tests.support.service.described import judge
 from tests.unit.diagnose.conftest import NOMINAL, setting_of
 from tests.unit.diagnose.export.test_model_file import document_of
 
@@ -53,6 +54,8 @@ def test_a_recording_is_diagnosed_and_its_model_plays_what_was_measured(files, t
     answer = call("diagnose", str(files / "good.csv"), "--out", str(tmp_path), "--json")
     document = answer.json
     assert answer.code == 0
+    judge("diagnose", document)
+    judge("model", json.loads((tmp_path / "model.json").read_text("utf-8")))
     assert [c["name"] for c in document["causes"]] == ["dead_time"]
     assert document["verdict"] == "not_distinguishable" and document["causes"][0]["equivalent"] == ["device_drop"]
     assert any("banana" in sentence for sentence in document["audit"])

@@ -14,6 +14,7 @@ from commissioner.recordings.table import read_table
 from sim.__main__ import main as simulator
 from sim.motoring.recording import build, record
 from sim.recordings.standstill import write_table
+from tests.support.service.described import judge
 from tests.unit.cli.test_failures import leave
 
 SCENARIO = Path(__file__).parents[3] / "sim" / "scenarios" / "start_turn_fault.toml"
@@ -34,6 +35,7 @@ def diagnosed(start):
 
 def test_a_start_with_a_turn_fault_is_diagnosed_as_such(diagnosed):
     document = json.loads(json.dumps(diagnosed.document))
+    judge("diagnose", document)
     assert document["verdict"] == "explained"
     assert [c["name"] for c in document["causes"]] == ["stator_asymmetry"]
     assert "current_in_v_of_rated" in document["causes"][0]["parameters"]
@@ -58,6 +60,7 @@ def test_a_start_with_a_turn_fault_is_diagnosed_as_such(diagnosed):
 def test_the_extended_model_plays_what_was_measured_and_is_a_scenario(start, diagnosed):
     path, _ = start
     model = diagnosed.out / "model.json"
+    judge("model", json.loads(model.read_text("utf-8")))
     errors = {}
     for is_plain in (False, True):
         out = path.parent / f"played_{is_plain}.csv"
@@ -78,6 +81,7 @@ def test_the_start_is_identified(start, tmp_path):
     path, truth = start
     found = identify_any(IdentifyRequest((path,), out=tmp_path / "out"))
     assert isinstance(found, IdentifiedRunning)
+    judge("identify", found.document)
     for key, true in truth["inverse_gamma"].items():
         assert found.document["parameters"][key]["value"] == pytest.approx(true, rel=0.05)
     assert found.document["inertia_kg_m2"]["value"] == pytest.approx(truth["inertia_kg_m2"], rel=0.02)

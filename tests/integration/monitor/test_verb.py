@@ -12,6 +12,7 @@ import pytest
 from commissioner.recordings.table import write_table
 from sim.recordings.running import load_scenario, record
 from tests.support.command_line import call
+from tests.support.service.described import judge
 
 DATA = Path(__file__).parents[2] / "data"
 COLUMNS = ["time_s", "shaft_angle_rad", "speed_rad_per_s", "electromagnetic_torque_nm", "load_torque_nm"]
@@ -50,6 +51,7 @@ def test_json_waveforms_and_report(recordings: dict[str, Path], tmp_path: Path) 
     code, out, _ = command(str(recordings["healthy"]), "--out", str(tmp_path / "result"), "--json")
     assert code == 0
     document = json.loads(out)
+    judge("monitor", document)
     truth = json.loads(recordings["healthy"].with_suffix(".json").read_text())
     assert document["mean_speed_rad_per_s"]["value"] == pytest.approx(truth["mean_speed_rad_per_s"], rel=2e-4)
     assert document["refused_because"] is None
@@ -101,6 +103,7 @@ def test_a_recording_that_cannot_carry_an_answer_exits_3_with_the_reason() -> No
     code, out, _ = command(str(plate), "--motor", "motor_2kw2", "--json")
     assert code == 3
     document = json.loads(out)
+    judge("monitor", document)
     assert document["refused_because"]["code"] == "too_short"
     assert document["mean_torque_nm"] is None
     assert document["indicators"]["power_w"] == pytest.approx(1203, abs=3)
@@ -134,5 +137,6 @@ def test_a_commissioning_result_is_the_start(recordings: dict[str, Path], tmp_pa
     code, out, _ = command(str(recordings["second"]), "--start", str(result), "--json")
     assert code == 0
     document = json.loads(out)
+    judge("monitor", document)
     assert document["parameters_from"].startswith("commissioning result")
     assert document["parameters"]["rotor_resistance_ohm"]["value"] == pytest.approx(2.09, rel=0.03)

@@ -1,4 +1,5 @@
-"""What the service sends, beside what its own OpenAPI document says of it: every key described, every described key there."""
+"""What leaves the program, beside what is said of it - the service's own OpenAPI document, the shipped schemas: every key described,
+every described key there."""
 
 from __future__ import annotations
 
@@ -10,6 +11,8 @@ from typing import Any
 
 import httpx
 from jsonschema_rs import Draft202012Validator
+
+from commissioner.docs import read_schema
 
 LOOSE = {"type": "object", "additionalProperties": True}
 MOST = 40
@@ -48,6 +51,16 @@ class Description:
     def _validator(self, method: str, route: str, status: str) -> Draft202012Validator:
         content = self.document["paths"][route][method]["responses"][status]["content"]
         return Draft202012Validator(content["application/json"]["schema"] | {"components": self.document["components"]})
+
+
+def judge(name: str, document: Any, *, may_have_more: bool = False) -> None:
+    """A document of the command line or of a file; what its shipped schema does not describe is an AssertionError."""
+    schema = json.loads(read_schema(name))
+    errors = Draft202012Validator(schema if may_have_more else _strict(schema)).iter_errors(
+        json.loads(json.dumps(document))
+    )
+    problems = [f"{'.'.join(map(str, error.instance_path))}: {error.message[:500]}" for error in errors]
+    assert problems == [], problems
 
 
 def _strict(schema: Any) -> Any:

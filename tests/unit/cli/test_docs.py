@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from commissioner.cli.app import app
-from commissioner.docs import chapter_names, chapter_title, read_chapter
+from commissioner.docs import chapter_names, chapter_title, read_chapter, read_schema
 from tests.unit.cli.test_failures import leave
 
 ROOT = Path(__file__).parents[3]
@@ -103,6 +103,13 @@ def test_docs_gives_a_chapter_as_one_document(capsys):
     assert (code, document) == (0, {"name": "accuracy", "text": read_chapter("accuracy")})
 
 
+def test_docs_gives_a_schema_as_it_ships(capsys):
+    code, document = leave(capsys, "docs", "run.schema.json")
+    assert (code, document) == (0, json.loads(read_schema("run")))
+    assert "run.schema.json" in leave(capsys, "docs")[1]["schemas"]
+    assert leave(capsys, "docs", "nope.schema.json")[0] == 2
+
+
 def test_docs_into_a_pipe_is_the_plain_markdown(capsys):
     app(["docs", "formats"], standalone_mode=False)
     assert capsys.readouterr().out == read_chapter("formats")
@@ -120,7 +127,7 @@ def test_a_chapter_that_there_is_not_is_a_usage_error_that_names_those_there_are
     assert all(name in document["error"]["limit"] for name in CHAPTERS)
 
 
-@pytest.mark.parametrize("name", ["../__init__", "", "accuracy.md"])
+@pytest.mark.parametrize("name", ["../__init__", "", "accuracy.md", "../schemas/run.schema.json"])
 def test_a_name_is_no_path(capsys, name):
     code, document = leave(capsys, "docs", name)
     assert code == 2, json.dumps(document)

@@ -24,6 +24,7 @@ from commissioner.study.simulators import simulator
 from commissioner.study.specification import cases_of, load_study
 from commissioner.study.summary import page, summarise
 from commissioner.study.workers import carried_out, here
+from tests.support.service.described import judge
 
 MOTORS = ["a", "b", "c"]
 
@@ -147,6 +148,7 @@ def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
     path = study_file(tmp_path, 'kind = "commission"\nmotors = ["haumer_132m04"]\neffects = ["no_such_effect"]\n')
     (case,) = cases_of(load_study(path), path, simulator().motors())
     told = carried_out(case)
+    judge("study_row", told)
     assert told["outcome"] == "impossible"
     assert "no_such_effect" in told["reason"]
 
@@ -161,6 +163,7 @@ def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):
         assert {k: v for k, v in told.items() if k != "cpu_s"} == {
             k: v for k, v in json.loads(json.dumps(shared[case])).items() if k != "cpu_s"
         }
+        judge("study_row", told)
         assert told["outcome"] == "commissioned", told["reason"]
         assert told["peak_flux_fraction"] <= 1.02
         for name in (
