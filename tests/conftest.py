@@ -68,6 +68,12 @@ USUAL_S, WHOLE_DIAGNOSIS_S = 0.1, 5.0
 """What a test is taken to cost that the table does not name; those of `hidden_effects` are whole diagnoses."""
 
 
+@pytest.fixture
+def is_short(request: pytest.FixtureRequest) -> bool:
+    """By day a recording is as short as its claim allows; at night it is whole."""
+    return request.node.get_closest_marker("campaign") is None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     at_night = set(NIGHT.read_text("utf-8").split("\n"))

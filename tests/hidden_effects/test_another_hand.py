@@ -11,12 +11,18 @@ from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.diagnose.verdict.evidence import hold_out
 from commissioner.motor.computed import without_computed_third
 from tests.hidden_effects.cases import class_of
-from tests.hidden_effects.generators.another_hand import PEAK_A, TONES_HZ, Machine, recorded
+from tests.hidden_effects.generators.another_hand import FEW, PEAK_A, SEGMENTS, TONES_HZ, Machine, recorded
 
 
-def named(machine, seconds=1.0):
-    seen = diagnose([recorded(machine, seconds)])
-    return seen, {c.name: {c.name, *c.equivalent} for c in seen.causes}
+@pytest.fixture
+def named(is_short):
+    """The diagnosis of a machine's recording, and by each cause that it names the names that stand for it."""
+
+    def made(machine, seconds=1.0):
+        seen = diagnose([recorded(machine, seconds, count=FEW if is_short else len(SEGMENTS))])
+        return seen, {c.name: {c.name, *c.equivalent} for c in seen.causes}
+
+    return made
 
 
 def long(*values):
@@ -24,7 +30,7 @@ def long(*values):
 
 
 @pytest.mark.parametrize("tones_hz", [TONES_HZ, long((25.0,)), (0.5,)])
-def test_a_machine_without_a_fault_has_none(tones_hz):
+def test_a_machine_without_a_fault_has_none(named, tones_hz):
     """A single slow tone's reactance is the magnetizing inductance for the most part: the leakage lies far below it."""
     seen, names = named(Machine(tones_hz=tones_hz))
     assert seen.verdict.value == "nothing_significant" and not names
@@ -47,7 +53,7 @@ def test_a_machine_without_a_fault_has_none(tones_hz):
         long({"end_a": 6.0}, "clipping", "limit_a", 6.0),
     ],
 )
-def test_one_fault_is_named_with_its_size_and_nothing_else_is(about, name, symbol, size):
+def test_one_fault_is_named_with_its_size_and_nothing_else_is(named, about, name, symbol, size):
     seen, names = named(Machine(**about))
     assert len(names) == 1 and any(class_of(name) & found for found in names.values()), (seen.reason, names)
     assert seen.left.sigma < 0.1
@@ -72,13 +78,13 @@ def test_a_gain_error_before_the_computed_third_current_is_named_and_no_noise_is
     assert held.noise_a is None and held.rmse_after_a == seen.held_out.rmse_after_a and held.share == pytest.approx(1.0)
 
 
-def test_a_recording_without_any_noise_has_what_is_in_it():
+def test_a_recording_without_any_noise_has_what_is_in_it(named):
     """A law's form is matched to some parts in 1e5 of the peak: what that leaves is no unknown cause."""
     seen, names = named(Machine(leg_v=3.0, noise=0.0))
     assert names == {"dead_time": {"dead_time", "device_drop"}} and seen.left.sigma < 0.5
 
 
-def test_a_rest_before_every_command_hides_nothing():
+def test_a_rest_before_every_command_hides_nothing(named):
     """What is explored first is a second of every segment: of its command, whatever was waited for before."""
     seen, names = named(Machine(sag=0.15, rest_s=1.5), 2.0)
     assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
@@ -86,14 +92,14 @@ def test_a_rest_before_every_command_hides_nothing():
 
 
 @pytest.mark.parametrize("diffusion_s", [6e-3, long(1.5e-3), long(2e-2)])
-def test_a_solid_bar_is_never_called_iron_loss_alone(diffusion_s):
+def test_a_solid_bar_is_never_called_iron_loss_alone(named, diffusion_s):
     """Its layers lie between the paths of the dictionary: judged on the first ones, iron loss had won by thousandths."""
     seen, names = named(Machine(bar_s=diffusion_s))
     assert len(names) == 1 and any("rotor_skin_effect" in found for found in names.values()), (seen.reason, names)
     assert seen.left.sigma < 0.1
 
 
-def test_flux_left_before_every_segment_has_its_size_where_none_is_carried_over():
+def test_flux_left_before_every_segment_has_its_size_where_none_is_carried_over(named):
     """Every segment's own flux and what it inherits from the one before stand for one another: the fewest numbers that do are kept."""
     seen, names = named(Machine(left_wb=0.02 + 0.008j))
     assert set(names) == {"remanence"}
@@ -104,7 +110,7 @@ def test_flux_left_before_every_segment_has_its_size_where_none_is_carried_over(
 @pytest.mark.parametrize(
     ("lag_s", "again_s"), [(2e-3, 0.0), long(5e-3, 0.0), long(2e-2, 0.0), (5e-3, 2.5e-3), long(1e-2, 1e-2)]
 )
-def test_a_sagging_link_has_its_size_whatever_its_lags(lag_s, again_s):
+def test_a_sagging_link_has_its_size_whatever_its_lags(named, lag_s, again_s):
     """Lags between those of the dictionary: the sum of several had been up to 19 % off. Two lags one behind the other are a
 
     difference of two: from sums alone 0.2 of the noise was left, and five other causes were named in turn.
@@ -115,14 +121,14 @@ def test_a_sagging_link_has_its_size_whatever_its_lags(lag_s, again_s):
 
 
 @pytest.mark.parametrize(("sag", "lag_s"), [(0.4, 5e-4), long(0.4, 1e-3), long(0.1, 3e-4)])
-def test_a_small_capacitor_behind_diodes_holds_what_is_given_back(sag, lag_s):
+def test_a_small_capacitor_behind_diodes_holds_what_is_given_back(named, sag, lag_s):
     """As a link that sags in proportion to power, 0.8 of the noise was left and nothing named."""
     seen, names = named(Machine(sag=sag, sag_s=lag_s, has_diodes=True), 1.5)
     assert set(names) == {"dc_link_sag"} and seen.left.sigma < 0.1
     assert seen.causes[0].sizes["sag_at_rated_power"][0] == pytest.approx(sag, rel=0.03)
 
 
-def test_a_link_that_something_else_moves_is_named_where_it_was_recorded():
+def test_a_link_that_something_else_moves_is_named_where_it_was_recorded(named):
     """Without its trace the error has no name; with it the trace says how much of it reaches the motor."""
     about = {"ripple": 0.01, "ripple_hz": 7.3}
     seen, names = named(Machine(**about))
@@ -133,7 +139,7 @@ def test_a_link_that_something_else_moves_is_named_where_it_was_recorded():
 
 
 @pytest.mark.campaign
-def test_a_recorded_link_that_sags_and_ripples_is_two_causes_with_their_sizes():
+def test_a_recorded_link_that_sags_and_ripples_is_two_causes_with_their_sizes(named):
     _, names = named(Machine(sag=0.3, sag_s=5e-3, has_diodes=True, ripple=0.006, records_link=True))
     assert set(names) == {"dc_link_sag", "dc_link_ripple"}
 
@@ -141,7 +147,7 @@ def test_a_recorded_link_that_sags_and_ripples_is_two_causes_with_their_sizes():
 @pytest.mark.parametrize(
     ("about", "wanted"), [({}, set()), long({"iron_ohm": 900.0}, {"iron_loss"}), ({"lag_s": 1.2e-4}, {"sensor_lag"})]
 )
-def test_a_sweep_shows_linear_causes_as_tones_do(about, wanted):
+def test_a_sweep_shows_linear_causes_as_tones_do(named, about, wanted):
     """It had been audited as a single tone, which bars them."""
     _, names = named(Machine(sweeps=True, **about), 3.0)
     assert set(names) == wanted or (
@@ -150,7 +156,7 @@ def test_a_sweep_shows_linear_causes_as_tones_do(about, wanted):
 
 
 @pytest.mark.campaign
-def test_an_offset_is_named_beside_a_remanence_thirty_times_larger():
+def test_an_offset_is_named_beside_a_remanence_thirty_times_larger(named):
     """The flux decays and the offset stays; 1e-2 of the larger cause's gain had to be beaten."""
     seen, names = named(Machine(left_wb=0.06 + 0.02j, offsets_a=(2e-3, -1e-3, 0.0)), 3.0)
     assert set(names) == {"remanence", "sensor_offset"} and seen.left.sigma < 0.1
@@ -159,7 +165,7 @@ def test_an_offset_is_named_beside_a_remanence_thirty_times_larger():
 
 
 @pytest.mark.parametrize("foot", [0.25, long(0.1)])
-def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(foot):
+def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(named, foot):
     """On twice the knots the foot of the curve was cut off: hysteresis and a sagging link were named beside it, 0.82 and 0.76 sure. Where
 
     it could not reach beyond 0.4 of the flux, hysteresis was, 0.97 sure.
@@ -169,7 +175,7 @@ def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(foot)
 
 
 @pytest.mark.parametrize("meet_wb", [0.6, long(3.0)])
-def test_iron_whose_loops_meet_in_saturation_is_hysteresis_alone(meet_wb):
+def test_iron_whose_loops_meet_in_saturation_is_hysteresis_alone(named, meet_wb):
     """Where loops could only widen with flux, such iron left 0.1 of the noise, and a sag and a saturation were likely beside it."""
     seen, names = named(Machine(loop_a=0.1, meet_wb=meet_wb), 2.0)
     assert set(names) == {"magnetic_hysteresis"} and seen.left.sigma < 0.05
@@ -177,7 +183,7 @@ def test_iron_whose_loops_meet_in_saturation_is_hysteresis_alone(meet_wb):
 
 
 @pytest.mark.parametrize("loop_a", [0.3, long(0.1)])
-def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(loop_a):
+def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(named, loop_a):
     """Where every segment had to begin demagnetized, a moving shaft, a drift and both anisotropies stood in for the flux that the loops
 
     keep, 0.15 of the noise was left and the loops were 27 % too wide.
@@ -189,7 +195,7 @@ def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(loop_a):
 
 
 @pytest.mark.parametrize("legs", [(0.97, 1.08, 0.95), (1.6, 0.4, 1.0), long((1.4, -0.3, 0.8))])
-def test_legs_that_differ_are_told_apart(legs):
+def test_legs_that_differ_are_told_apart(named, legs):
     """Where all three had to be alike, legs 8 % apart were an error without a name; where they might differ by 40 %, what lay beyond was
 
     unequal phases, a shaft, a sag and a bent sensor, up to 0.99 sure.
@@ -202,19 +208,19 @@ def test_legs_that_differ_are_told_apart(legs):
 
 
 @pytest.mark.parametrize("late_s", [2e-5, long(5e-6)])
-def test_a_current_that_is_read_late_is_not_sure_to_be_iron_loss_and_never_a_cable(late_s):
+def test_a_current_that_is_read_late_is_not_sure_to_be_iron_loss_and_never_a_cable(named, late_s):
     """It has taken late_s / L_sigma of the new voltage: a conductance, and a capacitance of that times the period."""
     _, names = named(Machine(read_late_s=late_s), 1.5)
     assert len(names) == 1 and any("sampling_delay" in found for found in names.values()), names
 
 
-def test_legs_that_are_alike_are_not_said_to_differ():
+def test_legs_that_are_alike_are_not_said_to_differ(named):
     seen, _ = named(Machine(leg_v=4.0))
     assert not {"unequal_v", "unequal_w"} & set(seen.causes[0].sizes)
 
 
 @pytest.mark.parametrize(("hz", "tones_hz"), [(300.0, (0.5, 2.0, 7.5, 29.5, 101.5, 329.5)), long(100.0, TONES_HZ)])
-def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(hz, tones_hz):
+def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(named, hz, tones_hz):
     """300 - 29.5 and 329.5 - 300 Hz: what starts leave at the tones, times one another, stood out more at 100 Hz."""
     seen, names = named(Machine(ripple=0.006, ripple_hz=hz, tones_hz=tones_hz), 3.0)
     assert set(names) == {"dc_link_ripple"}
@@ -222,7 +228,7 @@ def test_a_ripple_is_found_at_its_frequency_where_its_side_lines_meet_the_tones(
 
 
 @pytest.mark.parametrize(("hz", "rad_per_s"), [long(0.0, 0.5), long(0.7, 0.5), long(1.7, 0.5), (2.4, 1.5)])
-def test_a_shaft_that_swings_has_its_speed(hz, rad_per_s):
+def test_a_shaft_that_swings_has_its_speed(named, hz, rad_per_s):
     """At 1.7 Hz splines on a knot every 0.4 s cannot follow, nor those on one every 0.16 s at 2.4, and the speed is no steady one's equal.
 
     Speeds that the first part of a test ended with, at anything, had led the whole astray: 3.4 times the noise, without a name.
@@ -234,7 +240,7 @@ def test_a_shaft_that_swings_has_its_speed(hz, rad_per_s):
 
 
 @pytest.mark.campaign
-def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
+def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents(named):
     machine = Machine(bar_s=2e-2)
     seen, names = named(machine, 3.0)
     # inverse-Gamma form of the T circuit (G. R. Slemon, IEEE Trans. Ind. Appl. 25(6), 1989)
@@ -245,7 +251,7 @@ def test_beside_a_solid_bar_the_rotor_resistance_is_that_of_slow_currents():
 
 
 @pytest.mark.campaign
-def test_a_cause_is_seen_from_about_its_stated_limit_on():
+def test_a_cause_is_seen_from_about_its_stated_limit_on(named):
     limits = detection_limits(named(Machine(), 1.5)[0].found)
     offset_a, gain = (
         limits[n][key]["value"]
@@ -266,7 +272,7 @@ def test_a_size_errs_by_as_much_as_its_spread_says():
 
 
 @pytest.mark.campaign
-def test_saturation_a_lag_and_offsets_are_told_apart():
+def test_saturation_a_lag_and_offsets_are_told_apart(named):
     seen, names = named(Machine(knee_wb=0.75, lag_s=6e-5, offsets_a=(0.02, -0.01, 0.0)))
     assert set(names) == {"magnetizing_saturation", "sensor_lag", "sensor_offset"}
     sizes = {c.name: c.sizes for c in seen.causes}
@@ -276,7 +282,7 @@ def test_saturation_a_lag_and_offsets_are_told_apart():
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("about", [{"lag_s": 9e-5}, {"delay_s": 9e-5}])
-def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(about):
+def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(named, about):
     """700 ohm beside the magnetizing branch look to the terminals like 8 us less delay, to a few parts in 1e5 of its trace."""
     _, names = named(Machine(iron_ohm=700.0, **about), 3.0)
     true = class_of("sensor_lag") | class_of("iron_loss")
@@ -284,8 +290,8 @@ def test_iron_loss_beside_a_delay_brings_no_cause_that_is_not_there(about):
 
 
 @pytest.mark.parametrize(("step", "wanted"), [(2.3e-3, {"quantization"}), (1.4e-3, set())])
-def test_steps_coarser_than_those_of_twelve_bits_are_named(step, wanted):
-    seen = recorded(Machine(noise=3e-4), 1.5)
+def test_steps_coarser_than_those_of_twelve_bits_are_named(named, step, wanted):
+    seen = recorded(Machine(noise=3e-4), 1.5, count=FEW)
     u, v, w = (
         step * PEAK_A * np.round(i / (step * PEAK_A)) for i in (seen.current_u_a, seen.current_v_a, seen.current_w_a)
     )

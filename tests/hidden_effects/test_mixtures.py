@@ -12,7 +12,7 @@ from tests.hidden_effects.sizes import size_error
 @pytest.mark.parametrize("noise", NULL_NOISES)
 @pytest.mark.parametrize("excitation", ["rich", "poor"])
 def test_nothing_is_found_where_nothing_is_hidden(noise, excitation):
-    seen, scenario = diagnosed(Case("null", 50, "", excitation, noise))
+    seen, scenario = diagnosed(Case("null", 50, "", excitation, noise), is_short=excitation == "rich")
     assert hidden_names(scenario) == set()
     assert seen.causes == (), seen.reason
     assert seen.verdict.value == "nothing_significant"
@@ -21,8 +21,8 @@ def test_nothing_is_found_where_nothing_is_hidden(noise, excitation):
 @pytest.mark.parametrize(
     "seed", [50, 52, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (51, 53, 54, 55))]
 )
-def test_two_causes_are_both_named_and_nothing_else_is(seed):
-    seen, scenario = diagnosed(Case("two", seed, noise="white"))
+def test_two_causes_are_both_named_and_nothing_else_is(seed, is_short):
+    seen, scenario = diagnosed(Case("two", seed, noise="white"), is_short=is_short)
     hidden = hidden_names(scenario)
     named = [{c.name, *c.equivalent} for c in seen.causes]
     assert all(any(class_of(name) & names for names in named) for name in hidden), (hidden, named)
@@ -121,13 +121,13 @@ def test_no_cause_gains_more_than_all_together():
     assert seen.verdict.value == "unexplained" and not seen.causes
 
 
-def test_a_forbidden_cause_is_not_replaced_by_a_wrong_name_that_explains_everything():
+def test_a_forbidden_cause_is_not_replaced_by_a_wrong_name_that_explains_everything(is_short):
     case = Case("absent", 61, "sensor_gain_mismatch", noise="white", excluded=("sensor_gain_mismatch",))
-    assert diagnosed(case)[0].verdict.value == "unexplained"
+    assert diagnosed(case, is_short=is_short)[0].verdict.value == "unexplained"
 
 
-def test_a_loss_of_leg_voltage_is_a_tie_with_the_experiment_that_splits_it():
-    seen, _ = diagnosed(Case("one", 70, "device_drop", noise="white"))
+def test_a_loss_of_leg_voltage_is_a_tie_with_the_experiment_that_splits_it(is_short):
+    seen, _ = diagnosed(Case("one", 70, "device_drop", noise="white"), is_short=is_short)
     assert seen.verdict.value == "not_distinguishable"
     assert {"dead_time", "device_drop"} == {seen.causes[0].name, *seen.causes[0].equivalent}
     assert "switching frequency" in seen.next_experiment["do"] and seen.next_experiment["predicted_sigma"] >= 10.0

@@ -26,6 +26,8 @@ SEGMENTS = (
     (0.0, 1.0, 0.0), (60.0, 1.8, 0.0),
 )  # fmt: skip
 """Axis in degrees, level of the tones, bias as a share of the rated peak current."""
+FEW = 5
+"""Of these show whatever a single cause does: each axis, a second level and a bias."""
 TONES_HZ = (0.67, 3.0, 11.0, 42.0, 123.0, 327.0)
 LAYERS = ((np.arange(8) + 0.5) * np.pi) ** 2
 """Poles of tanh(x) / x, over the time of diffusion: r_r times the bar's admittance is the sum of 2 / (pole + s bar_s); what lies
@@ -131,12 +133,12 @@ def command(machine: Machine, level: float, bias: float, seconds: float, seed: i
     return np.concatenate([np.zeros(round(machine.rest_s / PERIOD_S)), out * np.clip(t / 0.1, 0.0, 1.0)])
 
 
-def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1) -> StandstillRecording:
-    """All segments one after the other, the machine at rest before each, and without flux but for what its iron keeps."""
+def recorded(machine: Machine, seconds: float = 3.0, seed: int = 1, count: int = len(SEGMENTS)) -> StandstillRecording:
+    """The first `count` segments one after the other, the machine at rest before each, and without flux but for what its iron keeps."""
     random = np.random.default_rng([seed, 7])
     times, numbers, axes, volts, currents, links = [], [], [], [], [], []
     begin, kept, plays = 0.0, 0j, np.zeros(60, dtype=np.complex128)
-    for k, (axis, level, bias) in enumerate(SEGMENTS):
+    for k, (axis, level, bias) in enumerate(SEGMENTS[:count]):
         volt = command(machine, level, bias, seconds, seed + (k if k < 6 else 0))
         along = cmath.exp(1j * math.radians(axis))
         left = complex(machine.left_wb) + kept
