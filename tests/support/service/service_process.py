@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -69,8 +70,9 @@ class ServiceProcess:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.communicate()
-        for pid in self._simulators():
-            os.kill(pid, signal.SIGKILL)
+        for pid in self._children("sim"):
+            with suppress(ProcessLookupError):  # it was ending by itself
+                os.kill(pid, signal.SIGKILL)
 
     def page(self, path: str) -> str:
         """A page as a browser gets it that was never here before; the scripts' client stays without a session."""
@@ -163,6 +165,3 @@ class ServiceProcess:
                 if word in command and str(self.folder) in command:
                     found.append(int(entry.name))
         return found
-
-    def _simulators(self) -> list[int]:
-        return self._children("sim")
