@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,15 +18,16 @@ def stator_inductance_h(plant: Plant, flux_wb: float, kind: str = "secant") -> f
     `secant` psi/i, `incremental` d psi/d i, `sine` = what a sinusoidal flux of this amplitude shows at its own
     frequency (first harmonic of the magnetizing current).
     """
+    current_a = _magnetizing(plant)
     if kind == "secant":
-        return flux_wb / _magnetizing_current(plant, flux_wb) if flux_wb > 0 else _small_signal(plant)
+        return flux_wb / current_a(flux_wb) if flux_wb > 0 else _small_signal(plant)
     if kind == "incremental":
         d = 1e-6
-        return 2 * d / (_magnetizing_current(plant, flux_wb + d) - _magnetizing_current(plant, flux_wb - d))
+        return 2 * d / (current_a(flux_wb + d) - current_a(flux_wb - d))
     if kind != "sine":
         raise ValueError(f"kind is secant, incremental or sine, not {kind!r}")
     turn = (np.arange(2000) + 0.5) * math.pi / 2000
-    current = np.array([_magnetizing_current(plant, flux_wb * math.cos(a)) for a in turn])
+    current = np.array([current_a(flux_wb * math.cos(a)) for a in turn])
     return flux_wb / (2.0 * float(np.mean(current * np.cos(turn)))) if flux_wb > 0 else _small_signal(plant)
 
 
@@ -33,13 +35,16 @@ def _small_signal(plant: Plant) -> float:
     return stator_inductance_h(plant, 1e-6)
 
 
-def _magnetizing_current(plant: Plant, flux_wb: float) -> float:
-    m = saturated(plant)
-    y = (flux_wb / plant.nameplate.rated_flux_wb) ** 2
-    excess = saturation_excess(
-        y, m.saturation_at_rated_flux, m.saturation_order, float(SATURATION_SHAPES.index(m.saturation_shape))
-    )
-    return flux_wb / m.inductance_h * (1.0 + excess)
+def _magnetizing(plant: Plant) -> Callable[[float], float]:
+    """The current over the flux."""
+    m, rated_wb = saturated(plant), plant.nameplate.rated_flux_wb
+    strength, order, shape = m.saturation_at_rated_flux, m.saturation_order, SATURATION_SHAPES.index(m.saturation_shape)
+
+    def current_a(flux_wb: float) -> float:
+        excess = saturation_excess((flux_wb / rated_wb) ** 2, strength, order, float(shape))
+        return flux_wb / m.inductance_h * (1.0 + excess)
+
+    return current_a
 
 
 def saturated(plant: Plant) -> Machine:
