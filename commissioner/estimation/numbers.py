@@ -12,7 +12,7 @@ NAMES = (
     "stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance",
     "stator_saturation_1", "stator_saturation_2", "stator_saturation_3",
     "rotor_saturation_1", "rotor_saturation_2", "rotor_saturation_3",
-    "leakage_softness", "leakage_bend", "leakage_knee", "bar_resistance", "bar_corner", "iron_conductance", "stator_heat", "rotor_heat",
+    "leakage_softness", "rotor_leakage_softness", "leakage_bend", "leakage_knee", "bar_resistance", "bar_corner", "iron_conductance", "stator_heat", "rotor_heat",
     "cage_asymmetry_re", "cage_asymmetry_im",
     "loop_conductance_u", "loop_susceptance_u", "loop_conductance_v", "loop_susceptance_v", "loop_conductance_w", "loop_susceptance_w",
     "line_re", "line_im", "dead_voltage", "dead_knee", "voltage_gain_re", "voltage_gain_im", "voltage_offset_re", "voltage_offset_im",
@@ -30,8 +30,8 @@ LOGARITHMIC = frozenset(
         "dead_knee", "inertia",
     )
 )  # fmt: skip
-DEFAULTS = {"leakage_knee": 2.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
-"""Leakage flux of so many times rated current; corner of the bars in rad/s; of rated peak current; kg m^2."""
+DEFAULTS = {"leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
+"""Leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s; of rated peak current; kg m^2."""
 
 
 @dataclass(frozen=True)

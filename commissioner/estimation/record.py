@@ -17,6 +17,8 @@ from commissioner.records import RunningRecording
 
 Array = NDArray[np.float64]
 STATES = ("off", "start", "steady", "transient", "coasting")
+STEADY_SHARE = 0.95
+"""Of the samples: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 """What a stretch of 20 ms is: no voltage and no current; speeding up; nothing changes; a load step or a ramp; current without voltage."""
 BLOCK_S = 0.02
 OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
@@ -71,6 +73,11 @@ class Record:
     def has_start(self) -> bool:
         """Whether a window begins at rest."""
         return any(w.is_from_rest for w in self.windows)
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether there is one window, and hardly anything moves in it."""
+        return len(self.windows) == 1 and bool(np.mean(self.windows[0].state == STATES.index("steady")) > STEADY_SHARE)
 
 
 def scales_of(plate: Nameplate) -> Scales:

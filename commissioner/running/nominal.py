@@ -60,7 +60,7 @@ def weighted(problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
 
 
 def with_speed(problem: Problem) -> Fit:
-    """The measured speed is an input; the encoder's ripple at shaft frequency is always free."""
+    """The measured speed is an input; the encoder's ripple at shaft frequency is free once the four are near: from far off it ran away."""
     record = problem.record
     numbers = (*FOUR, "speed_ripple_cos", "speed_ripple_sin")
     typical = np.array(prior(record.plate).typical.as_tuple())
@@ -68,7 +68,7 @@ def with_speed(problem: Problem) -> Fit:
     for factors in STARTS:
         machine = plain_machine((typical * factors).tolist(), record)
         for seconds in (0.1, 0.4):
-            machine = _settled(problem.cut(seconds), machine, numbers)
+            machine = _settled(problem.cut(seconds), machine, FOUR)
         fit = refine(problem, machine, columns_of(numbers, record, machine), most=25)
         best = fit if best is None or fit.chi2 < best.chi2 else best
         if best.chi2 < WRONG_VALLEY * best.count:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.estimation.fit import Machine, Problem, problem_of, simulate
+from commissioner.estimation.fit import Machine, Problem, columns_of, plain_machine, problem_of, refine, simulate
 from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record, Window, between, prepare
 from commissioner.motor.nameplate import Nameplate
@@ -17,6 +17,7 @@ from commissioner.records import RunningRecording
 
 Array = NDArray[np.float64]
 SECONDS = 3.0
+RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
 
 
 def play(
@@ -27,16 +28,7 @@ def play(
     if like is None:
         machine, problem = _on_mains(machine, scales, plate, period_s, scenario)
     else:
-        problem = problem_of(prepare([like], plate), 0.0)
-        windows = len(problem.record.windows)
-        first, none = np.zeros((windows, machine.first.shape[1])), np.zeros((windows, 2))
-        machine = replace(
-            machine,
-            first=first,
-            knots=none,
-            knot_times_s=np.tile([0.0, 1e3], (windows, 1)),
-            has_shaft=not problem.record.has_speed,
-        )
+        machine, problem = _beside(machine, like, plate)
     window = problem.record.windows[0]
     run, shaft = simulate(problem, machine)[0]
     current = np.array(
@@ -49,6 +41,23 @@ def play(
     columns |= {f"current_{p}_a": current[k] for k, p in enumerate("uvw")}
     columns |= {f"voltage_{p}_v": volts[k] for k, p in enumerate("uvw")}
     return columns | {"speed_rad_per_s": shaft[:, 0] / plate.pole_pairs}
+
+
+def _beside(machine: Machine, like: RunningRecording, plate: Nameplate) -> tuple[Machine, Problem]:
+    """On the recording's first window, with what is its own and not the motor's fitted to its currents: fluxes (and a speed that is not
+    measured) at its first sample, which comes up to a sample after the contactor closed, and the encoder's ripple."""
+    record = prepare([like], plate)
+    record = replace(record, windows=record.windows[:1])
+    problem, began = problem_of(record, 0.0), plain_machine(machine.physical()[:4].tolist(), record)
+    machine = replace(
+        machine,
+        first=began.first,
+        knots=began.knots,
+        knot_times_s=np.array([[0.0, 1e3]]),
+        has_shaft=not record.has_speed,
+    )
+    columns = columns_of(RIPPLE if record.has_speed else (), record, machine)
+    return refine(problem, machine, columns, is_final=False).machine, problem
 
 
 def _on_mains(

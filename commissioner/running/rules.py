@@ -14,7 +14,7 @@ class Rules:
     each_further_number: float = 10.0
     """And so much more for every further number of its form."""
     least_share: float = 0.01
-    """Of the first cause's gain; less is what the first one's law leaves."""
+    """Of what all accepted causes gained; less is what their laws, simpler than nature's, leave."""
     hold_out_loss: float = 9.0
     """Chi-square by which the held-out part may get worse (and a hundredth of the gain)."""
     tie: float = 10.0
@@ -28,6 +28,9 @@ class Rules:
     most_causes: int = 6
     material_sigma: float = 0.03
     """Strength over noise below which a cause is not named."""
+    material_steady_sigma: float = 0.2
+    """The same where nothing but one steady load was recorded: all that is without a shape of its own there stands near the voltage's noise.
+    Of 20 such cases five false names were weaker, and of the true ones only those below what counts for recall."""
 
 
 RULES = Rules()

@@ -202,9 +202,8 @@ def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit,
         other = seeking.fitted(fit.machine, (*accepted, one), first=first)
         tried.append((fit.chi2 - other.chi2, one, other))
     tried.sort(key=lambda item: -item[0])
-    first_gain = max(seeking.base.chi2 - fit.chi2, 0.0)
     for gain, one, other in tried:
-        why = _refusal(seeking, fit, other, (*accepted, one), gain, first_gain)
+        why = _refusal(seeking, fit, other, (*accepted, one), gain)
         if not why:
             seeking.say(Step("accepted", one.cause, one.form.name, gain / other.scale))
             return refreshed(seeking.problem, other), (*accepted, one)
@@ -212,14 +211,15 @@ def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit,
     return None
 
 
-def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gain: float, first_gain: float) -> str:
+def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:
     """Why the last of these causes is not taken in; empty where it is."""
     rules = seeking.rules
+    is_steady = seeking.problem.record.is_steady
     if gain / other.scale < _needed(seeking, causes[-1]):
         return "gains too little"
-    if gain < rules.least_share * first_gain:
-        return "gains less than what the first cause's law leaves"
-    if np.sqrt(gain / fit.count) < rules.material_sigma:
+    if gain < rules.least_share * max(seeking.base.chi2 - fit.chi2, 0.0):
+        return "gains less than what the laws of the accepted causes leave"
+    if np.sqrt(gain / fit.count) < (rules.material_steady_sigma if is_steady else rules.material_sigma):
         return "too small to matter"
     if not seeking.is_plausible(other, causes):
         return "its size is one that physics does not allow"

@@ -7,19 +7,16 @@ from tests.hidden_effects.blind import SECONDS, diagnosed, hidden_names
 from tests.hidden_effects.cases import Case, class_of
 
 SEED = 40
-SEEN_FROM = {
-    "dc_link_sag": (58, SECONDS),
-    "leakage_saturation": (44, SECONDS),
-    "rotor_heating": (122, SECONDS),
-    "stator_heating": (122, 3.0),
-}
-"""Seed and seconds of a segment where seed 40 draws less than a tenth of the noise, or too little for half of the segments."""
+SEEN_FROM = {"dc_link_sag": (58, SECONDS), "rotor_heating": (122, SECONDS), "stator_heating": (122, 3.0)}
+"""Seed and seconds of a segment where seed 40 draws less than a tenth of the noise."""
+WHOLE = ("leakage_saturation",)
+"""Needs all segments."""
 
 
 @pytest.mark.parametrize("name", sorted(CATALOGUE))
 def test_a_single_cause_is_named_in_its_class_and_nothing_else_is(name, is_short):
     seed, seconds = SEEN_FROM.get(name, (SEED, SECONDS))
-    seen, scenario = diagnosed(Case("one", seed, name, noise="white"), seconds, is_short=is_short)
+    seen, scenario = diagnosed(Case("one", seed, name, noise="white"), seconds, is_short=is_short and name not in WHOLE)
     assert hidden_names(scenario) == {name}
     assert seen.causes, seen.reason
     for cause in seen.causes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,25 @@ class Case:
 
     def scenario(self) -> Scenario:
         return draw(self.seed, self.stratum, self.course, self.only, self.has_speed)
+
+
+def elsewhere(scenario: Scenario) -> Scenario:
+    """The same motor started or ramped up with other loads, closed at another angle, seen by sensors that have no noise."""
+    first, *others = scenario.course.steps
+    steps = ((first[0], 1.7 * first[1]), *((t, 0.4 * torque) for t, torque in others))
+    return replace(
+        scenario,
+        course=replace(scenario.course, constant_nm=2.0 * scenario.course.constant_nm, steps=steps),
+        supply=replace(scenario.supply, phase_rad=scenario.supply.phase_rad + 1.0),
+        sensors=replace(
+            scenario.sensors,
+            current_noise_a=0.0,
+            voltage_noise_v=0.0,
+            speed_noise_rad_per_s=0.0,
+            speed_ripple_rad_per_s=0.0,
+            has_speed=True,
+        ),
+    )
 
 
 def taken(scenario: Scenario, seed: int) -> tuple[RunningRecording, Nameplate, dict[str, Any]]:

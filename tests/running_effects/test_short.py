@@ -6,7 +6,7 @@ import pytest
 from commissioner.running.diagnosis import Verdict, diagnose
 from commissioner.running.identification import identify
 from tests.running_effects.cases import Case, taken, true_size
-from tests.running_effects.protocol import failures, false_names, run, table
+from tests.running_effects.protocol import failures, false_names, gain_elsewhere, run, table
 
 NAMED = {
     "magnetizing_saturation": 0.15, "rotor_skin_effect": 0.4, "iron_loss": 0.05, "rotor_asymmetry": 0.05, "stator_asymmetry": 0.05,
@@ -53,6 +53,18 @@ def test_one_cause_is_named_with_its_size_and_nothing_else_is(name):
         "voltage_gain_mismatch",
     ):
         assert effect["phase"] in next(iter(seen.causes[0].sizes)).split("_")
+    assert gain_elsewhere(seen, scenario, case) > 0.95
+
+
+def test_leakage_that_saturates_on_the_rotors_side_is_taken_for_nothing_else():
+    """By the stator's law the first cycles of a start were left over, and bars or heat were named for them."""
+    case = Case(7002, "one", only="leakage_saturation")
+    scenario = case.scenario()
+    recording, plate, _ = taken(scenario, case.seed)
+    seen = diagnose([recording], plate)
+    assert [(c.name, c.form) for c in seen.causes] == [("leakage_saturation", "rotor")], seen.reason
+    assert seen.verdict is Verdict.EXPLAINED
+    assert gain_elsewhere(seen, scenario, case) > 0.95
 
 
 @pytest.mark.parametrize("name", ["sensor_lag"])

@@ -29,8 +29,9 @@ R_S, R_R, L_SIGMA, L_M = (
     AT["magnetizing_inductance"],
 )
 SAT_S, SAT_R = AT["stator_saturation_1"], AT["rotor_saturation_1"]
-SOFT, BOW, KNEE, BAR, CORNER, IRON = (
+SOFT, SOFT_R, BOW, KNEE, BAR, CORNER, IRON = (
     AT["leakage_softness"],
+    AT["rotor_leakage_softness"],
     AT["leakage_bend"],
     AT["leakage_knee"],
     AT["bar_resistance"],
@@ -68,7 +69,8 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
     per_leak, per_main = 1.0 / p[L_SIGMA], 1.0 / p[L_M]
     has_s = (p[SAT_S] != 0.0) or (p[SAT_S + 1] != 0.0) or (p[SAT_S + 2] != 0.0)
     has_r = (p[SAT_R] != 0.0) or (p[SAT_R + 1] != 0.0) or (p[SAT_R + 2] != 0.0)
-    has_soft, has_bar, has_heat = p[SOFT] != 0.0, p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
+    has_soft, has_soft_r = p[SOFT] != 0.0, p[SOFT_R] != 0.0
+    has_bar, has_heat = p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
     has_cage = (p[CAGE] != 0.0) or (p[CAGE + 1] != 0.0)
     has_loop = False
     for j in range(6):
@@ -76,6 +78,7 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
     has_line = (p[LINE] != 0.0) or (p[LINE + 1] != 0.0)
     has_dead = p[DEAD] != 0.0
     has_ripple = (p[W_RIPPLE] != 0.0) or (p[W_RIPPLE + 1] != 0.0)
+    rotor_side = 1.0 + p[L_SIGMA] / p[L_M]
     per_knee2 = 1.0 / (p[L_SIGMA] * p[KNEE] * current) ** 2
     iron = p[IRON] * current / volt
     loop_scale, hot = current / volt, 1.0 / (9.0 * current * current)
@@ -117,6 +120,13 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                 z = z / (1.0 + z)
                 grown = 1.0 + p[SOFT] * z * (1.0 + p[BOW] * z)
                 la, lb = la * grown, lb * grown
+            ea, eb = one, one
+            if has_soft_r:
+                da, db = y[0] - rotor_side * y[2], y[1] - rotor_side * y[3]
+                z = (da * da + db * db) * per_knee2
+                z = z / (1.0 + z)
+                grown = per_leak * p[SOFT_R] * z * (1.0 + p[BOW] * z)
+                ea, eb = da * grown, db * grown
             main_a, main_b = y[2] * per_main, y[3] * per_main
             if has_r:
                 z = (y[2] * y[2] + y[3] * y[3]) * flux2
@@ -124,8 +134,8 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                     z = one + MOST_FLUX
                 grown = 1.0 + z * (p[SAT_R] + z * (p[SAT_R + 1] + z * p[SAT_R + 2]))
                 main_a, main_b = main_a * grown, main_b * grown
-            ra, rb = main_a - la, main_b - lb
-            ia, ib = la, lb
+            ra, rb = main_a - la - rotor_side * ea, main_b - lb - rotor_side * eb
+            ia, ib = la + ea, lb + eb
             if has_s:
                 z = (y[0] * y[0] + y[1] * y[1]) * flux2
                 if z.real > MOST_FLUX:
@@ -158,7 +168,7 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
             if stage == 0:
                 out[q, 0], out[q, 1] = ia, ib
                 shaft[q, 0] = w
-                shaft[q, 1] = 1.5 * pairs * (y[2] * lb - y[3] * la)
+                shaft[q, 1] = 1.5 * pairs * (y[3] * ra - y[2] * rb)
             # slopes
             k[stage, 0], k[stage, 1] = ua - r_s * ia, ub - r_s * ib
             r_r = p[R_R] * (1.0 + p[HEAT_R] * y[7])
@@ -180,7 +190,7 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
             else:
                 k[stage, 6], k[stage, 7] = one, one
             if is_free:
-                torque = 1.5 * pairs * (y[2] * lb - y[3] * la)
+                torque = 1.5 * pairs * (y[3] * ra - y[2] * rb)
                 share = w / w_n
                 low = min(int(places[m]), knots.shape[0] - 2)
                 part = places[m] - low

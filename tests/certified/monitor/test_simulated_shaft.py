@@ -140,11 +140,11 @@ def test_unknown_inertia_gives_no_load_torque() -> None:
 
 
 def test_leaks_are_seen_monotonically_and_the_smallest_five_sigma_away() -> None:
-    table = leak_table(3, 12.0)
+    table = leak_table(4, 20.0)
     means = [table[leak].mean() for leak in LEAKS_MM2]
     assert means == sorted(means)
     healthy, smallest = table[0.0], table[LEAKS_MM2[1]]
-    # three values each know their spread to 50 %: the pooled one of all four groups is used
+    # four values each know their spread to 40 %: the pooled one of all four groups is used
     spread = np.sqrt(np.mean([values.var(ddof=1) for values in table.values()]))
     assert smallest.mean() - healthy.mean() > 5 * spread * np.sqrt(2)
 
