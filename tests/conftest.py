@@ -29,7 +29,7 @@ REALTIME = (
     "sim/test_faults.py",
     "sim/test_server.py",
 )
-"""Judged by answers, time-outs and watchdogs of 10 to 250 ms of wall time: nothing heavy may run beside them but what yields at once. Whole runs
+"""Judged by answers, time-outs and watchdogs of 10 to 250 ms of wall time: nothing heavy may run beside them. Whole runs
 of the service against `sim --speed max` are not: the reader paces them, and they allow 250 ms for what takes one. Nor are
 defects that a rule must catch: what comes late fails it all the more. `NOT_REALTIME` are the tests of these files that
 no clock judges."""
@@ -58,6 +58,8 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
+TOGETHER = ("integration/service",)
+"""Folders whose tests share a costly fixture of a whole session: one worker has them all."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
@@ -104,15 +106,14 @@ def _costliest_first(items: list[pytest.Item]) -> None:
 
 
 def _shared(item: pytest.Item) -> str | None:
-    """The file whose tests belong together: they share a fixture of the module or of the folder, or what a function keeps."""
-    file = item.path.relative_to(TESTS)
-    rooms = {file.as_posix(), *(folder.as_posix() for folder in file.parents)}
+    """What the tests that belong together are called: their folder, or their file where they share a fixture of the module
+    or what a function keeps."""
+    for folder in TOGETHER:
+        if item.path.is_relative_to(TESTS / folder):
+            return folder
+    file = item.path.relative_to(TESTS).as_posix()
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
-    if any(
-        fixture.scope in ("module", "session") and fixture.baseid.removeprefix("tests/") in rooms
-        for made in fixtures
-        for fixture in made
-    ):
-        return file.as_posix()
+    if any(fixture.scope == "module" and fixture.baseid.endswith(file) for made in fixtures for fixture in made):
+        return file
     kept = (value for value in vars(getattr(item, "module", None) or object).values() if hasattr(value, "cache_info"))
-    return file.as_posix() if any(True for _ in kept) else None
+    return file if any(True for _ in kept) else None

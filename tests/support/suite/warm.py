@@ -1,7 +1,6 @@
-"""Compile the kernels once, before several workers would each compile them: `python -m tests.support.suite.warm [PART ...]`.
+"""Compile the kernels once, before several workers would each compile them: `python -m tests.support.suite.warm`.
 
-A process for each part, side by side; what tests on a wire need is a part of its own. A kernel that only a few tests need is
-left to them.
+A process for each part, side by side. A kernel that only a few tests need is left to them.
 """
 
 from __future__ import annotations
