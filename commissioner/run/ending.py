@@ -91,7 +91,7 @@ def with_master(error: CommissionerError, inverter: Inverter) -> CommissionerErr
     except ForeignMaster as other:
         other.what += f"; before that was seen: {error.what}"
         return other
-    except CommissionerError:
+    except Exception:  # whatever breaks: the run ends by what stopped it
         return error
     return error
 

@@ -107,10 +107,10 @@ class Runner:
                 live = self._disarm(error.what if error is not None else "the run has ended")
                 if self._progress.granted is not None:  # zero volts came first
                     note(self._folder, kind_of(self._progress.granted), self._progress.granted)
-                elif error is not None and self._progress.segment >= 0:
-                    error = with_master(error, self._inverter)
         if live is not None:
             ended, error = None, still_live(live, error)
+        elif error is not None and self._progress.segment >= 0 and self._progress.granted is None:
+            error = with_master(error, self._inverter)
         if ended is None:
             assert error is not None
             ended = ended_by(error, self._folder, self.energised_s)
