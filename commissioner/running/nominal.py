@@ -87,10 +87,22 @@ def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
 
     `smooth_load`: constant and fan only, as a start from rest has them. Else knots, denser around load steps.
     """
+    typical = np.array(prior(problem.record.plate).typical.as_tuple())
+    best: Fit | None = None
+    for factors in STARTS:
+        fit = _with_shaft_from((typical * factors).tolist(), problem, smooth_load=smooth_load)
+        best = fit if best is None or fit.chi2 < best.chi2 else best
+        if best.chi2 < WRONG_VALLEY * best.count:
+            break
+    assert best is not None
+    return best
+
+
+def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) -> Fit:
     record = problem.record
     torque, w = record.scales.torque_nm, record.scales.frequency_rad_per_s / record.scales.pole_pairs
     inertia = record.plate.inertia_kg_m2 or RUN_UP_TORQUE * torque * _run_up_s(record) / w
-    machine = plain_machine(prior(record.plate).typical.as_tuple(), record, inertia=inertia, has_shaft=True)
+    machine = plain_machine(four, record, inertia=inertia, has_shaft=True)
     numbers: tuple[str, ...] = FOUR
     if record.has_start:
         numbers = (*FOUR, "inertia")
