@@ -31,7 +31,8 @@ LOGARITHMIC = frozenset(
     )
 )  # fmt: skip
 DEFAULTS = {"leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
-"""Leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s; of rated peak current; kg m^2."""
+"""Leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s;
+of rated peak current; kg m^2."""
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from commissioner.records import RunningRecording
 
 Array = NDArray[np.float64]
 STATES = ("off", "start", "steady", "transient", "coasting")
-STEADY_SHARE = 0.95
-"""Of the samples: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 """What a stretch of 20 ms is: no voltage and no current; speeding up; nothing changes; a load step or a ramp; current without voltage."""
+STEADY_SHARE = 0.95
+"""Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 BLOCK_S = 0.02
 OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from commissioner.errors import DataRefused
@@ -17,6 +19,8 @@ FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
 RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
 FOUR = NAMES[:4]
+RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
+"""Of an encoder, at the shaft's frequency."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))
 """Factors on the plate's four, tried in turn until one leaves the valley where R_s is near zero."""
 WRONG_VALLEY = 300.0
@@ -61,15 +65,22 @@ def weighted(problem: Problem, fit: Fit) -> tuple[Problem, Fit]:
 
 def with_speed(problem: Problem) -> Fit:
     """The measured speed is an input; the encoder's ripple at shaft frequency is free once the four are near: from far off it ran away."""
-    record = problem.record
-    numbers = (*FOUR, "speed_ripple_cos", "speed_ripple_sin")
-    typical = np.array(prior(record.plate).typical.as_tuple())
-    best: Fit | None = None
-    for factors in STARTS:
-        machine = plain_machine((typical * factors).tolist(), record)
+
+    def fitted(four: list[float]) -> Fit:
+        machine = plain_machine(four, problem.record)
         for seconds in (0.1, 0.4):
             machine = _settled(problem.cut(seconds), machine, FOUR)
-        fit = refine(problem, machine, columns_of(numbers, record, machine), most=25)
+        return refine(problem, machine, columns_of((*FOUR, *RIPPLE), problem.record, machine), most=25)
+
+    return _from_several_starts(problem, fitted)
+
+
+def _from_several_starts(problem: Problem, fitted: Callable[[list[float]], Fit]) -> Fit:
+    """The best fit from the plate's four and, as long as that is a wrong valley, from others."""
+    typical = np.array(prior(problem.record.plate).typical.as_tuple())
+    best: Fit | None = None
+    for factors in STARTS:
+        fit = fitted((typical * factors).tolist())
         best = fit if best is None or fit.chi2 < best.chi2 else best
         if best.chi2 < WRONG_VALLEY * best.count:
             break
@@ -87,15 +98,7 @@ def with_shaft(problem: Problem, *, smooth_load: bool = False) -> Fit:
 
     `smooth_load`: constant and fan only, as a start from rest has them. Else knots, denser around load steps.
     """
-    typical = np.array(prior(problem.record.plate).typical.as_tuple())
-    best: Fit | None = None
-    for factors in STARTS:
-        fit = _with_shaft_from((typical * factors).tolist(), problem, smooth_load=smooth_load)
-        best = fit if best is None or fit.chi2 < best.chi2 else best
-        if best.chi2 < WRONG_VALLEY * best.count:
-            break
-    assert best is not None
-    return best
+    return _from_several_starts(problem, lambda four: _with_shaft_from(four, problem, smooth_load=smooth_load))
 
 
 def _with_shaft_from(four: list[float], problem: Problem, *, smooth_load: bool) -> Fit:

@@ -14,10 +14,10 @@ from commissioner.estimation.numbers import Scales
 from commissioner.estimation.record import Record, Window, between, prepare
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
+from commissioner.running.nominal import RIPPLE
 
 Array = NDArray[np.float64]
 SECONDS = 3.0
-RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
 
 
 def play(
@@ -48,14 +48,9 @@ def _beside(machine: Machine, like: RunningRecording, plate: Nameplate) -> tuple
     measured) at its first sample, which comes up to a sample after the contactor closed, and the encoder's ripple."""
     record = prepare([like], plate)
     record = replace(record, windows=record.windows[:1])
-    problem, began = problem_of(record, 0.0), plain_machine(machine.physical()[:4].tolist(), record)
-    machine = replace(
-        machine,
-        first=began.first,
-        knots=began.knots,
-        knot_times_s=np.array([[0.0, 1e3]]),
-        has_shaft=not record.has_speed,
-    )
+    problem = problem_of(record, 0.0)
+    began = plain_machine(machine.physical()[:4].tolist(), record, has_shaft=not record.has_speed)
+    machine = replace(began, theta=machine.theta)
     columns = columns_of(RIPPLE if record.has_speed else (), record, machine)
     return refine(problem, machine, columns, is_final=False).machine, problem
 

@@ -138,7 +138,7 @@ class UnderTest:
         """Aborted: the drive applies more than the tones at this amplitude, else at the largest asked for in this session, and the bias."""
         scale = self._most_asked if scale is None else scale
         instants = block.first_index + np.arange(-SLACK, block.voltage_axis_v.size + SLACK, dtype=np.float64)
-        tones_v = np.abs(self._excitation.over_scale(instants * block.sample_period_s)(scale))
+        tones_v = np.abs(self._excitation.voltage_v(instants * block.sample_period_s, scale))
         peaks_v = scale * sum(t.amplitude_v for t in self._excitation.tones)
         most_v = abs(bias_v) + MOST_APPLIED * float(np.max(tones_v)) + ROOM * peaks_v
         seen_v = float(np.max(np.abs(block.voltage_axis_v)))

@@ -53,15 +53,13 @@ def observing() -> None:
 PARTS: dict[str, Callable[[], None]] = {"driving": driving, "diagnosing": diagnosing, "observing": observing}
 
 
-def main(names: list[str]) -> int:
-    command = (sys.executable, "-m", "tests.support.suite.warm")
-    children = [subprocess.Popen([*command, name]) for name in names]
+def main() -> int:
+    children = [subprocess.Popen([sys.executable, "-m", "tests.support.suite.warm", name]) for name in PARTS]
     return max(child.wait() for child in children)
 
 
 if __name__ == "__main__":
-    match sys.argv[1:] or list(PARTS):
-        case [name]:
-            PARTS[name]()
-        case names:
-            sys.exit(main(names))
+    if len(sys.argv) > 1:
+        PARTS[sys.argv[1]]()
+    else:
+        sys.exit(main())
