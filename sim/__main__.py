@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import gc
 import json
 import signal
 import ssl
@@ -123,6 +124,7 @@ async def _serve_until_signal(scenario, serving, serve) -> None:
 
     def announce(text: str) -> None:
         """`listening KIND ADDRESS` for programs; what a person copies goes to stderr."""
+        gc.freeze()  # looking through all that compiling has left would let a master wait for 0.3 s
         _announce(text)
         _, kind, address = text.split(" ", 2)
         sys.stderr.write(f'ready: --drive "{ready_url(kind, address, serving)}"\n')

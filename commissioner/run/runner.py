@@ -29,6 +29,7 @@ from commissioner.run.ending import (
     with_master,
     write_lost,
 )
+from commissioner.run.holding.collector import set_aside, short_collections
 from commissioner.run.holding.priority import raised_priority
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
 from commissioner.run.stream import Stream, stop_if
@@ -95,7 +96,7 @@ class Runner:
         """Run the course to its end. Faults, guards and the operator end it as a value; the drive is disarmed."""
         error: CommissionerError | None = None
         ended: RunEnded | None = None
-        with self._stop, raised_priority():
+        with self._stop, raised_priority(), short_collections():
             try:
                 ended = self._drive(course)
             except CommissionerError as failure:
@@ -223,6 +224,7 @@ class Runner:
         progress.segment += 1
         progress.session_s = progress.next_status_s = progress.flux_fraction = 0.0
         limits = progress.facts.drive_limits
+        set_aside()
         began_s = self._inverter.now_s()
         cursor = self._inverter.enable()
         self._inverter.port.stats.longest_gap_s = 0.0
