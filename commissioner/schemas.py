@@ -13,18 +13,32 @@ from pydantic.json_schema import GenerateJsonSchema
 from typing_extensions import TypedDict
 
 from commissioner import docs
+from commissioner.cli.verbs.archived.motors import KnownMotors, LikelyMotors
+from commissioner.cli.verbs.archived.moving import MovedRuns
+from commissioner.cli.verbs.archived.runs import ShownRun
+from commissioner.cli.verbs.archived.verify import VerifiedRuns
 from commissioner.cli.verbs.drives.conformance import ConformanceDocument
 from commissioner.cli.verbs.drives.files import DriveRow
+from commissioner.cli.verbs.ports import FoundAdapters
+from commissioner.cli.verbs.serve import KnownAccounts
 from commissioner.diagnose.contract import DiagnosisDocument
 from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import AnyIdentification
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring
+from commissioner.operations.archive import Exported, ReplayedRun, Reported
+from commissioner.operations.export import ExportedModel
+from commissioner.operations.history.compare import Held
+from commissioner.operations.history.motors import Named
+from commissioner.operations.history.runs import WrittenTable
+from commissioner.operations.history.trend import MotorTrend
 from commissioner.operations.recordings.simulate import Simulated
 from commissioner.recordings.imported import Understood
 from commissioner.report.run.contract import RunDocument, WritePlan
 from commissioner.run.archive.summary import RunSummary
 from commissioner.run.archive.verify import Verified
+from commissioner.run.index.index import Refreshed
+from commissioner.run.tuning.tune import TuneDocument
 from commissioner.running.export import RunningModel
 from commissioner.service.contract.drives import CheckDocument
 from commissioner.service.contract.history import ComparedDocument
@@ -40,6 +54,12 @@ class EndedRun(RunDocument):
     folder: NotRequired[str]
 
 
+class TunedRun(EndedRun):
+    """As any run; `tune`: what the drive found by itself."""
+
+    tune: TuneDocument
+
+
 class ListedRuns(TypedDict):
     """Newest first, without their results; `total`: how many there are beyond a limit."""
 
@@ -47,22 +67,8 @@ class ListedRuns(TypedDict):
     total: int
 
 
-class VerifiedRuns(TypedDict):
-    """Of `--all`; `damaged`: how many are not as their runs left them."""
-
-    runs: list[Verified]
-    damaged: int
-
-
-class ShownRun(TypedDict):
-    """`result`: the run's, as it lies in the archive; null where it left none."""
-
-    run: str
-    summary: RunSummary
-    result: JsonObject | None
-
-
 SCHEMAS: Mapping[str, Any] = {
+    "accounts": KnownAccounts,
     "check": CheckDocument,
     "conformance": ConformanceDocument,
     "diagnose": DiagnosisDocument,
@@ -73,16 +79,26 @@ SCHEMAS: Mapping[str, Any] = {
     "identify": AnyIdentification,
     "model": ModelDocument | RunningModel,
     "monitor": MonitoringDocument | PartialMonitoring | RefusedMonitoring,
+    "ports": FoundAdapters,
     "recordings_import": Understood,
+    "replay": ReplayedRun,
     "restore": RestoredDocument,
     "run": EndedRun,
-    "runs_compare": ComparedDocument,
+    "runs_compare": ComparedDocument | Held,
+    "runs_export": Exported | ExportedModel,
+    "runs_index": Refreshed,
     "runs_list": ListedRuns,
+    "runs_motors": KnownMotors | LikelyMotors | Named,
+    "runs_moved": MovedRuns,
+    "runs_report": Reported,
     "runs_show": ShownRun,
+    "runs_table": WrittenTable,
+    "runs_trend": MotorTrend,
     "runs_verify": Verified | VerifiedRuns,
     "simulate": Simulated,
     "study": Studied,
     "study_row": Row,
+    "tune": TunedRun,
     "write_back": WrittenDocument,
     "write_plan": WritePlan,
 }
@@ -90,7 +106,11 @@ SCHEMAS: Mapping[str, Any] = {
 
 
 class AsEncoded(GenerateJsonSchema):
-    """What `encoding.plain` makes of a record: no hidden field; null for a number that is none."""
+    """What `encoding.plain` makes of a record: no hidden field; null for a number that is none; the name of a choice."""
+
+    def enum_schema(self, schema: Any) -> JsonObject:
+        made: JsonObject = super().enum_schema(schema)
+        return made | {"type": "string", "enum": [one.name.lower() for one in schema["members"]]}
 
     def dataclass_schema(self, schema: Any) -> JsonObject:
         made: JsonObject = super().dataclass_schema(schema)

@@ -91,7 +91,17 @@ def verify_folder(folder: Path, key: bytes | None) -> Verified:
     except (CommissionerError, OSError) as error:
         what = error.what if isinstance(error, CommissionerError) else str(error)
         return Verified(
-            folder.name, DAMAGED, (Loss(folder.name, None, what),), "nothing that can be read", 0, 0, 0, 0, "none"
+            folder.name,
+            DAMAGED,
+            (Loss(folder.name, None, what),),
+            "nothing that can be read",
+            0,
+            0,
+            0,
+            0,
+            "none",
+            (),
+            False,
         )
 
 

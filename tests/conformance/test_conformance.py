@@ -6,6 +6,7 @@ from commissioner.conformance.records import Outcome
 from commissioner.conformance.rules import RULES
 from tests.support.command_line import call
 from tests.support.reference_firmware import FirmwareProcess, build, make, missing, needs_libmodbus
+from tests.support.service.described import judge as described
 from tests.support.sim_process import SimProcess
 
 NEEDS_A_HAND = {"watchdog-is-off-after-power-up", "hardware-faults-block-the-output", "clipped-samples-are-flagged"}
@@ -33,6 +34,7 @@ def test_a_conforming_firmware_passes_every_rule_that_can_be_tried(drive):
     answer = call("drives", "conformance", drive.url, "--energise", "--yes", "--json")
     assert answer.code == 0, answer.stdout[:2000]
     document = answer.json
+    described("conformance", document)
     assert document["outcome"] == "passed"
     assert len(document["rules"]) == len(RULES)
     assert outcomes(document, Outcome.NOT_TESTED) == NEEDS_A_HAND | {ON_A_SERIAL_LINE}

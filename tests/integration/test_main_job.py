@@ -164,8 +164,19 @@ def test_identify_offline_gives_the_runs_answer_from_its_samples(job):
 def test_replay_makes_the_same_decisions_bit_for_bit(job):
     answer = call("replay", "last", "--runs", str(job["runs"]), "--json")
     assert answer.code == 0, answer.stdout[:2000]
+    judge("replay", answer.json)
     assert answer.json["identical"] is True
     assert answer.json["decisions"] > 100
+
+
+def test_report_and_samples_of_an_archived_run_are_found(job, tmp_path):
+    for name, arguments in (
+        ("runs_report", ("report", "last")),
+        ("runs_export", ("export", "last", str(tmp_path / "out.csv"))),
+    ):
+        answer = call("runs", *arguments, "--runs", str(job["runs"]), "--json")
+        assert answer.code == 0, answer.stdout[:2000]
+        judge(name, answer.json)
 
 
 def test_the_archive_lists_and_shows_the_run(job):

@@ -4,6 +4,7 @@ import pytest
 
 from tests.support.command_line import call
 from tests.support.raw_servers import Bank, TcpDevice
+from tests.support.service.described import judge
 
 STATUS_WORD, STATOR_RESISTANCE = 50199, 1299
 READY, RUNNING, TRIPPED = 0x0202, 0x0A02, 0x020A
@@ -68,6 +69,11 @@ def test_an_accepted_recording_is_written_in_the_drives_terms_and_restored_from_
     assert shown["summary"]["written"].startswith("new, read back and stored")
     restored = call("restore", "last", "--runs", str(tmp_path), "--yes", "--json")
     assert (restored.code, held(drive)) == (0, pytest.approx(3.0))
+    planned = call("write-back", "last", "--plan", "--runs", str(tmp_path), "--json")
+    judge("write_plan", planned.json)
+    again = call("write-back", "last", "--yes", "--runs", str(tmp_path), "--json")
+    assert (again.code, held(drive)) == (0, pytest.approx(found, abs=1e-4)), again.stdout
+    judge("write_back", again.json)
 
 
 @pytest.mark.parametrize("status", [RUNNING, TRIPPED])

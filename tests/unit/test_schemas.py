@@ -41,6 +41,7 @@ PROMISED = {
         "mean_speed_rad_per_s", "mean_torque_nm", "parameters", "periods", "current_resimulation_error", "indicators",
         "refused_because",
     ),
+    ("Results: tune", "tune"): (*IDENTIFIED[:2], "tune.repeats", "tune.rows", "tune.best", "tune.in_the_drive"),
     ("Campaigns: --json", "study"): ("cases", "outcomes", "per_minute", "table", "report"),
     ("Campaigns: a row", "study_row"): (
         "case", "seed", "motor", "outcome", "reason", *(f"{name}_{part}" for name in PARAMETERS for part in ("true", "value", "std")),
@@ -132,3 +133,39 @@ def test_the_archive(tmp_path, capsys):
         code, document = leave(capsys, "runs", verb, *((name,) if verb != "list" else ()), "--runs", str(runs))
         assert code in (0, 3)
         judge(f"runs_{verb}", document, may_have_more=verb != "show")
+
+
+def test_motors_over_the_years_and_what_is_moved(tmp_path, capsys):
+    runs, share = tmp_path / "runs", tmp_path / "share"
+    names = [f"2026{month:02d}01-000000-simulated-a" for month in (1, 3, 5)]
+    for name in names:
+        make_run(
+            runs, name, result=result_of(name, MACHINE), origin={"motor_tag": "PUMP-3"} if name != names[2] else None
+        )
+    for document, arguments in (
+        ("runs_index", ("runs", "index")),
+        ("runs_motors", ("runs", "motors")),
+        ("runs_motors", ("runs", "motors", names[2])),
+        ("runs_motors", ("runs", "motors", names[2], "--tag", "PUMP-3")),
+        ("runs_trend", ("runs", "trend", "PUMP-3")),
+        ("runs_table", ("runs", "find", "simulated", "--out", str(tmp_path / "table.csv"))),
+        ("runs_compare", ("runs", "compare", names[0], names[1])),
+        ("runs_verify", ("runs", "verify", "--all")),
+        ("runs_moved", ("runs", "push", str(share))),
+    ):
+        code, answer = leave(capsys, *arguments, "--runs", str(runs))
+        assert code in (0, 3), answer
+        assert "error" not in answer, answer
+        judge(document, answer)
+    judge("runs_moved", leave(capsys, "runs", "pull", str(share), "--runs", str(tmp_path / "other"))[1])
+
+
+def test_adapters_and_accounts(tmp_path, capsys):
+    judge("ports", leave(capsys, "ports")[1])
+    secret = tmp_path / "secret"
+    secret.write_text("correct horse battery\n", encoding="utf-8")
+    runs = ("--runs", str(tmp_path / "runs"))
+    leave(capsys, "accounts", "add", "anna", "--role", "operator", "--password-file", str(secret), *runs)
+    code, known = leave(capsys, "accounts", "list", *runs)
+    assert code == 0 and known["accounts"]
+    judge("accounts", known)

@@ -9,11 +9,26 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from typing_extensions import TypedDict
+
 from commissioner.cli.screens.password import read_password
 from commissioner.errors import UsageError
 
 if TYPE_CHECKING:
     from commissioner.service.access.accounts import Accounts
+
+
+class AccountRow(TypedDict):
+    """`role`: what it may do."""
+
+    account: str
+    role: str
+
+
+class KnownAccounts(TypedDict):
+    """Who may log in."""
+
+    accounts: list[AccountRow]
 
 
 def serve(*, host: str, port: int, config: Path | None, open_page: bool, runs: Path, as_json: bool) -> None:
@@ -52,9 +67,9 @@ def list_accounts(*, config: Path | None, runs: Path, as_json: bool) -> None:
     """Names and roles."""
     from commissioner.cli.screens import screen
 
-    known = [{"account": a.name, "role": a.role.name.lower()} for a in _accounts(config, runs).all()]
+    known = [AccountRow(account=a.name, role=a.role.name.lower()) for a in _accounts(config, runs).all()]
     if as_json:
-        screen.emit({"accounts": known})
+        screen.emit(KnownAccounts(accounts=known))
     elif known:
         screen.out.print(screen.table("", ("account", "role"), [(a["account"], a["role"]) for a in known]))
     else:

@@ -35,7 +35,8 @@ class Loss:
 
 @dataclass(frozen=True)
 class Verified:
-    """`state`: intact | unverified | cut off | damaged. `usable` says what of the run can still be relied upon."""
+    """`state`: intact | unverified | cut off | damaged. `usable` says what of the run can still be relied upon. `is_whole`: nothing is
+    lost or changed, as far as can be seen."""
 
     run: str
     state: str
@@ -46,12 +47,8 @@ class Verified:
     samples: int
     lost_samples: int
     seal: str
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def is_whole(self) -> bool:
-        """Nothing is lost or changed, as far as can be seen."""
-        return not self.losses
+    remarks: tuple[str, ...]
+    is_whole: bool
 
     def lost_in(self, *files: str) -> tuple[Loss, ...]:
         return tuple(loss for loss in self.losses if loss.file in files)
@@ -79,6 +76,7 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
     return Verified(
         folder.name, state, tuple(losses), _usable(state, whole, losses, *counts, is_over=is_over),
         len(whole), *counts, lost_samples, said, tuple(_remarks(folder, whole, is_torn=is_torn, is_chained=is_chained)),
+        not losses,
     )  # fmt: skip
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from typing_extensions import TypedDict
 
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CheckFailed, CommissionerError, DriveFault, LinkError, UsageError
@@ -22,7 +24,7 @@ from commissioner.procedure.checks import check_failed, judge_idle
 from commissioner.procedure.findings import DriveIdentified, RunEnded
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Findings
-from commissioner.procedure.tuned import TuneVerdict, judge_tunings
+from commissioner.procedure.tuned import TunedRow, TuneVerdict, judge_tunings
 from commissioner.records import ParameterSnapshot
 from commissioner.registers.profile import DriveProfile
 from commissioner.registers.tuning import Tuning
@@ -390,19 +392,32 @@ def _check_watchdog(inverter: Inverter, wanted: TuneOrder) -> None:
         )  # fmt: skip
 
 
+class TuneDocument(TypedDict):
+    """What the drive found by itself, by the drive's own names: `repeats` with their `seconds`, `rows` over all of them, `best` the
+    repeat nearest to the medians. `form`: remote or assisted; `proved_on`: models and firmware on which the drive file's way of tuning really ran."""
+
+    form: str
+    proved_on: tuple[str, ...]
+    repeats: list[Mapping[str, float]]
+    seconds: list[float]
+    rows: Sequence[TunedRow]
+    best: Mapping[str, float] | None
+    in_the_drive: str
+
+
 def _save(order: Order, folder: RunFolder, found: TuneFindings, ended: RunEnded) -> Any:
     """Result and report, as of any run; `tune` beside them."""
     document: dict[str, Any] = dict(summarise(found.common, ended, folder.path.name, *names_of(order.profile)))
     tuning = require_tuning(order.profile)
-    document["tune"] = {
-        "form": tuning.form,
-        "proved_on": tuning.proved_on,
-        "repeats": [done.values for done in found.repeats],
-        "seconds": [done.seconds for done in found.repeats],
-        "rows": found.verdict.rows if found.verdict else (),
-        "best": found.verdict.best if found.verdict else None,
-        "in_the_drive": found.in_the_drive,
-    }
+    document["tune"] = TuneDocument(
+        form=tuning.form,
+        proved_on=tuning.proved_on,
+        repeats=[done.values for done in found.repeats],
+        seconds=[done.seconds for done in found.repeats],
+        rows=found.verdict.rows if found.verdict else (),
+        best=found.verdict.best if found.verdict else None,
+        in_the_drive=found.in_the_drive,
+    )
     document["objections"] = found.verdict.objections if found.verdict else ()
     document["remarks"] = [f"tuning: {tuning.proof}", *found.remarks]
     result = plain(document)

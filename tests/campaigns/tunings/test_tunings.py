@@ -17,6 +17,7 @@ from commissioner.settings import load_motor, load_procedure
 from sim.vendors.drive import Habits
 from tests.campaigns.tunings import bench
 from tests.campaigns.tunings.cases import applies, campaign, cases, judge, names
+from tests.support.service.described import judge as described
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name.replace(" ", "-"))
@@ -39,6 +40,7 @@ def test_what_a_tune_changed_is_restored_from_its_run_afterwards(tmp_path, monke
         assert tried.done.ended.outcome == "commissioned", name
         assert "proved: the values outlasted a power-off" in tried.done.result["remarks"]
         assert tried.truth["held"] != tried.before
+        described("tune", {**tried.done.result, "folder": str(tried.done.folder)})
         clock = tried.person.clock
         monkeypatch.setattr(restoring, "open_port", lambda *_, d=tried.drive, c=clock, **__: bench.VendorPort(d, c))
         restoring.restore(find_run(tmp_path / Path(name).stem, "last"), None)

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+
+from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.errors import UsageError
-from commissioner.operations.history.motors import Likeness, judge_motor, list_motors, name_motor
+from commissioner.operations.history.motors import Likeness, Motor, judge_motor, list_motors, name_motor
 from commissioner.operations.history.runs import Archive
 from commissioner.operations.history.trend import MotorTrend, trend, trend_of_indicators
+
+
+class KnownMotors(TypedDict):
+    """The last used first."""
+
+    motors: Sequence[Motor]
+
+
+class LikelyMotors(TypedDict):
+    """Those that a run may have been made on, the most alike first."""
+
+    motors: Sequence[Likeness]
 
 
 def motors(archive: Archive, run: str | None, *, tag: str, serial: str, confirm: bool, as_json: bool) -> None:
@@ -44,7 +59,7 @@ def show_trend(archive: Archive, motor: str | None, baseline: Path | None, out: 
 def _list(archive: Archive, *, as_json: bool) -> None:
     found = list_motors(archive)
     if as_json:
-        screen.emit({"motors": found})
+        screen.emit(KnownMotors(motors=found))
         return
     rows = [
         (screen.text(one.motor or "nobody said"), screen.text(one.serial), screen.text(one.plate), screen.text(one.drive), str(one.runs),
@@ -58,7 +73,7 @@ def _list(archive: Archive, *, as_json: bool) -> None:
 def _judge(archive: Archive, run: str, *, as_json: bool) -> None:
     found = judge_motor(archive, run)
     if as_json:
-        screen.emit({"motors": found})
+        screen.emit(LikelyMotors(motors=found))
         return
     screen.out.print(screen.table("", ("motor", "beside", "by its parameters", ""), [_row(one) for one in found]))
     screen.out.print("[dim]`commissioner runs motors RUN --tag TAG` says which one it was[/]")

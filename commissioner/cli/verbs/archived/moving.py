@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from typing_extensions import TypedDict
+
 from commissioner.cli.screens import screen
 from commissioner.cli.screens.password import read_password
 from commissioner.errors import DataRefused
 from commissioner.operations.history import send, share
+
+
+class MovedRuns(TypedDict):
+    """What became of each run; `left`: how many a person has to look at."""
+
+    runs: Sequence[share.Moved]
+    left: int
 
 
 def push(
@@ -40,7 +49,7 @@ def _tell(move: Callable[[], tuple[share.Moved, ...]], *, as_json: bool) -> None
         done = move()
     bad = [one for one in done if not one.is_good]
     if as_json:
-        screen.emit({"runs": done, "left": len(bad)})
+        screen.emit(MovedRuns(runs=done, left=len(bad)))
     else:
         for one in done:
             if one.what not in (share.THERE, share.NEWER):

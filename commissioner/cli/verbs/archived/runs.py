@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from typing_extensions import TypedDict
+
 from commissioner.cli.screens import screen
+from commissioner.encoding import JsonObject
 from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs, write_runs
 from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.catalogue import RunSummary
@@ -56,11 +59,19 @@ def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -
         )
 
 
+class ShownRun(TypedDict):
+    """`result`: the run's, as it lies in the archive; null where it left none."""
+
+    run: str
+    summary: RunSummary
+    result: JsonObject | None
+
+
 def show_run(folder: Path, name: str, *, as_json: bool) -> None:
     """One run, as its result says; a run that was cut off is told from its journal."""
     summary = look_up(folder, name)
     if as_json:
-        screen.emit({"run": summary.run, "summary": summary, "result": summary.result})
+        screen.emit(ShownRun(run=summary.run, summary=summary, result=summary.result))
         return
     _print(summary)
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+
+from typing_extensions import TypedDict
 
 from commissioner.cli.screens import screen
 from commissioner.errors import DataRefused, UsageError
@@ -11,6 +14,13 @@ from commissioner.run.archive.seal import read_key
 from commissioner.run.archive.verify import DAMAGED, Verified
 
 _COLOURS = {"intact": "green", "unverified": "yellow", "cut off": "yellow", DAMAGED: "red"}
+
+
+class VerifiedRuns(TypedDict):
+    """Of `--all`; `damaged`: how many are not as their runs left them."""
+
+    runs: Sequence[Verified]
+    damaged: int
 
 
 def verify_runs(runs: Path, run: str | None, *, everything: bool, seal: Path | None, as_json: bool) -> None:
@@ -24,8 +34,7 @@ def verify_runs(runs: Path, run: str | None, *, everything: bool, seal: Path | N
     found = archive.verify_runs(runs, None if everything else run or "last", key)
     damaged = sum(not one.is_whole for one in found)
     if as_json:
-        documents = [vars(one) | {"is_whole": one.is_whole} for one in found]
-        screen.emit({"runs": documents, "damaged": damaged} if everything else documents[0])
+        screen.emit(VerifiedRuns(runs=found, damaged=damaged) if everything else found[0])
     else:
         for one in found:
             _print(one)
