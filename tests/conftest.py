@@ -59,8 +59,8 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-TOGETHER = ("integration/service",)
-"""Folders whose tests share a costly fixture of a whole session: one worker has them all."""
+TOGETHER = ("integration/service/browser", "integration/service")
+"""Folders whose tests share a costly fixture of a whole session: one worker has them all, what lies in the first by itself."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"

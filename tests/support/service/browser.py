@@ -153,7 +153,7 @@ class Technician:
         ]
 
     def fits(self) -> bool:
-        """No wider than its window and STOP in view, within a second of a change of size: what is drawn follows a frame later."""
+        """No wider than its window and STOP in view, within a second of a change of size or page: what is drawn follows a frame later."""
         for _ in range(20):
             if self.overflow() <= 0 and self.stop_is_in_view():
                 return True

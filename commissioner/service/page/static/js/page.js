@@ -80,10 +80,10 @@ function offline() {
     put("big", say(wasLive ? "TAKE THE MOTOR AS LIVE" : "State of the motor not known"));
     put("small", say(wasLive ? "This page has lost the service. The motor was energised" : "This page has lost the service"));
     put("control", say("not known")); put("controlline", say("no service"));
-    put("stopsub", say("cannot be sent: use the emergency stop"));
     put("say", `${$("#big").textContent}. ${$("#small").textContent}`);
     tell("offline", true);
   }
+  if (performance.now() > stopPending) put("stopsub", say("cannot be sent: use the emergency stop")); // not over what a STOP was answered
   put("driveline", say("last word %s ago", number((performance.now() - heardAt) / 1000, 1, "s")));
 }
 function online() { isOffline = false; lastBand = null; stopPending = 0; tell("offline", false); }

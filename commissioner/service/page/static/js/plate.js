@@ -25,4 +25,6 @@ function show(judged) {
   document.querySelector("#judgement").replaceChildren(...(judged.verdict ? [note] : []));
 }
 
-for (const input of form.querySelectorAll("input")) input.addEventListener("change", judge);
+const inputs = [...form.querySelectorAll("input")];
+for (const input of inputs) input.addEventListener("change", judge);
+if (inputs.some((input) => input.value !== input.defaultValue)) judge(); // typed before this was here
