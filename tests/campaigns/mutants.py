@@ -24,6 +24,7 @@ from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[2]
 TARGETS = {
+    "commissioner.safety.applied": ("tests/unit/safety/test_applied.py",),
     "commissioner.safety.limits": ("tests/unit/safety/test_limits.py",),
     "commissioner.safety.watch": ("tests/unit/safety/test_watch.py",),
     "commissioner.safety.freshness": ("tests/unit/safety/test_freshness.py",),

@@ -27,6 +27,7 @@ from commissioner.procedure.energised.session import along_axis, duration_s, ton
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock
+from commissioner.safety.applied import judge_applied
 
 TELL_EVERY_S = 0.1
 """Motor time between two estimates in the journal."""
@@ -35,9 +36,8 @@ KNOWN_LOG_STD = 0.05
 KNEES, EXCITED = 8.0, 0.3
 """The observer adapts once the current reaches this many knees of the inverter's error, or this share of the designed
 peak: below, the dead band takes most of the command and the samples tell about its shape, not about the motor."""
-MOST_APPLIED, ROOM, SLACK = 1.25, 0.1, 3
-"""Voltage that a block may show: of the largest amplitude asked for in this session, at these instants and as many periods before and after;
-and besides of that amplitude's tones all at their peaks. Another master that raises the amplitude is seen so before the poll for it."""
+AROUND = 3
+"""Sample periods before and after a block whose tones it may show."""
 COMPENSATION_ROWS = 1025
 WARM_UP_SAMPLES, FITTED_SAMPLES = 6000, 600
 
@@ -137,16 +137,13 @@ class UnderTest:
     def require_asked(self, block: SampleBlock, scale: float | None = None, bias_v: float = 0.0) -> None:
         """Aborted: the drive applies more than the tones at this amplitude, else at the largest asked for in this session, and the bias."""
         scale = self._most_asked if scale is None else scale
-        instants = block.first_index + np.arange(-SLACK, block.voltage_axis_v.size + SLACK, dtype=np.float64)
-        tones_v = np.abs(self._excitation.voltage_v(instants * block.sample_period_s, scale))
+        instants = block.first_index + np.arange(-AROUND, block.count + AROUND, dtype=np.float64)
+        asked_v = self._excitation.voltage_v(instants * block.sample_period_s, scale)
         peaks_v = scale * sum(t.amplitude_v for t in self._excitation.tones)
-        most_v = abs(bias_v) + MOST_APPLIED * float(np.max(tones_v)) + ROOM * peaks_v
-        seen_v = float(np.max(np.abs(block.voltage_axis_v)))
-        if seen_v > most_v:
-            raise Aborted(
-                "the drive applies more than it was asked for", step=f"multitone test, axis {self._axis_deg:g} deg", value=seen_v,
-                limit=most_v, remedy="see that nothing else writes to this drive: a second master, a panel, a program on another computer",
-            )  # fmt: skip
+        reason = judge_applied(block.voltage_axis_v, asked_v, peaks_v, bias_v)
+        if reason is not None:
+            step = f"multitone test, axis {self._axis_deg:g} deg"
+            raise Aborted(reason.what, step=step, value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
     def is_done(self, longest_s: float) -> bool:
         """The planned time is up and the estimate at rest, or no more time is allowed."""
