@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -49,6 +49,7 @@ ENERGISE = View("work/energise.html", "What will happen to the motor", 4)
 LIVE = View("work/live.html", "Test in progress", 5)
 ENDED = View("work/ended.html", "The run has ended", 5)
 RESULT = View("work/result.html", "Result", 6)
+DONE = replace(RESULT, step=8)
 WRITE = View("work/write.html", "What would be written into the drive", 7)
 WRITTEN = View("work/written.html", "Written, read back and stored", 8)
 
@@ -340,7 +341,8 @@ async def run(request: Request, run: str) -> Response:
     if (result.get("tune") or {}).get("rows"):
         return tuned_page(request, place, **facts)
     if result.get("parameters") and entry.outcome in ("commissioned", "rejected"):
-        return render(request, RESULT, place, **facts)
+        is_written = entry.standing == "commissioned"
+        return render(request, DONE if is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
 
 

@@ -78,6 +78,8 @@ def test_a_whole_commissioning_by_clicks(service, browser, language):
             if seen == "written":
                 kept = {"en": "Measured and written", "de": "Gemessen und geschrieben"}[language]
                 expect(hand.page.locator("#small")).to_contain_text(kept)
+        hand.go(f"/runs/{run}")
+        expect(hand.page.locator("[aria-current=step] .dot")).to_have_text("8" if language == "de" else "6")
         for path in ("/", "/runs", "/audit", "/motors/motor_2kw2/trend", f"/runs/{run}/report", "/runs/none", "/login"):
             hand.go(path)
             judge_view(hand, language, english)
