@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ def _row(plant: Plant, flux_wb: float) -> dict[str, Any]:
 def inverter_truth(plant: Plant) -> dict[str, Any]:
     """Leg error law of the inverter as it stands (effects included): plateau volts and a table over leg current."""
     p, _ = pack(plant)
+    lost = _leg_law(plant)
     dead_v = float(p[at.P_DEAD_FRACTION] * p[at.P_LINK_V])
     currents = np.concatenate([np.linspace(0.0, 0.5, 26), np.linspace(0.6, 2.0, 15), np.linspace(2.5, 10.0, 16)])
     return {
@@ -68,16 +70,25 @@ def inverter_truth(plant: Plant) -> dict[str, Any]:
         "slope_ohm": float(p[at.P_SLOPE_OHM]),
         "link_v": float(p[at.P_LINK_V]),
         "switching_frequency_hz": plant.power_stage.switching_frequency_hz,
-        "leg_error": [[float(i), leg_error_v(plant, float(i))] for i in currents],
+        "leg_error": [[float(i), lost(float(i))] for i in currents],
     }
 
 
 def leg_error_v(plant: Plant, current_a: float) -> float:
     """Mean voltage (V) a leg loses while it carries this current."""
+    return _leg_law(plant)(current_a)
+
+
+def _leg_law(plant: Plant) -> Callable[[float], float]:
     p, _ = pack(plant)
     m = load(p)
-    dead = m.dead_fraction * p[at.P_LINK_V] * sign_law(current_a * m.dead_per_a, m.dead_shape)
-    return float(dead + m.drop_v * sign_law(current_a * m.drop_per_a, m.drop_shape) + p[at.P_SLOPE_OHM] * current_a)
+
+    def lost_v(current_a: float) -> float:
+        dead = m.dead_fraction * p[at.P_LINK_V] * sign_law(current_a * m.dead_per_a, m.dead_shape)
+        drop = m.drop_v * sign_law(current_a * m.drop_per_a, m.drop_shape)
+        return float(dead + drop + p[at.P_SLOPE_OHM] * current_a)
+
+    return lost_v
 
 
 def axis_error_v(plant: Plant, axis_deg: float, current_a: float) -> float:
