@@ -6,7 +6,7 @@ import pytest
 from commissioner.running.diagnosis import Verdict, diagnose
 from commissioner.running.identification import identify
 from tests.running_effects.cases import Case, taken, true_size
-from tests.running_effects.protocol import failures, false_names, gain_elsewhere, run, table
+from tests.running_effects.protocol import failures, false_names, gains_elsewhere, run, table
 
 NAMED = {
     "magnetizing_saturation": 0.15, "rotor_skin_effect": 0.4, "iron_loss": 0.05, "rotor_asymmetry": 0.05, "stator_asymmetry": 0.05,
@@ -53,7 +53,7 @@ def test_one_cause_is_named_with_its_size_and_nothing_else_is(name):
         "voltage_gain_mismatch",
     ):
         assert effect["phase"] in next(iter(seen.causes[0].sizes)).split("_")
-    assert gain_elsewhere(seen, scenario, case) > 0.95
+    assert gains_elsewhere(seen, scenario, case)["elsewhere"] > 0.95
 
 
 def test_leakage_that_saturates_on_the_rotors_side_is_taken_for_nothing_else():
@@ -64,7 +64,7 @@ def test_leakage_that_saturates_on_the_rotors_side_is_taken_for_nothing_else():
     seen = diagnose([recording], plate)
     assert [(c.name, c.form) for c in seen.causes] == [("leakage_saturation", "rotor")], seen.reason
     assert seen.verdict is Verdict.EXPLAINED
-    assert gain_elsewhere(seen, scenario, case) > 0.95
+    assert gains_elsewhere(seen, scenario, case)["elsewhere"] > 0.95
 
 
 @pytest.mark.parametrize("name", ["sensor_lag"])
