@@ -95,8 +95,8 @@ def sure_mismatch(machine: InverseGamma, resistance_std_ohm: float, plate: Namep
     """
     least_ohm = machine.stator_resistance_ohm - SURE * resistance_std_ohm
     least = replace(machine, stator_resistance_ohm=max(least_ohm, LEAST_SHARE * machine.stator_resistance_ohm))
-    found = mismatch(plate_match(machine, plate), plate)
-    return found if found and mismatch(plate_match(least, plate), plate) else None
+    is_sure = mismatch(plate_match(least, plate), plate) is not None
+    return mismatch(plate_match(machine, plate), plate) if is_sure else None
 
 
 def inductance_mismatch(inductance_h: float, plate: Nameplate) -> PlateMismatch | None:

@@ -207,3 +207,21 @@ def test_a_copper_loss_contradicts_the_plate_where_it_is_sure(std_share, is_sure
     assert mismatch(plate_match(hot, plate), plate) is not None
     assert (sure_mismatch(hot, std_share * hot.stator_resistance_ohm, plate) is not None) is is_sure
     assert sure_mismatch(machine, 0.0, plate) is None
+
+
+def test_a_resistance_that_is_not_known_at_all_hides_no_other_contradiction():
+    """Twice its standard error is more than R_s itself: the rated current of three times the impedances contradicts all the same."""
+    plate = load_motor("motor_2kw2")
+    threefold = InverseGamma(*(3.0 * value for value in prior(plate).typical.as_tuple()))
+    assert sure_mismatch(threefold, threefold.stator_resistance_ohm, plate) is not None
+
+
+def test_a_copper_loss_that_is_not_known_at_all_contradicts_no_plate():
+    """Of a large motor, where a hundredth of the resistance is not a hundredth of an ohm."""
+    small = load_motor("motor_2kw2")
+    plate = replace(small, rated_power_w=50.0 * small.rated_power_w, rated_current_a=50.0 * small.rated_current_a)
+    machine = prior(plate).typical
+    loss = plate_match(machine, plate).copper_loss_ratio
+    hot = replace(machine, stator_resistance_ohm=2.0 / loss * machine.stator_resistance_ohm)
+    assert sure_mismatch(hot, 0.0, plate) is not None
+    assert sure_mismatch(hot, hot.stator_resistance_ohm, plate) is None
