@@ -219,7 +219,7 @@ def test_a_resistance_that_is_not_known_at_all_hides_no_other_contradiction():
 def test_a_copper_loss_that_is_not_known_at_all_contradicts_no_plate():
     """Of a large motor, where a hundredth of the resistance is not a hundredth of an ohm."""
     small = load_motor("motor_2kw2")
-    plate = replace(small, rated_power_w=50.0 * small.rated_power_w, rated_current_a=50.0 * small.rated_current_a)
+    plate = replace(small, rated_power_w=500.0 * small.rated_power_w, rated_current_a=500.0 * small.rated_current_a)
     machine = prior(plate).typical
     loss = plate_match(machine, plate).copper_loss_ratio
     hot = replace(machine, stator_resistance_ohm=2.0 / loss * machine.stator_resistance_ohm)
