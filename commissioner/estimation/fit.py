@@ -206,12 +206,18 @@ def held_part(problem: Problem, parts: Sequence[Array]) -> Array:
     return np.concatenate([x[u:].reshape(-1) for x, u in zip(parts, problem.until, strict=True)])
 
 
+DELAY_MIXES = 4
+"""Samples, and one more: a sensor's delay takes a cubic through four."""
+
+
 def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> Array:
     """Whitened sensitivities of the simulated current, (columns, fitted samples x channels)."""
     p, slope, scales = machine.physical(), machine.slope(), problem.record.scales.as_tuple()
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
-        own = [j for j, c in enumerate(columns) if c.kind == "p" or c.window == k]
+        places = machine.places(k, u, problem.period)
+        since = [_acts_from(c, places) for c in columns]
+        own = sorted((j for j, c in enumerate(columns) if c.kind == "p" or c.window == k), key=since.__getitem__)
         dp, dx, dk = (
             np.zeros((len(own), COUNT)),
             np.zeros((len(own), STATES)),
@@ -227,8 +233,8 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
                 dk[row, column.index] = 1.0
         run, shaft = np.empty((len(own), u, 3)), np.empty((len(own), u))
         tangents(
-            p, scales, machine.first[k], dp, dx, dk, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1], machine.knots[k],
-            machine.places(k, u, problem.period), problem.period, machine.has_shaft, run, shaft,
+            p, scales, machine.first[k], dp, dx, dk, np.array([since[j] for j in own], dtype=np.int64), w.voltage[: 2 * u - 1],
+            w.speed[: 2 * u - 1], machine.knots[k], places, problem.period, machine.has_shaft, run, shaft,
         )  # fmt: skip
         white = np.zeros((len(columns), u, 3 if problem.record.has_zero else 2))
         white[own] = problem.noise.white(np.nan_to_num(run))
@@ -237,6 +243,13 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
             white[:, -EDGE:] = 0.0
         parts.append(white.reshape(len(columns), -1))
     return np.concatenate(parts, axis=1)
+
+
+def _acts_from(column: Column, places: Array) -> int:
+    """The sample before which a column changes nothing: of a knot of the load where the knot before it lies, less what a delay mixes."""
+    if column.kind != "k":
+        return 0
+    return max(int(np.searchsorted(places, column.index - 1.0, side="right")) // 2 - DELAY_MIXES, 0)
 
 
 @dataclass(frozen=True)

@@ -241,17 +241,29 @@ def _chain(p, current, period, out):
 
 
 @_kernel
-def tangents(p, scales, x0, dp, dx, dk, voltage, speed, knots, places, period, is_free, out, dshaft):
-    """Derivatives along directions (C, ...) of parameters, first state and knots; `out` (C, n, 3) and `dshaft` (C, n)."""
+def tangents(p, scales, x0, dp, dx, dk, acts_from, voltage, speed, knots, places, period, is_free, out, dshaft):
+    """Derivatives along directions (C, ...) of parameters, first state and knots; `out` (C, n, 3) and `dshaft` (C, n).
+
+    `acts_from` (C,), which does not fall: the sample before which a direction changes nothing. Its march begins there, where the one
+    of no direction has come to."""
     step = 1e-30
     n = out.shape[1]
     run, shaft = np.empty((n, 3), dtype=np.complex128), np.empty((n, 2), dtype=np.complex128)
+    plain, level, state, at = p + 0j, knots + 0j, x0 + 0j, 0
     for c in range(out.shape[0]):
+        first = acts_from[c]
+        if first > at:
+            march(
+                plain, scales, state, voltage[2 * at : 2 * first + 1], speed[2 * at : 2 * first + 1], level,
+                places[2 * at : 2 * first + 1], period, is_free, run[at : first + 1], shaft[at : first + 1],
+            )  # fmt: skip
+            at = first
         march(
-            p + 1j * step * dp[c], scales, x0 + 1j * step * dx[c], voltage, speed, knots + 1j * step * dk[c], places, period,
-            is_free, run, shaft,
+            p + 1j * step * dp[c], scales, state + 1j * step * dx[c], voltage[2 * first :], speed[2 * first :],
+            knots + 1j * step * dk[c], places[2 * first :], period, is_free, run[first:], shaft[first:],
         )  # fmt: skip
         for q in range(n):
+            is_reached = q >= first
             for j in range(3):
-                out[c, q, j] = run[q, j].imag / step
-            dshaft[c, q] = shaft[q, 0].imag / step
+                out[c, q, j] = run[q, j].imag / step if is_reached else 0.0
+            dshaft[c, q] = shaft[q, 0].imag / step if is_reached else 0.0

@@ -54,6 +54,7 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
         np.eye(COUNT),
         none_x,
         none_k,
+        np.zeros(COUNT, dtype=np.int64),
         voltage,
         w,
         knots,
@@ -70,6 +71,27 @@ def test_derivatives_of_all_numbers_at_once_are_those_of_differences(is_free):
         down[k] -= step
         differences = (run(up, count, is_free=is_free)[0] - run(down, count, is_free=is_free)[0]) / (2 * step)
         assert np.abs(differences - exact[k]).max() <= 2e-5 * max(np.abs(exact[k]).max(), 1.0), name
+
+
+def test_a_direction_that_acts_later_has_the_derivatives_of_its_whole_march():
+    """Four knots over 400 samples: the last two change nothing before samples 100 and 200, and a delayed sensor sees four samples at once."""
+    count, p = 400, numbers(SPOKEN)
+    voltage, w = forcing(count)
+    knots, places = np.array([0.1, 0.3, 0.2, 0.4]), np.linspace(0, 4.0, 2 * count - 1)
+
+    def along(acts_from):
+        out, shaft = np.empty((4, count, 3)), np.empty((4, count))
+        tangents(
+            p, SCALES.as_tuple(), np.zeros(STATES), np.zeros((4, COUNT)), np.zeros((4, STATES)), np.eye(4), np.array(acts_from), voltage, w,
+            knots, places, PERIOD, True, out, shaft,
+        )  # fmt: skip
+        return out, shaft
+
+    whole, later = along([0, 0, 0, 0]), along([0, 0, 95, 195])
+    assert np.all(later[0][2, :95] == 0.0) and np.all(later[1][3, :195] == 0.0)
+    for a, b in zip(whole, later, strict=True):
+        assert np.abs(a[3]).max() > 0.0
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(a).max()
 
 
 def test_steady_current_is_that_of_the_circuit():
