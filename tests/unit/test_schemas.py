@@ -15,6 +15,7 @@ from tests.unit.recordings.test_catalogue_sheets import GERMAN
 from tests.unit.recordings.test_test_sheets import SHEETS
 
 DATA = Path(__file__).parents[1] / "data"
+CONFIG = Path(__file__).parents[2] / "config"
 T_MODEL = (
     "stator_resistance_ohm",
     "rotor_resistance_ohm",
@@ -117,6 +118,7 @@ def test_tables_of_points(capsys):
 def test_drive_files_recordings_and_failures(tmp_path, capsys):
     judge("drives_list", leave(capsys, "drives", "list")[1])
     judge("drives_show", leave(capsys, "drives", "show", "simulated")[1])
+    judge("drives_validate", leave(capsys, "drives", "validate", str(CONFIG / "drives" / "abb_acs380.toml"))[1])
     judge("failure", leave(capsys, "drives", "show", "nobody's")[1])
     path = tmp_path / "played.csv"
     judge("simulate", leave(capsys, "simulate", "motor_2kw2", "--out", str(path), "--seconds", "0.5")[1])
@@ -169,3 +171,11 @@ def test_adapters_and_accounts(tmp_path, capsys):
     code, known = leave(capsys, "accounts", "list", *runs)
     assert code == 0 and known["accounts"]
     judge("accounts", known)
+
+
+def test_a_study_of_a_recording_that_cannot_be_read(tmp_path, capsys):
+    (tmp_path / "one.csv").write_text("time_s,current_u_a\n0,1\n", encoding="utf-8")
+    (tmp_path / "study.toml").write_text('kind = "identify"\nfiles = "*.csv"\n', encoding="utf-8")
+    code, told = leave(capsys, "study", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--workers", "1")
+    assert (code, told["cases"]) == (0, 1), told
+    judge("study", told)
