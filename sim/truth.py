@@ -96,15 +96,17 @@ def axis_error_v(plant: Plant, axis_deg: float, current_a: float) -> float:
 
     Off the multiples of 30 degrees the legs also push across the axis; the cross current that answers is found first.
     """
-    resistance = plant.machine.stator_resistance_ohm
-    cross = brentq(lambda c: resistance * c + _leg_errors(plant, axis_deg, current_a, c)[1], -20.0, 20.0)
-    return _leg_errors(plant, axis_deg, current_a, float(cross))[0]
+    resistance, lost = plant.machine.stator_resistance_ohm, _leg_law(plant)
+    cross = brentq(lambda c: resistance * c + _leg_errors(lost, axis_deg, current_a, c)[1], -20.0, 20.0)
+    return _leg_errors(lost, axis_deg, current_a, float(cross))[0]
 
 
-def _leg_errors(plant: Plant, axis_deg: float, along_a: float, across_a: float) -> tuple[float, float]:
+def _leg_errors(
+    lost: Callable[[float], float], axis_deg: float, along_a: float, across_a: float
+) -> tuple[float, float]:
     """Leg errors (V) projected along and across the axis, for a current with both components."""
     angles = np.radians(axis_deg) - np.array([0.0, 2.0, -2.0]) * np.pi / 3.0
-    errors = [leg_error_v(plant, float(along_a * np.cos(a) - across_a * np.sin(a))) for a in angles]
+    errors = [lost(float(along_a * np.cos(a) - across_a * np.sin(a))) for a in angles]
     return float(2.0 / 3.0 * np.dot(errors, np.cos(angles))), float(-2.0 / 3.0 * np.dot(errors, np.sin(angles)))
 
 

@@ -6,7 +6,6 @@ import json
 import os
 import tempfile
 from collections import defaultdict
-from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -60,8 +59,8 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-TOGETHER = ("integration/service/browser/*", "integration/service/*")
-"""Tests that share a costly fixture of a whole session: a worker has all that one pattern names and none before it."""
+TOGETHER = ("integration/service/browser", "integration/service")
+"""Folders whose tests share a costly fixture of a whole session: one worker has them all, what lies in the first by itself."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
@@ -113,12 +112,12 @@ def _costliest_first(items: list[pytest.Item]) -> None:
 
 
 def _shared(item: pytest.Item) -> str | None:
-    """What the tests that belong together are called: their pattern, or their file where they share a fixture of the module
+    """What the tests that belong together are called: their folder, or their file where they share a fixture of the module
     or what a function keeps."""
+    for folder in TOGETHER:
+        if item.path.is_relative_to(TESTS / folder):
+            return folder
     file = item.path.relative_to(TESTS).as_posix()
-    for pattern in TOGETHER:
-        if fnmatch(file, pattern):
-            return pattern
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
     if any(fixture.scope == "module" and fixture.baseid.endswith(file) for made in fixtures for fixture in made):
         return file

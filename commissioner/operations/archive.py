@@ -91,18 +91,9 @@ def verify_folder(folder: Path, key: bytes | None) -> Verified:
     except (CommissionerError, OSError) as error:
         what = error.what if isinstance(error, CommissionerError) else str(error)
         return Verified(
-            folder.name,
-            DAMAGED,
-            (Loss(folder.name, None, what),),
-            "nothing that can be read",
-            0,
-            0,
-            0,
-            0,
-            "none",
-            (),
-            False,
-        )
+            folder.name, DAMAGED, (Loss(folder.name, None, what),), "nothing that can be read",
+            records=0, blocks=0, samples=0, lost_samples=0, seal="none", remarks=(), is_whole=False,
+        )  # fmt: skip
 
 
 def replay_run(runs: Path, run: str, *, salvage: bool = False) -> tuple[ReplayedRun, Verified]:

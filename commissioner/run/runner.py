@@ -32,11 +32,11 @@ from commissioner.run.ending import (
 from commissioner.run.holding.collector import set_aside, short_collections
 from commissioner.run.holding.priority import raised_priority
 from commissioner.run.stopping.operator_stop import Abandoned, OperatorStop, StopAsked
-from commissioner.run.stream import Stream, stop_if
+from commissioner.run.stream import Stream
 from commissioner.safety import commands as ask
 from commissioner.safety.limits import Bounds, SafetyFacts, after, permit
 from commissioner.safety.sensors import SensorWatch
-from commissioner.safety.watch import WatchLimits, judge_block, judge_status
+from commissioner.safety.watch import WatchLimits, judge_block, judge_status, stop_if
 
 STATUS_EVERY_S = 0.25
 """Motor time between two readings of the drive's status while energised."""

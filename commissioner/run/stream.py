@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from commissioner.errors import Aborted, DriveFault
+from commissioner.errors import DriveFault
 from commissioner.link.drive.inverter import Inverter
 from commissioner.records import DriveStatus, SampleBlock
 from commissioner.registers.window import StreamCursor
 from commissioner.safety.freshness import DriveClock
 from commissioner.safety.sensors import SensorWatch
-from commissioner.safety.watch import StopReason, WatchLimits, judge_status
+from commissioner.safety.watch import WatchLimits, judge_status, stop_if
 
 EMPTY_FETCH_PAUSE_S = 0.002
 """Wait after a window without new samples: a drive in real time needs a moment."""
@@ -121,14 +121,6 @@ class Stream:
     def _age_s(self, block: SampleBlock) -> float:
         assert self._clock is not None
         return self._clock.age_s(block.first_index + block.count, self._inverter.now_s())
-
-
-def stop_if(reason: StopReason | None) -> None:
-    """Raise what the reason amounts to; nothing where there is none."""
-    if reason is None:
-        return
-    kind = DriveFault if reason.is_fault else Aborted
-    raise kind(reason.what, step="watch", value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
 
 def _joined(first: SampleBlock, second: SampleBlock) -> SampleBlock:

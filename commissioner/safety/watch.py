@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from commissioner.errors import Aborted, DriveFault
 from commissioner.records import DriveStatus, SampleBlock
 
 
@@ -105,6 +106,14 @@ def judge_status(status: DriveStatus, limits: WatchLimits) -> StopReason | None:
     if status.winding_degc > limits.winding_degc:
         return StopReason("the winding is too hot", status.winding_degc, limits.winding_degc, "let the motor cool down")
     return _outside("the DC link left its range", status.dc_link_v, *limits.dc_link_v, "check the supply")
+
+
+def stop_if(reason: StopReason | None, step: str = "watch") -> None:
+    """Raise what the reason amounts to; nothing where there is none."""
+    if reason is None:
+        return
+    kind = DriveFault if reason.is_fault else Aborted
+    raise kind(reason.what, step=step, value=reason.value, limit=reason.limit, remedy=reason.remedy)
 
 
 def _outside(what: str, value: float, low: float, high: float, remedy: str) -> StopReason | None:

@@ -28,6 +28,7 @@ from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock
 from commissioner.safety.applied import judge_applied
+from commissioner.safety.watch import stop_if
 
 TELL_EVERY_S = 0.1
 """Motor time between two estimates in the journal."""
@@ -140,10 +141,8 @@ class UnderTest:
         instants = block.first_index + np.arange(-AROUND, block.count + AROUND, dtype=np.float64)
         asked_v = self._excitation.voltage_v(instants * block.sample_period_s, scale)
         peaks_v = scale * sum(t.amplitude_v for t in self._excitation.tones)
-        reason = judge_applied(block.voltage_axis_v, asked_v, peaks_v, bias_v)
-        if reason is not None:
-            step = f"multitone test, axis {self._axis_deg:g} deg"
-            raise Aborted(reason.what, step=step, value=reason.value, limit=reason.limit, remedy=reason.remedy)
+        step = f"multitone test, axis {self._axis_deg:g} deg"
+        stop_if(judge_applied(block.voltage_axis_v, asked_v, peaks_v, bias_v), step)
 
     def is_done(self, longest_s: float) -> bool:
         """The planned time is up and the estimate at rest, or no more time is allowed."""

@@ -6,8 +6,9 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
+from commissioner.errors import Aborted, DriveFault
 from commissioner.records import DriveStatus, SampleBlock
-from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status
+from commissioner.safety.watch import StopReason, WatchLimits, judge_block, judge_status, stop_if
 
 LIMITS = WatchLimits(
     current_a=5.0,
@@ -135,3 +136,20 @@ def test_a_healthy_status_is_no_reason_to_stop():
 def test_nobody_can_change_a_limit_or_a_reason(record):
     with pytest.raises(FrozenInstanceError):
         setattr(record, next(iter(record.__dataclass_fields__)), 99.0)
+
+
+@pytest.mark.parametrize(("is_fault", "kind"), [(True, DriveFault), (False, Aborted)])
+def test_a_reason_ends_the_run_as_what_it_is(is_fault, kind):
+    reason = StopReason("the winding is too hot", 130.0, 120.0, "let the motor cool down", is_fault)
+    with pytest.raises(kind) as ended:
+        stop_if(reason, "a test")
+    told = ended.value.as_dict()
+    assert (ended.value.what, told["step"], told["value"], told["limit"]) == (reason.what, "a test", 130.0, 120.0)
+    assert told["remedy"] == reason.remedy
+    with pytest.raises(kind) as ended:
+        stop_if(reason)
+    assert ended.value.as_dict()["step"] == "watch"
+
+
+def test_no_reason_ends_nothing():
+    stop_if(None)
