@@ -15,6 +15,13 @@ def drive_words(drive_type: str, serial_number: int | None) -> str:
 
 
 Signal = NDArray[np.float64]
+
+
+def peak(signal: Signal) -> float:
+    """The largest magnitude; NaN where there is one."""
+    return float(np.abs(signal).max())
+
+
 RPM = 30.0 / np.pi
 """1/min per rad/s."""
 POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")

@@ -21,9 +21,12 @@ def clarke(u: Signal, v: Signal, w: Signal | None) -> tuple[Signal, Signal]:
 
 def axis_current_a(current_u_a: Signal, current_v_a: Signal, current_w_a: Signal | None, axis_deg: float) -> Signal:
     """The current vector's component along the axis."""
-    alpha, beta = clarke(current_u_a, current_v_a, current_w_a)
-    angle = math.radians(axis_deg)
-    return np.asarray(alpha * math.cos(angle) + beta * math.sin(angle), dtype=np.float64)
+    of_u, of_v, of_w = (2.0 / 3.0 * cosine for cosine in phase_cosines(axis_deg))
+    if current_w_a is None:
+        along = (of_u - of_w) * current_u_a + (of_v - of_w) * current_v_a
+    else:
+        along = of_u * current_u_a + of_v * current_v_a + of_w * current_w_a
+    return np.asarray(along, dtype=np.float64)
 
 
 def orthogonal_current_a(

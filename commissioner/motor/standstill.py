@@ -49,29 +49,47 @@ def continuous(machine: InverseGamma) -> tuple[Matrix, Matrix]:
 
 def held_input(machine: InverseGamma, period_s: float) -> tuple[Matrix, Matrix]:
     """(Ad, bd): x[k+1] = Ad x[k] + bd u[k] with x = (i, psi_R) and u held over `period_s`. Exact."""
-    matrix, gain = continuous(machine)
+    r_s, r_r, l_s, l_m = machine.as_tuple()
     slow, fast = poles_per_s(machine)
-    identity = np.eye(2)
-    onto_slow = (matrix - fast * identity) / (slow - fast)
-    onto_fast = identity - onto_slow
-    discrete = onto_slow * math.exp(slow * period_s) + onto_fast * math.exp(fast * period_s)
-    weights = onto_slow * (math.expm1(slow * period_s) / slow) + onto_fast * (math.expm1(fast * period_s) / fast)
-    return discrete, weights @ gain
+    kept = math.exp(slow * period_s), math.exp(fast * period_s)
+    taken = math.expm1(slow * period_s) / slow, math.expm1(fast * period_s) / fast
+    # Projection onto the slow eigenvector; that onto the fast one is what is left of the identity.
+    apart = slow - fast
+    p11, p12 = (-(r_s + r_r) / l_s - fast) / apart, r_r / (l_m * l_s) / apart
+    p21, p22 = r_r / apart, (-r_r / l_m - fast) / apart
+
+    def of(slow_part: float, fast_part: float) -> tuple[float, float, float, float]:
+        step = slow_part - fast_part
+        return fast_part + p11 * step, p12 * step, p21 * step, fast_part + p22 * step
+
+    d11, d12, d21, d22 = of(*kept)
+    w11, _, w21, _ = of(*taken)
+    return np.array([[d11, d12], [d21, d22]]), np.array([w11 / l_s, w21 / l_s])
 
 
 def to_pulse_transfer(machine: InverseGamma, period_s: float) -> PulseTransfer:
     """The z-transform of the machine behind a zero-order hold."""
-    _r_s, r_r, l_s, l_m = machine.as_tuple()
+    return PulseTransfer(*pulse_transfers(np.array([machine.as_tuple()]), period_s)[0].tolist())
+
+
+def pulse_transfers(machines: Matrix, period_s: float) -> Matrix:
+    """(n, 4): (a1, a0, b1, b0) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M)."""
+    r_s, r_r, l_s, l_m = machines.T
     alpha = r_r / l_m
-    slow, fast = poles_per_s(machine)
-    slow_z, fast_z = math.exp(slow * period_s), math.exp(fast * period_s)
-    residue_slow = (slow + alpha) / (l_s * (slow - fast)) * math.expm1(slow * period_s) / slow
-    residue_fast = (fast + alpha) / (l_s * (fast - slow)) * math.expm1(fast * period_s) / fast
-    return PulseTransfer(
-        a1=-(slow_z + fast_z),
-        a0=slow_z * fast_z,
-        b1=residue_slow + residue_fast,
-        b0=-(residue_slow * fast_z + residue_fast * slow_z),
+    half = 0.5 * ((r_s + r_r) / l_s + alpha)
+    product = alpha * r_s / l_s
+    fast = -(half + np.sqrt(np.maximum(half * half - product, 0.0)))
+    slow = product / fast
+    slow_z, fast_z = np.exp(slow * period_s), np.exp(fast * period_s)
+    residue_slow = (slow + alpha) / (l_s * (slow - fast)) * np.expm1(slow * period_s) / slow
+    residue_fast = (fast + alpha) / (l_s * (fast - slow)) * np.expm1(fast * period_s) / fast
+    return np.column_stack(
+        [
+            -(slow_z + fast_z),
+            slow_z * fast_z,
+            residue_slow + residue_fast,
+            -(residue_slow * fast_z + residue_fast * slow_z),
+        ]
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.space_vector import axis_current_a
-from commissioner.records import SampleBlock, Signal, StandstillRecording
+from commissioner.records import SampleBlock, Signal, StandstillRecording, peak
 
 
 def assemble(
@@ -32,18 +32,19 @@ def assemble(
         rows.append((segment, block))
     if not rows:
         return None
-    averaged = np.concatenate([np.full(block.count, block.averaged, dtype=np.int64) for _, block in rows])
+    counts = [block.count for _, block in rows]
+    averaged = np.repeat(np.array([block.averaged for _, block in rows], dtype=np.int64), counts)
     has_means, period_s = bool(np.any(averaged > 1)), rows[0][1].sample_period_s / rows[0][1].averaged
     third = [block.current_w_a for _, block in rows if block.current_w_a is not None]
     return StandstillRecording(
         time_s=np.concatenate(times),
-        segment=np.concatenate([np.full(block.count, segment, dtype=np.int64) for segment, block in rows]),
-        axis_deg=np.concatenate([np.full(block.count, block.axis_deg) for _, block in rows]),
+        segment=np.repeat(np.array([segment for segment, _ in rows], dtype=np.int64), counts),
+        axis_deg=np.repeat([float(block.axis_deg) for _, block in rows], counts),
         voltage_axis_v=np.concatenate([block.voltage_axis_v for _, block in rows]),
         current_u_a=np.concatenate([block.current_u_a for _, block in rows]),
         current_v_a=np.concatenate([block.current_v_a for _, block in rows]),
         current_w_a=np.concatenate(third) if len(third) == len(rows) else None,
-        dc_link_v=np.concatenate([np.full(block.count, block.dc_link_v) for _, block in rows]),
+        dc_link_v=np.repeat([float(block.dc_link_v) for _, block in rows], counts),
         sample_period_s=period_s,
         metadata={**metadata, "sample_period_s": period_s} if has_means else metadata,
         source=source,
@@ -65,7 +66,7 @@ def highest_stator_flux_wb(blocks: Iterable[tuple[int, SampleBlock]], machine: I
         seen = axis_current_a(block.current_u_a, block.current_v_a, block.current_w_a, block.axis_deg)
         if flux is None or segment != current:
             current, flux, offset_a = segment, CurrentFlux(machine, block.sample_period_s), float(np.mean(seen))
-        highest = max(highest, float(np.max(np.abs(flux.advance(seen - offset_a, block.lost_before)))))
+        highest = max(highest, peak(flux.advance(seen - offset_a, block.lost_before)))
     return highest
 
 

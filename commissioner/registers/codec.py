@@ -6,6 +6,8 @@ import math
 import struct
 from collections.abc import Mapping, Sequence
 
+from fastcrc import crc16
+
 from commissioner.errors import ReplyMismatch, UsageError
 from commissioner.registers.profile import Item, Span
 
@@ -71,23 +73,7 @@ def crc16_bytes(data: bytes) -> int:
 
     Zero over a whole RTU frame, whose last two bytes are the sum, low byte first.
     """
-    crc = 0xFFFF
-    table = _CRC_TABLE
-    for byte in data:
-        crc = crc >> 8 ^ table[(crc ^ byte) & 0xFF]
-    return crc
-
-
-def _crc_table() -> tuple[int, ...]:
-    def entry(byte: int) -> int:
-        for _ in range(8):
-            byte = byte >> 1 ^ 0xA001 if byte & 1 else byte >> 1
-        return byte
-
-    return tuple(entry(byte) for byte in range(256))
-
-
-_CRC_TABLE = _crc_table()
+    return crc16.modbus(data)
 
 
 def _decode_element(item: Item, words: Sequence[int]) -> float | int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -181,6 +182,15 @@ class WindowLayout:
     @cached_property
     def words(self) -> int:
         return self.header_words + self.data_registers
+
+    @cached_property
+    def header_names(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in self.header)
+
+    @cached_property
+    def header_form(self) -> struct.Struct:
+        codes = {"u16": "H", "i16": "h", "u32": "I", "i32": "i"}
+        return struct.Struct(">" + "".join(codes[kind] for _, kind in self.header))
 
 
 @dataclass(frozen=True)

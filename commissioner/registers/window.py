@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,16 @@ class StreamFormat:
     @property
     def channels(self) -> int:
         return self.channel_mask.bit_count()
+
+    @cached_property
+    def bits(self) -> tuple[int, ...]:
+        """Of the channels, in the window's order."""
+        return tuple(bit for bit in CHANNEL_BITS.values() if self.channel_mask & bit)
+
+    @cached_property
+    def scales(self) -> NDArray[np.float64]:
+        """(channels, 1): unit per count."""
+        return np.array([[self.voltage_scale_v if b == VOLTAGE_BIT else self.current_scale_a] for b in self.bits])
 
     @property
     def samples_per_window(self) -> int:
@@ -136,9 +147,7 @@ def decode_window(words: Sequence[int], cursor: StreamCursor, asked: int | None 
 
 
 def _decode_header(layout: WindowLayout, packed: bytes) -> dict[str, int]:
-    codes = {"u16": "H", "i16": "h", "u32": "I", "i32": "i"}
-    form = ">" + "".join(codes[kind] for _, kind in layout.header)
-    return dict(zip((name for name, _ in layout.header), struct.unpack_from(form, packed), strict=True))
+    return dict(zip(layout.header_names, layout.header_form.unpack_from(packed), strict=True))
 
 
 def _examine(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:
@@ -167,7 +176,7 @@ def _accept(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> Wind
     claims = {name: bool(header["flags"] & mask) for name, mask in flags.items()}
     return Window(
         block=_block(packed, header, cursor.stream, lost, claims["clipped"]) if count else None,
-        cursor=replace(cursor, next_index=first + count, lost=cursor.lost + lost) if count else cursor,
+        cursor=StreamCursor(cursor.stream, first + count, cursor.lost + lost) if count else cursor,
         is_running=claims["running"],
         is_clipped=claims["clipped"],
         is_overrun=claims["overrun"],
@@ -179,11 +188,8 @@ def _accept(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> Wind
 def _block(packed: bytes, header: dict[str, int], stream: StreamFormat, lost: int, is_clipped: bool) -> SampleBlock:
     shape = (header["count"], stream.channels)
     data = np.frombuffer(packed, ">i2", shape[0] * shape[1], 2 * stream.layout.header_words).reshape(shape)
-    scales = {VOLTAGE_BIT: stream.voltage_scale_v}
-    bits = [bit for bit in CHANNEL_BITS.values() if stream.channel_mask & bit]
-    columns: dict[int, NDArray[np.float64]] = {
-        bit: data[:, k] * np.float64(scales.get(bit, stream.current_scale_a)) for k, bit in enumerate(bits)
-    }
+    scaled = np.multiply(data.T, stream.scales, order="C")
+    columns: dict[int, NDArray[np.float64]] = dict(zip(stream.bits, scaled, strict=True))
     return SampleBlock(
         session=stream.session,
         first_index=header["first_index"],

@@ -3,9 +3,7 @@ amplitude is seen so before the next poll for it."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 from commissioner.safety.watch import StopReason
 
 MOST_APPLIED = 1.25
@@ -17,8 +15,8 @@ ROOM = 0.1
 def judge_applied(seen_v: Signal, asked_v: Signal, peaks_v: float, bias_v: float) -> StopReason | None:
     """The reason to stop that a block's voltages `(n,)` give; `asked_v` `(m,)` are the tones about its instants at the amplitude asked
     for, `peaks_v` the same tones all at their peaks, `bias_v` the direct voltage asked for; all along the axis."""
-    most_v = abs(bias_v) + MOST_APPLIED * float(np.max(np.abs(asked_v))) + ROOM * peaks_v
-    largest_v = float(np.max(np.abs(seen_v)))
+    most_v = abs(bias_v) + MOST_APPLIED * peak(asked_v) + ROOM * peaks_v
+    largest_v = peak(seen_v)
     if largest_v <= most_v:
         return None
     return StopReason(

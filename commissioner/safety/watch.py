@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import Aborted, DriveFault
-from commissioner.records import DriveStatus, SampleBlock
+from commissioner.records import DriveStatus, SampleBlock, peak
 
 
 @dataclass(frozen=True)
@@ -125,4 +125,4 @@ def _outside(what: str, value: float, low: float, high: float, remedy: str) -> S
 def _peak(block: SampleBlock) -> float:
     """Largest phase current magnitude; with two sensors the third phase follows from the sum."""
     w = block.current_w_a if block.current_w_a is not None else -(block.current_u_a + block.current_v_a)
-    return max(float(np.max(np.abs(phase))) for phase in (block.current_u_a, block.current_v_a, w))
+    return peak(np.concatenate((block.current_u_a, block.current_v_a, w)))

@@ -40,6 +40,7 @@ def warm_up(plant: Plant, drive_map: DriveMap) -> None:
     run_interrupts(1, x, p, e, s, ring.c, white, ring.history, ring.means, ring.ring, ring.flags, trip)
     coast(x, p, 0.001)
     crc16(np.zeros(1, np.int64))
+    ring.window(0, 1, 0, 0.0, is_running=False)
 
 
 class Firmware:

@@ -132,10 +132,36 @@ def _finish_sample(c, means, ring, flags, capacity):
 @kernel
 def crc16(words):
     """CRC-16/MODBUS over 16-bit registers, high byte first (polynomial 0xA001 reflected, start 0xFFFF)."""
-    crc = 0xFFFF
+    return crc16_from(0xFFFF, words)
+
+
+@kernel
+def crc16_from(crc, words):
+    """The same, carried on."""
     for word in words:
         for byte in ((word >> 8) & 0xFF, word & 0xFF):
             crc ^= byte
             for _ in range(8):
                 crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
     return crc
+
+
+@kernel
+def copy_samples(ring, flags, first, count, mask, words):
+    """Samples `first` ... of the channels in the mask, as unsigned words, one sample after the other; what any is flagged with."""
+    at_word, seen = 0, 0
+    for k in range(first, first + count):
+        row = k % ring.shape[0]
+        seen |= flags[row]
+        for channel in range(ring.shape[1]):
+            if mask >> channel & 1:
+                words[at_word] = ring[row, channel] & 0xFFFF
+                at_word += 1
+    return seen
+
+
+@kernel
+def check_sum(words, header, used):
+    """Of a window: its header without the sum itself, which is its last word, and the words in use."""
+    crc = crc16_from(0xFFFF, words[: header - 1])
+    return crc16_from(crc, words[header : header + used])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from sim.drive.drive_map import DriveMap
-from sim.drive.live import CHANNELS, HISTORY, crc16
+from sim.drive.live import CHANNELS, HISTORY, check_sum, copy_samples
 from sim.physics import layout as at
 
 VOLTAGE_STEP_V = 0.01
 LINK_STEP_V = 0.02
+HEADER = 8
 
 
 class SampleRing:
@@ -39,7 +42,7 @@ class SampleRing:
         """Largest phase current of the last sample, in counts."""
         return float(np.max(np.abs(self.ring[(self.produced - 1) % self.capacity, 1:])))
 
-    @property
+    @cached_property
     def channels(self) -> list[int]:
         return [k for k in range(CHANNELS) if self.mask >> k & 1]
 
@@ -54,14 +57,14 @@ class SampleRing:
         self.overruns += max(0, oldest - self.next_unread)
         first = max(wanted, oldest)
         first, count = self._around_gaps(first, max(0, min(samples, self.produced - first)))
-        flags = self._flags(first, count, was_overrun=wanted < oldest, is_running=is_running)
         self.next_unread = max(self.next_unread, oldest, first + count)
         link = round(link_v / LINK_STEP_V) & 0xFFFF
-        header = [session, first >> 16 & 0xFFFF, first & 0xFFFF, count, self.mask, flags, link]
-        data = self._data(first, count)
-        crc = int(crc16(np.concatenate([np.array(header, np.int64), data])))
-        words = [*header, crc, *data.tolist()]
-        return words + [0] * (self.map.window_words - len(words))
+        words = np.zeros(self.map.window_words, np.int64)
+        seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[HEADER:]))
+        flags = seen | self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
+        words[: HEADER - 1] = session, first >> 16 & 0xFFFF, first & 0xFFFF, count, self.mask, flags, link
+        words[HEADER - 1] = check_sum(words, HEADER, count * len(self.channels))
+        return words.tolist()
 
     def forget(self) -> None:
         """Fault knob: all that nobody has read yet is overwritten, as in a ring that is shorter than it claims."""
@@ -84,14 +87,7 @@ class SampleRing:
                 count = start - first
         return first, min(count, max(0, self.produced - first))
 
-    def _rows(self, first: int, count: int) -> np.ndarray:
-        return np.arange(first, first + count) % self.capacity
-
-    def _data(self, first: int, count: int) -> np.ndarray:
-        return (self.ring[self._rows(first, count)][:, self.channels].astype(np.int64) & 0xFFFF).reshape(-1)
-
-    def _flags(self, first: int, count: int, *, was_overrun: bool, is_running: bool) -> int:
+    def _flags(self, end: int, *, was_overrun: bool, is_running: bool) -> int:
         names = self.map.flags
-        flags = int(np.bitwise_or.reduce(self.flags[self._rows(first, count)], initial=0))
-        flags |= names["running"] * is_running | names["overrun"] * was_overrun
-        return flags | names["ended"] * (self.has_ended and first + count >= self.produced)
+        flags = names["running"] * is_running | names["overrun"] * was_overrun
+        return flags | names["ended"] * (self.has_ended and end >= self.produced)

@@ -29,6 +29,7 @@ from commissioner.identify.inverter.leg_pair import (
     TYPICAL_KNEE,
     TYPICAL_SHARE,
     PairLaw,
+    law_of_knee,
 )
 from commissioner.identify.inverter.mixture import chances_of, mixture
 from commissioner.records import Signal
@@ -103,9 +104,16 @@ def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: S
         ]
         return np.concatenate([root @ (curve(p) - mean), prior])
 
-    fit = least_squares(
-        misfit, [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical], method="lm", max_nfev=300
-    )
+    def jacobian(p: Signal) -> Matrix:
+        total, ratio, k1, k2 = np.exp(np.clip(p, -30.0, 30.0))
+        share = ratio / (1.0 + ratio)
+        of_dead, of_drop = (1.0 - share) * law_of_knee(dead, current / k1), share * law_of_knee(drop, current / k2)
+        by_ratio = (1.0 - share) * of_drop[:, 0] - share * of_dead[:, 0]
+        rows = total * np.column_stack([of_dead[:, 0] + of_drop[:, 0], by_ratio, of_dead[:, 1], of_drop[:, 1]])
+        return np.vstack([root @ rows, np.diag([0.0, 1.0 / SHARE_SPREAD, 1.0 / KNEE_SPREAD, 1.0 / KNEE_SPREAD])[1:]])
+
+    start = [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical]
+    fit = least_squares(misfit, start, jacobian, method="lm", max_nfev=300)
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)
     jacobian = np.linalg.solve(root, fit.jac[: mean.size])
     total, ratio, knee_1, knee_2 = map(float, np.exp(np.clip(fit.x, -30.0, 30.0)))

@@ -42,18 +42,13 @@ class Amplitude:
     sample_period_s: float
 
     @property
-    def _volts(self) -> float:
-        """All tones at their peaks at once."""
-        return sum(t.amplitude_v for t in self.forecast.excitation.tones)
-
-    @property
     def safe(self) -> float:
         """The scale at which no motor whatever can pass the flux limit.
 
         Either flux stays below it even without resistance and inverter, or the whole command stays inside the measured
         dead band (`SURE_LOSS` of it), where no current flows. The two do not add up: fast tones carry slow ones across.
         """
-        in_dead_band = SURE_LOSS * self.plateau_v / max(self._volts, 1e-12)
+        in_dead_band = SURE_LOSS * self.plateau_v / max(self.forecast.excitation.peaks_v, 1e-12)
         return min(1.0, max(self.limit_wb / max(self._bound_wb(), 1e-12), in_dead_band))
 
     def _bound_wb(self) -> float:
@@ -117,7 +112,7 @@ class Amplitude:
     def unsure(self, machine: InverseGamma, scale: float) -> float:
         """A small raise: it adds at most `CURRENT_STEP` of the permitted current, all tones at their peaks at once."""
         ohms = machine.stator_resistance_ohm + machine.rotor_resistance_ohm
-        return min(SMALL_RAISE * scale, scale + CURRENT_STEP * self.current_a * ohms / max(self._volts, 1e-12))
+        return min(SMALL_RAISE * scale, scale + CURRENT_STEP * self.current_a * ohms / max(self.forecast.excitation.peaks_v, 1e-12))
 
 
 def _largest(low: float, high: float, is_permitted: Callable[[float], bool]) -> float:

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.signal import lfilter
-
+from commissioner.compiled import writable
+from commissioner.identify.excite.kernels import driven_flux
 from commissioner.motor.circuit import InverseGamma
 from commissioner.records import Signal
 
@@ -29,8 +28,8 @@ class CurrentFlux:
         """The stator flux at the samples, `(n,)`; what was lost before them is bridged with the first current."""
         machine = self.machine
         keeps = math.exp(-self.sample_period_s * machine.rotor_resistance_ohm / machine.magnetizing_inductance_h)
-        bridged = np.append(np.full(lost_before, current_a[0]), current_a)
-        driven = (1.0 - keeps) * machine.magnetizing_inductance_h * bridged
-        rotor = lfilter([1.0], [1.0, -keeps], driven, zi=[keeps * self.rotor_flux_wb])[0]
-        self.rotor_flux_wb = float(rotor[-1])
-        return np.asarray(rotor[lost_before:] + machine.leakage_inductance_h * current_a)
+        flux, self.rotor_flux_wb = driven_flux(
+            writable(current_a), lost_before, keeps, machine.magnetizing_inductance_h, machine.leakage_inductance_h,
+            self.rotor_flux_wb,
+        )  # fmt: skip
+        return flux

@@ -17,13 +17,15 @@ from functools import cached_property
 
 import numpy as np
 
+from commissioner.compiled import writable
 from commissioner.identify.excite.amplitude import TARGET, Amplitude
 from commissioner.identify.excite.forecast import Forecast
+from commissioner.identify.excite.kernels import integrated_flux
 from commissioner.identify.excite.tones import Excitation
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
 from commissioner.identify.observer.observer import BlockEstimate
 from commissioner.motor.circuit import InverseGamma
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 BACK_OFF_ABOVE = 0.99
 ABORT_ABOVE = 1.01
@@ -89,7 +91,7 @@ class FluxGuard:
     trip_a: float = math.inf
     began_s: float = 0.0
     """Time between the excitation's start and the first sample."""
-    _integral: tuple[float, float] = field(default=(0.0, 0.0), init=False)
+    _integral: Signal = field(default_factory=lambda: np.zeros(2), init=False)
     _samples: int = field(default=0, init=False)
     _scale_since_s: float = field(default=0.0, init=False)
     _last_scale: float = field(default=0.0, init=False)
@@ -132,13 +134,12 @@ class FluxGuard:
         self._samples += lost_before + voltage_v.shape[0]
         time_s = self._samples * self.sample_period_s
         model_free = self._integrate(voltage_v, current_a)
-        observer = np.abs(estimate.stator_flux_wb)
-        observer_wb, model_free_wb = float(np.max(observer)), float(np.max(np.abs(model_free)))
+        observer_wb, model_free_wb = peak(estimate.stator_flux_wb), peak(model_free)
         predicted_wb, predicted_a = self._predict(estimate, float(model_free[-1]), time_s, present_scale)
         fraction = max(observer_wb, model_free_wb, predicted_wb) / self.limit_wb
-        largest_a = float(np.max(np.abs(current_a)))
+        largest_a = peak(current_a)
         current_fraction = max(largest_a, predicted_a) / (0.5 * (self.current_a + self.trip_a))
-        difference = float(np.max(np.abs(estimate.stator_flux_wb - model_free)))
+        difference = peak(estimate.stator_flux_wb - model_free)
         self._recent = [r for r in self._recent if time_s - r.time_s < self._window_s]
         self._recent.append(_Seen(time_s, difference, max(observer_wb, model_free_wb), largest_a))
         if abs(present_scale - self._last_scale) > 1e-4 or age_s > self.latency_s:
@@ -147,7 +148,7 @@ class FluxGuard:
         permitted = self._permit(estimate, present_scale, time_s, current_a)
         agreed_wb = min(observer_wb, model_free_wb)
         advice, permitted = self._advise(fraction, current_fraction, agreed_wb, present_scale, permitted, time_s)
-        rotor_wb = float(np.max(np.abs(estimate.rotor_flux_wb)))
+        rotor_wb = peak(estimate.rotor_flux_wb)
         return FluxReading(
             observer_wb, model_free_wb, predicted_wb, rotor_wb, fraction, current_fraction, advice, permitted
         )
@@ -163,21 +164,12 @@ class FluxGuard:
         return max(0.25 / self._lowest_hz, 0.2)
 
     def _integrate(self, voltage_v: Signal, current_a: Signal) -> Signal:
-        """psi' = u - R_s i - F(i) - 2 zeta w psi - w^2 integral(psi); mean current over the period by trapezoid."""
-        from scipy.signal import lfilter
-
-        following = np.append(
-            current_a[1:], 2.0 * current_a[-1] - current_a[-2] if current_a.size > 1 else current_a[-1]
-        )
-        mean = 0.5 * (current_a + following)
-        emf = voltage_v - self.stator_resistance_ohm * mean - self.inverter.on_axis(mean, self.axis_deg)
+        """(b): the model-free estimate at the block's samples."""
         corner = 2.0 * math.pi * 0.08 * self._lowest_hz * self.sample_period_s
-        # Damped high-pass times integrator, as one difference equation; two states in direct form II transposed.
-        a = [1.0, -2.0 + 1.4 * corner, 1.0 - 1.4 * corner + corner * corner]
-        b = [self.sample_period_s, -self.sample_period_s]
-        flux, final = lfilter(b, a, emf, zi=np.array(self._integral))
-        self._integral = (float(final[0]), float(final[1]))
-        return np.asarray(flux)
+        return integrated_flux(
+            writable(voltage_v), writable(current_a), self.stator_resistance_ohm, self._forecast.lost_v,
+            self._forecast.span_a, self.sample_period_s, corner, self._integral,
+        )  # fmt: skip
 
     def _predict(
         self, estimate: BlockEstimate, model_free_wb: float, time_s: float, scale: float

@@ -11,12 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from commissioner.compiled import writable
+from commissioner.identify.excite.kernels import sum_of_tones
 from commissioner.identify.excite.minimax import FEWEST_SHARE, minimax_cost
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
 from commissioner.motor.circuit import InverseGamma
@@ -50,10 +52,17 @@ class Excitation:
 
     def over_scale(self, time_s: Signal) -> Callable[[float | Signal], Signal]:
         """`voltage_v` at the instants over the scale."""
-        total = np.zeros_like(time_s)
-        for tone in self.tones:
-            total += tone.amplitude_v * np.cos(2.0 * np.pi * tone.frequency_hz * time_s + tone.phase_rad)
+        total = sum_of_tones(writable(time_s), self._table)
         return lambda scale: np.asarray(self.dc_bias_v + scale * total)
+
+    @cached_property
+    def peaks_v(self) -> float:
+        """All tones at their peaks at once."""
+        return sum(t.amplitude_v for t in self.tones)
+
+    @cached_property
+    def _table(self) -> Signal:
+        return np.array([(t.amplitude_v, t.frequency_hz, t.phase_rad) for t in self.tones]).reshape(-1, 3)
 
 
 @dataclass(frozen=True)

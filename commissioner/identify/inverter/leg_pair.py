@@ -63,6 +63,12 @@ DEAD_TIME: dict[str, Shape] = {
 THRESHOLD: dict[str, Shape] = {"hyperbola": _power(1.0), "root": _power(2.0), "tanh": np.tanh}
 
 
+def law_of_knee(law: Shape, of_knee: Signal) -> Matrix:
+    """(n, 2): the law at currents counted in its knee, and its derivative by the knee's logarithm."""
+    less, more = law(of_knee * math.exp(-KNEE_STEP)), law(of_knee * math.exp(KNEE_STEP))
+    return np.column_stack([law(of_knee), (less - more) / (2.0 * KNEE_STEP)])
+
+
 @dataclass(frozen=True)
 class PairLaw:
     """Values: plateau of the dead time (V), of the threshold (V), and their knees' logarithmic steps times them (V)."""
@@ -84,12 +90,8 @@ class PairLaw:
             (DEAD_TIME[self.dead_time], self.dead_time_knee_a),
             (THRESHOLD[self.threshold], self.threshold_knee_a),
         )
-        values = [law(size / knee) for law, knee in laws]
-        slopes = [
-            (law(size / knee * math.exp(-KNEE_STEP)) - law(size / knee * math.exp(KNEE_STEP))) / (2.0 * KNEE_STEP)
-            for law, knee in laws
-        ]
-        return np.asarray(np.sign(current_a)[:, None] * np.column_stack(values + slopes))
+        (dead, dead_step), (drop, drop_step) = (law_of_knee(law, size / knee).T for law, knee in laws)
+        return np.asarray(np.sign(current_a)[:, None] * np.column_stack([dead, drop, dead_step, drop_step]))
 
     def on_axis(self, current_a: Signal, axis_deg: float) -> Matrix:
         """(n, 4): axis voltage per unit of each value, all current along the axis."""

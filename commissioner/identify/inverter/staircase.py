@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from commissioner.errors import DataRefused
@@ -230,8 +231,15 @@ def _fit_shape(
         wide = [0.3 * math.log(p[2] / (0.02 * largest)), p[3] / (0.03 * largest)]
         return np.concatenate([(voltage - p[0] * true - shape.on_axis(true, axis_deg)) / noise, wide])
 
+    def jacobian(p: Signal) -> NDArray[np.float64]:
+        """The unit loss is a function of current over knee."""
+        true = current - (p[3] if has_both_signs else 0.0)
+        unit, slope = _with_slope(knee_shape(1.0, p[2], tail), true, axis_deg)
+        rows = np.column_stack([-true, -unit, p[1] / p[2] * true * slope, has_both_signs * (p[0] + p[1] * slope)])
+        return np.vstack([rows / noise, [0.0, 0.0, 0.3 / p[2], 0.0], [0.0, 0.0, 0.0, 1.0 / (0.03 * largest)]])
+
     for _ in range(2):
-        fit = least_squares(misfit, start, bounds=(lower, np.inf), x_scale=scale)
+        fit = least_squares(misfit, start, jacobian, bounds=(lower, np.inf), x_scale=scale)
         start = fit.x
         residual = misfit(fit.x)[: voltage.size] * noise
         noise = max(math.sqrt(float(residual @ residual) / max(voltage.size - 4, 1)), 3e-5 * top_v)
@@ -239,6 +247,19 @@ def _fit_shape(
     if not has_both_signs:
         fit.x[3] = 0.0
     return _ShapeFit(tail, fit.x, std, max(float(np.mean(residual**2)), (1e-5 * top_v) ** 2))
+
+
+def _with_slope(shape: InverterError, axis_current_a: Signal, axis_deg: float) -> tuple[Signal, Signal]:
+    """(loss along the axis, its derivative by the axis current), all current along the axis."""
+    loss, slope = np.zeros_like(axis_current_a), np.zeros_like(axis_current_a)
+    knots, volts = np.array(shape.current_a), np.array(shape.voltage_v)
+    per_a = np.append(np.diff(volts) / np.diff(knots), 0.0)
+    for cosine in phase_cosines(axis_deg):
+        leg_a = cosine * axis_current_a
+        size = np.abs(leg_a)
+        loss += 2.0 / 3.0 * cosine * np.sign(leg_a) * np.interp(size, knots, volts)
+        slope += 2.0 / 3.0 * cosine**2 * per_a[np.searchsorted(knots, size, side="right") - 1]
+    return loss, slope
 
 
 def knee_shape(plateau_v: float, knee_a: float, tail: float) -> InverterError:

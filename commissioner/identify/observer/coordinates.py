@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from commissioner.errors import UsageError
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import ParameterBox
-from commissioner.motor.standstill import poles_per_s, to_pulse_transfer
+from commissioner.motor.standstill import poles_per_s, pulse_transfers, to_pulse_transfer
 from commissioner.records import Signal
 
 Matrix = NDArray[np.float64]
@@ -59,16 +59,21 @@ def require_margin(prior: ParameterBox, filter_z: Matrix, period_s: float) -> No
 
 def to_theta(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
     """(theta_1, theta_2), `(4,)`: partial fractions of (Lambda - A)/Lambda and B/Lambda at f1 and f2."""
-    t = to_pulse_transfer(machine, period_s)
+    return np.asarray(_thetas(np.array([machine.as_tuple()]), filter_z, period_s)[0])
+
+
+def _thetas(machines: Matrix, filter_z: Matrix, period_s: float) -> Matrix:
+    """(n, 4) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M)."""
+    a1, a0, b1, b0 = pulse_transfers(machines, period_s).T
     f1, f2 = filter_z
-    g1, g2 = 1.0 - f1, 1.0 - f2
     spread = f1 - f2
-    return np.array(
+    at_1, at_2 = (1.0 - f1) * spread, (1.0 - f2) * spread
+    return np.column_stack(
         [
-            -(f1 * f1 + t.a1 * f1 + t.a0) / (g1 * spread),
-            (f2 * f2 + t.a1 * f2 + t.a0) / (g2 * spread),
-            (t.b1 * f1 + t.b0) / (g1 * spread),
-            -(t.b1 * f2 + t.b0) / (g2 * spread),
+            -(f1 * f1 + a1 * f1 + a0) / at_1,
+            (f2 * f2 + a1 * f2 + a0) / at_2,
+            (b1 * f1 + b0) / at_1,
+            -(b1 * f2 + b0) / at_2,
         ]
     )
 
@@ -83,24 +88,17 @@ def ud_factors(covariance: Matrix) -> tuple[Matrix, Matrix]:
 
 def theta_jacobian(machine: InverseGamma, filter_z: Matrix, period_s: float) -> Matrix:
     """d theta / d(R_s, R_R, L_sigma, L_M), (4, 4), by central differences."""
-    columns = []
-    for j, value in enumerate(machine.as_tuple()):
-        step = 1e-4 * value
-        pair = []
-        for sign in (1.0, -1.0):
-            moved = list(machine.as_tuple())
-            moved[j] += sign * step
-            pair.append(to_theta(InverseGamma(*moved), filter_z, period_s))
-        columns.append((pair[0] - pair[1]) / (2.0 * step))
-    return np.column_stack(columns)
+    values = np.array(machine.as_tuple())
+    steps = np.diag(1e-4 * values)
+    there = _thetas(np.vstack([values + steps, values - steps]), filter_z, period_s)
+    return np.asarray((there[:4] - there[4:]).T / (2e-4 * values))
 
 
 def prior_covariance(prior: ParameterBox, filter_z: Matrix, period_s: float) -> Matrix:
     """Covariance of theta over log-normal machines around the typical one (a fixed quasi-random set)."""
     log_typical = np.log(prior.typical.as_tuple())
     draws = np.random.default_rng(1).standard_normal((400, 4))
-    thetas = [to_theta(InverseGamma(*np.exp(log_typical + PRIOR_LOG_STD * d)), filter_z, period_s) for d in draws]
-    return np.cov(np.array(thetas).T)
+    return np.cov(_thetas(np.exp(log_typical + PRIOR_LOG_STD * draws), filter_z, period_s).T)
 
 
 def regressor(machine: InverseGamma, filter_z: Matrix, period_s: float, voltage_v: Signal) -> Matrix:

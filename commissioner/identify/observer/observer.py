@@ -193,7 +193,7 @@ class ParallelObserver:
             self._samples += cut - done
             done = cut
             self._remember(part)
-        current, rotor, stator = (np.concatenate(parts) for parts in zip(*signals, strict=True))
+        current, rotor, stator = signals[0] if len(signals) == 1 else map(np.concatenate, zip(*signals, strict=True))
         return BlockEstimate(
             parameters=self.parameters,
             errors=partial(_std, self.law, self._shell.kept(), self._filter, self.sample_period_s),

@@ -23,7 +23,7 @@ from commissioner.procedure.energised.session import (
     ramp_down,
 )
 from commissioner.procedure.steps import Findings, Job
-from commissioner.records import SampleBlock, Signal
+from commissioner.records import SampleBlock, Signal, peak
 from commissioner.safety.commands import Command, Disarm, Enable, SetBias, SetDriveLimits
 
 STEER_S, IN_EFFECT_S = 0.02, 0.015
@@ -113,7 +113,7 @@ class DirectCurrent:
         if self._flux is None:
             flux_wb = self._inductance_h * abs(float(np.mean(current)))
         else:
-            flux_wb = float(np.max(np.abs(self._flux.advance(current, block.lost_before))))
+            flux_wb = peak(self._flux.advance(current, block.lost_before))
         self.peak_fraction = max(self.peak_fraction, flux_wb / self._limit_wb)
         self.findings.peak_flux_fraction = max(self.findings.peak_flux_fraction, self.peak_fraction)
         if flux_wb > self._limit_wb:

@@ -26,7 +26,7 @@ from commissioner.procedure.energised.ceilings import aimed_current_a, tripping_
 from commissioner.procedure.energised.session import along_axis, duration_s, tone_period_s
 from commissioner.procedure.findings import AxisFinished, EstimateUpdated
 from commissioner.procedure.steps import Findings, Job
-from commissioner.records import SampleBlock
+from commissioner.records import SampleBlock, peak
 from commissioner.safety.applied import judge_applied
 from commissioner.safety.watch import stop_if
 
@@ -93,14 +93,14 @@ class UnderTest:
         if self._estimate is None:
             self._guard.began_s = block.first_index * block.sample_period_s
         current = along_axis(block) - self.offset_a
-        self._is_awake |= float(np.max(np.abs(current))) >= self._wakes_a
+        self._is_awake |= peak(current) >= self._wakes_a
         voltage_v = on_its_period(block.voltage_axis_v, block.averaged)
         self.require_asked(block)
         self._estimate = self._observer.advance(voltage_v, current, block.lost_before, adapts=self._is_awake)
         taken_s = duration_s(block)
         self.time_s += taken_s
         step = self._job.scale_ramp_per_s * taken_s
-        self._present_scale += float(np.clip(self.scale - self._present_scale, -step, step))
+        self._present_scale += min(max(self.scale - self._present_scale, -step), step)
         reading = self._guard.advance(
             voltage_v, current, self._estimate, self._present_scale, block.lost_before, block.age_s
         )
@@ -140,7 +140,7 @@ class UnderTest:
         scale = self._most_asked if scale is None else scale
         instants = block.first_index + np.arange(-AROUND, block.count + AROUND, dtype=np.float64)
         asked_v = self._excitation.voltage_v(instants * block.sample_period_s, scale)
-        peaks_v = scale * sum(t.amplitude_v for t in self._excitation.tones)
+        peaks_v = scale * self._excitation.peaks_v
         step = f"multitone test, axis {self._axis_deg:g} deg"
         stop_if(judge_applied(block.voltage_axis_v, asked_v, peaks_v, bias_v), step)
 

@@ -1,0 +1,78 @@
+"""Compiled signals of a block: the commanded tones, the flux that a current drives, the flux that a voltage integrates to."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.compiled import njit
+
+Array = NDArray[np.float64]
+
+
+@njit()
+def sum_of_tones(time_s: Array, tones: Array) -> Array:
+    """At the instants `(n,)`; `tones` `(m, 3)`: amplitude, frequency in Hz, phase in rad."""
+    total = np.zeros_like(time_s)
+    for m in range(tones.shape[0]):
+        amplitude, omega, phase = tones[m, 0], 2.0 * math.pi * tones[m, 1], tones[m, 2]
+        for k in range(time_s.size):
+            total[k] += amplitude * math.cos(omega * time_s[k] + phase)
+    return total
+
+
+@njit()
+def driven_flux(
+    current_a: Array, lost_before: int, keeps: float, inductance_h: float, leakage_h: float, rotor_wb: float
+) -> tuple[Array, float]:
+    """(stator flux at the samples, the rotor's at the last): psi_R keeps its share a period and takes L_M i for the rest.
+
+    The samples that were lost are bridged with the first current.
+    """
+    takes = (1.0 - keeps) * inductance_h
+    for _ in range(lost_before):
+        rotor_wb = keeps * rotor_wb + takes * current_a[0]
+    flux = np.empty_like(current_a)
+    for k in range(current_a.size):
+        rotor_wb = keeps * rotor_wb + takes * current_a[k]
+        flux[k] = rotor_wb + leakage_h * current_a[k]
+    return flux, rotor_wb
+
+
+@njit()
+def integrated_flux(
+    voltage_v: Array,
+    current_a: Array,
+    resistance_ohm: float,
+    lost_v: Array,
+    lost_span_a: float,
+    period_s: float,
+    corner: float,
+    state: Array,
+) -> Array:
+    """psi' = u - R_s i - F(i) - 2 zeta w psi - w^2 integral(psi) at the samples; mean current over each period by trapezoid.
+
+    A damped high-pass times an integrator as one difference equation, `corner` = w period; `state` `(2,)`, direct form II
+    transposed, is carried on. F, the inverter's loss, is odd and tabulated over 0 ... `lost_span_a`.
+    """
+    flux = np.empty_like(voltage_v)
+    a1, a2 = -2.0 + 1.4 * corner, 1.0 - 1.4 * corner + corner * corner
+    z1, z2, last = state[0], state[1], current_a.size - 1
+    per_a = (lost_v.size - 1) / lost_span_a
+    for k in range(voltage_v.size):
+        if k < last:
+            following = current_a[k + 1]
+        else:
+            following = 2.0 * current_a[k] - current_a[k - 1] if last > 0 else current_a[k]
+        mean = 0.5 * (current_a[k] + following)
+        at = min(abs(mean) * per_a, lost_v.size - 1.0)
+        cell = min(int(at), lost_v.size - 2)
+        loss = lost_v[cell] + (at - cell) * (lost_v[cell + 1] - lost_v[cell])
+        emf = voltage_v[k] - resistance_ohm * mean - (loss if mean >= 0.0 else -loss)
+        flux[k] = period_s * emf + z1
+        z1 = -period_s * emf - a1 * flux[k] + z2
+        z2 = -a2 * flux[k]
+    state[0], state[1] = z1, z2
+    return flux
