@@ -33,7 +33,7 @@ PARTS = 4
 _SOLVED = 1e-12
 """Of the current's span: what the implicit step may miss its current by."""
 _MOST_STEPS = 40
-_ROWS = 256
+ROWS = 256
 """Weighted sensitivities gathered before they are multiplied."""
 
 
@@ -241,9 +241,11 @@ def simulate(
     block_scores: Array,
     residual: Array,
     flux: Array,
+    rows: Array,
+    is_linearised: bool,
 ) -> float:
-    """Residuals y - i into `residual`, stator flux into `flux`, J^T W J and J^T W e added to `information`,
-    `score`.
+    """Residuals y - i into `residual`, stator flux into `flux`; where `is_linearised`, J^T W J and J^T W e added to `information`,
+    `score`, and the weighted sensitivities into `rows`: those of every sample where it has (n, p) rows, else of a stretch.
 
     First axis of `ad` (2, 2, 2), `b1`, `b2` (2, 2): held-input and ramp response over the period and over a part of it;
     `dad` (2, 4, 2, 2), `db1`, `db2` (2, 4, 2) their derivatives by the circuit's four. `exponents` (m,) are odd and rising.
@@ -279,24 +281,24 @@ def simulate(
         si[j] = (h_s + slope_g) * s1[j] + h_r * s2[j] + to_i[j]
         dg[j] = slope_g * s1[j] + to_g[j]
     dg_last[:] = dg
-    rows, missed, gathered = np.zeros((_ROWS, p)), np.zeros(_ROWS), 0
+    missed, begun, keeps = np.zeros(ROWS), 0, rows.shape[0] == u.size
     total, v_last, last_parts = 0.0, u_before, 1
     mean, by_i0, by_i1 = 0.0, 0.0, 0.0
     for k in range(u.size):
         e = y[k] - i - own[0]
         residual[k], flux[k] = e, x1
         w = weight[k]
-        if w > 0.0:
-            total += w * e * e
-            root = np.sqrt(w)
+        total += w * e * e if w > 0.0 else 0.0
+        if is_linearised:
+            root, at, gathered = np.sqrt(w), (k if keeps else k - begun), k + 1 - begun
             for j in range(p):
-                rows[gathered, j] = root * si[j]
-            rows[gathered, first_own] = root * wanted[first_own]
-            missed[gathered] = root * e
-            gathered += 1
-        if gathered == _ROWS or (k + 1) % block == 0 or k == u.size - 1:
-            _add_rows(rows[:gathered], missed[:gathered], information, score, block_scores[k // block])
-            gathered = 0
+                rows[at, j] = root * si[j]
+            rows[at, first_own] = root * wanted[first_own]
+            missed[gathered - 1] = root * e if w > 0.0 else 0.0
+            if gathered == ROWS or (k + 1) % block == 0 or k == u.size - 1:
+                seen = rows[at + 1 - gathered : at + 1]
+                _add_rows(seen, missed[:gathered], information, score, block_scores[k // block])
+                begun = k + 1
         if k == u.size - 1:
             break
         jump = u[k] - v_last
@@ -345,6 +347,9 @@ def simulate(
                 i = h_s * x1 + h_r * x2 + g
             held -= mean
 
+            if not is_linearised:
+                continue
+
             # What the parameters add themselves, then every sensitivity; of its own loss the new current's part.
             pushed[0], pushed[DELAY] = -extra, -(jump + 0.5 * steep) * d_late
             if k_f > 0:
@@ -373,3 +378,18 @@ def simulate(
             for j in range(p):
                 dg[j] = slope_g * s1[j] + to_g[j]
     return total
+
+
+@njit()
+def add_scores(rows: Array, weight: Array, residual: Array, score: Array, block: int, block_scores: Array) -> None:
+    """J^T W e added to `score` and by stretches of `block` samples to `block_scores`, of the weighted sensitivities `rows` (n, p) that
+    `simulate` left there and other residuals `(n,)`; a sample of no weight has none."""
+    missed = np.zeros(residual.size)
+    for k in range(residual.size):
+        if weight[k] > 0.0:
+            missed[k] = np.sqrt(weight[k]) * residual[k]
+    for first in range(0, residual.size, block):
+        last = min(first + block, residual.size)
+        added = np.dot(missed[first:last], rows[first:last])
+        score += added
+        block_scores[first // block] += added

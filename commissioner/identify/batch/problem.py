@@ -16,6 +16,7 @@ from scipy.linalg import expm
 
 from commissioner.identify.batch import modal, output_error
 from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, Matrix, ModelChoice
+from commissioner.identify.batch.output_error import ROWS
 from commissioner.identify.batch.segments import TABLE_ROWS, Segment
 from commissioner.records import Signal
 
@@ -26,14 +27,21 @@ NEAR_ZERO, NEAR_ZERO_WHEN_LATE = 0.03, 0.25
 the period and the loss, while it still rises, does not see the mean of its ends: L_M 1.6 %, R_R 0.5 % off at 150 of 200 us."""
 
 
+MOST_KEPT = 4_000_000
+"""Sensitivities that are kept for what is evaluated near by, 32 MB: a longer record is linearised at every step."""
+
+
 @dataclass
 class Evaluation:
+    """`is_near`: with the sensitivities, and so the information, of a place near by."""
+
     squares: float
     information: Matrix
     score: Matrix
     block_scores: list[Matrix]
     residuals: list[Signal]
     flux: list[Signal]
+    is_near: bool = False
 
     @property
     def is_finite(self) -> bool:
@@ -65,6 +73,10 @@ class Problem:
         self.samples = int(sum(float(np.sum(w > 0)) for w in self.weights))
         self.columns = [np.concatenate([np.arange(shared), shared + OWN * k + np.arange(OWN)]) for k in range(count)]
         self.total = shared + OWN * count
+        self._keeps = sum(s.current_a.size for s in segments) * (shared + OWN) <= MOST_KEPT
+        self._rows: list[Matrix] = []
+        self._rows_of: Matrix | None = None
+        """Of the place where the kept sensitivities were computed, its information."""
         if not model.with_drift:
             self.free[shared + OWN :: OWN] = False
             for columns in self.columns:
@@ -88,9 +100,10 @@ class Problem:
         moves = np.abs(np.diff(current_a, append=current_a[-1]))
         return np.asarray(np.abs(current_a) < near * self.model.leg.largest_a + 1.5 * moves)
 
-    def _held(self, circuit: Matrix) -> tuple[Matrix, ...]:
-        """Responses and derivatives over a period and over a part of one, stacked."""
-        both = (_held_with_derivatives(circuit, self.period_s / parts) for parts in (1, output_error.PARTS))
+    def _held(self, circuit: Matrix, *, is_linearised: bool) -> tuple[Matrix, ...]:
+        """Responses and derivatives (zero where nothing is linearised) over a period and over a part of one, stacked."""
+        periods = (self.period_s / parts for parts in (1, output_error.PARTS))
+        both = (_held_with_derivatives(circuit, period_s, is_linearised=is_linearised) for period_s in periods)
         return tuple(np.stack(pair) for pair in zip(*both, strict=True))
 
     def expect_leg(self, theta: Matrix) -> None:
@@ -103,11 +116,23 @@ class Problem:
         found = self.evaluate(theta, np.zeros((len(self.segments), OWN)))
         return found.squares if found.is_finite else math.inf
 
-    def evaluate(self, theta: Matrix, own: Matrix, over: Evaluation | None = None) -> Evaluation:
-        """All segments simulated; the signals of `over`, which is not needed any more, are written over."""
+    def knows(self, near: Evaluation) -> bool:
+        """Whether the sensitivities of this evaluation are kept."""
+        return near.information is self._rows_of
+
+    def evaluate(
+        self, theta: Matrix, own: Matrix, over: Evaluation | None = None, near: Evaluation | None = None
+    ) -> Evaluation:
+        """All segments simulated; the signals of `over`, which is not needed any more, are written over. With the sensitivities of
+        `near`, where they are kept: a third of the time."""
         is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
-        held = () if is_linear else self._held(theta[:CIRCUIT])
-        out = Evaluation(0.0, np.zeros((self.total, self.total)), np.zeros(self.total), [], [], [])
+        is_near = near is not None and self.knows(near)
+        held = () if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)
+        information = near.information if near is not None and is_near else np.zeros((self.total, self.total))
+        out = Evaluation(0.0, information, np.zeros(self.total), [], [], [], is_near)
+        if not is_near and not is_linear:
+            self._rows = self._rows or self._room()
+            self._rows_of = information if self._keeps else None
         block = max(1, round(SCORE_BLOCK_S / self.period_s))
         for k, segment in enumerate(self.segments):
             columns = self.columns[k]
@@ -120,12 +145,13 @@ class Problem:
                 if is_linear:
                     squares = self._simulate_linear(k, theta, own[k], shared)
                 else:
-                    squares = self._simulate(k, held, theta, own[k], shared)
+                    squares = self._simulate(k, held, theta, own[k], shared, is_linearised=not is_near)
                 scale = np.ones(columns.size)
                 scale[DELAY] = 1.0 / self.period_s
                 information *= np.outer(scale, scale)
                 out.squares += squares if math.isfinite(squares) else math.inf
-                out.information[np.ix_(columns, columns)] += information
+                if not is_near:
+                    out.information[np.ix_(columns, columns)] += information
                 out.score[columns] += score * scale
             wide = np.zeros((scores.shape[0], self.total))
             wide[:, columns] = scores * scale
@@ -143,7 +169,8 @@ class Problem:
         part = self.model.leg_slice
         rows, missed = self.model.leg.expected(theta[part], self.plateau_v)
         out.squares += self.noise_a2 * float(missed @ missed)
-        out.information[part, part] += self.noise_a2 * rows.T @ rows
+        if not out.is_near:
+            out.information[part, part] += self.noise_a2 * rows.T @ rows
         out.score[part] -= self.noise_a2 * rows.T @ missed
 
     def _simulate_linear(
@@ -174,8 +201,10 @@ class Problem:
         theta: Matrix,
         own: Matrix,
         shared: tuple[Matrix, Matrix, int, Matrix, Matrix, Matrix],
+        *,
+        is_linearised: bool,
     ) -> float:
-        """One segment's pass; what it finds is written into `shared`."""
+        """One segment's pass; what it finds is written into `shared`. Not linearised: with the sensitivities that are kept."""
         segment, model = self.segments[k], self.model
         wanted = self.free[self.columns[k]].astype(np.float64)
         information, score, block, scores, residual, flux = shared
@@ -208,8 +237,17 @@ class Problem:
             scores,
             residual,
             flux,
+            self._rows[k],
+            is_linearised,
         )
+        if not is_linearised:
+            output_error.add_scores(self._rows[k], self.weights[k], residual, score, block, scores)
         return float(squares)
+
+    def _room(self) -> list[Matrix]:
+        """For the sensitivities of every sample, or where these are too many of a stretch."""
+        width = self.model.size + OWN
+        return [np.empty((s.current_a.size if self._keeps else ROWS, width)) for s in self.segments]
 
 
 def _from_zero(table: Matrix) -> Matrix:
@@ -217,9 +255,11 @@ def _from_zero(table: Matrix) -> Matrix:
     return np.vstack([np.zeros(table.shape[1]), np.cumsum(0.5 * (table[1:] + table[:-1]), axis=0)])
 
 
-def _held_with_derivatives(circuit: Matrix, period_s: float) -> tuple[Matrix, ...]:
+def _held_with_derivatives(circuit: Matrix, period_s: float, *, is_linearised: bool) -> tuple[Matrix, ...]:
     """(Ad, b1, b2, dAd, db1, db2): held and ramp response of (psi_s, psi_R) and derivatives, by complex steps."""
     ad, b1, b2 = (x.real.copy() for x in _held(circuit.astype(np.complex128), period_s))
+    if not is_linearised:
+        return ad, b1, b2, np.zeros((CIRCUIT, 2, 2)), np.zeros((CIRCUIT, 2)), np.zeros((CIRCUIT, 2))
     derivatives = []
     for j in range(CIRCUIT):
         moved = circuit.astype(np.complex128)

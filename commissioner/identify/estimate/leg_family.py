@@ -115,11 +115,11 @@ def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: S
     start = [math.log(plateau), math.log(TYPICAL_SHARE), typical, typical]
     fit = least_squares(misfit, start, jacobian, method="lm", max_nfev=300)
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)
-    jacobian = np.linalg.solve(root, fit.jac[: mean.size])
+    moves = np.linalg.solve(root, fit.jac[: mean.size])
     total, ratio, knee_1, knee_2 = map(float, np.exp(np.clip(fit.x, -30.0, 30.0)))
     return Pair(
         values=curve(fit.x),
-        covariance=jacobian @ spread @ jacobian.T,
+        covariance=moves @ spread @ moves.T,
         misfit=2.0 * float(fit.cost),
         law=PairLaw(*names, knee_1, knee_2, largest_a),
         plateaus=np.array([total / (1.0 + ratio), total * ratio / (1.0 + ratio), 0.0, 0.0]),

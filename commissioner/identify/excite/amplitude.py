@@ -112,7 +112,10 @@ class Amplitude:
     def unsure(self, machine: InverseGamma, scale: float) -> float:
         """A small raise: it adds at most `CURRENT_STEP` of the permitted current, all tones at their peaks at once."""
         ohms = machine.stator_resistance_ohm + machine.rotor_resistance_ohm
-        return min(SMALL_RAISE * scale, scale + CURRENT_STEP * self.current_a * ohms / max(self.forecast.excitation.peaks_v, 1e-12))
+        return min(
+            SMALL_RAISE * scale,
+            scale + CURRENT_STEP * self.current_a * ohms / max(self.forecast.excitation.peaks_v, 1e-12),
+        )
 
 
 def _largest(low: float, high: float, is_permitted: Callable[[float], bool]) -> float:

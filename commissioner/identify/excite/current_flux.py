@@ -28,6 +28,7 @@ class CurrentFlux:
         """The stator flux at the samples, `(n,)`; what was lost before them is bridged with the first current."""
         machine = self.machine
         keeps = math.exp(-self.sample_period_s * machine.rotor_resistance_ohm / machine.magnetizing_inductance_h)
+        flux: Signal
         flux, self.rotor_flux_wb = driven_flux(
             writable(current_a), lost_before, keeps, machine.magnetizing_inductance_h, machine.leakage_inductance_h,
             self.rotor_flux_wb,

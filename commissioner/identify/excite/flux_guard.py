@@ -166,10 +166,11 @@ class FluxGuard:
     def _integrate(self, voltage_v: Signal, current_a: Signal) -> Signal:
         """(b): the model-free estimate at the block's samples."""
         corner = 2.0 * math.pi * 0.08 * self._lowest_hz * self.sample_period_s
-        return integrated_flux(
+        flux: Signal = integrated_flux(
             writable(voltage_v), writable(current_a), self.stator_resistance_ohm, self._forecast.lost_v,
             self._forecast.span_a, self.sample_period_s, corner, self._integral,
         )  # fmt: skip
+        return flux
 
     def _predict(
         self, estimate: BlockEstimate, model_free_wb: float, time_s: float, scale: float
