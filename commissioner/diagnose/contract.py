@@ -12,6 +12,8 @@ from commissioner.errors import ErrorDocument
 from commissioner.identify.contract import SheetValue, Silence, StatedValue
 from commissioner.motor.nameplate import Plate
 
+CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
+
 
 class Measured(TypedDict):
     """A value and one standard deviation, in SI units. Of L_M and T_R `at_stator_flux_wb` is the peak stator flux at which they

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from commissioner.diagnose.contract import CauseDocument, DiagnosisDocument, Measured
+from commissioner.diagnose.contract import CONVENTION, CauseDocument, DiagnosisDocument, Measured
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.points.diagnosis import PointsDiagnosis
 from commissioner.diagnose.verdict.causes import Cause
@@ -12,7 +12,6 @@ from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
 
-CONVENTION = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
 OF_RECORDINGS = (
     "resistance, leakage and time constant of the rotor are those of slow currents; a sensor's full scale is twice the rated peak "
     "current; the shaft's speed is electrical"

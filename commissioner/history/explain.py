@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from commissioner.identify.estimate.axes import REPEATABILITY, Identity
 from commissioner.identify.estimate.common_ground import CommonGround, Result
@@ -49,7 +49,7 @@ def explain(
     differences of the parameters' logarithms on common ground `(4,)`, and their standard errors without repeatability."""
     difference, std = moved
     weight = 1.0 / (std**2 + np.square(REPEATABILITY))
-    if verdict is Identity.SAME or float(chi2.sf(np.sum(weight * difference**2), 4)) > REST:
+    if verdict is Identity.SAME or float(chdtrc(4, np.sum(weight * difference**2))) > REST:
         return ()
     found = [made for one in _directions(old, new, common) if (made := _fit(one, difference, weight)) is not None]
     if verdict is Identity.OTHER:
@@ -64,7 +64,7 @@ def _fit(direction: _Direction, difference: Array, weight: Array) -> Explanation
     bound = float(np.sum(weight * along**2))
     size = float(np.sum(weight * along * difference)) / bound
     rest = difference - size * along
-    probability = float(chi2.sf(np.sum(weight * rest**2), 3))
+    probability = float(chdtrc(3, np.sum(weight * rest**2)))
     relative = float(np.expm1(size))
     if probability < REST or not direction.within[0] <= relative <= direction.within[1]:
         return None

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from commissioner.monitor.trend.trend import PRIOR_WEIGHT
 
@@ -143,7 +143,7 @@ def _best(value: Array, noise: Array, begin: int, end: int, freedom: float, plac
 def _step(value: Array, noise: Array, begin: int, at: int, end: int, freedom: float, places: int) -> Step:
     (before, before_std), (after, after_std) = _mean(value, noise, begin, at), _mean(value, noise, at, end)
     std = float(np.hypot(before_std, after_std))
-    chance = 2.0 * float(student.sf(abs(after - before) / std, freedom))
+    chance = 2.0 * float(stdtr(freedom, -abs(after - before) / std))
     return Step(at, after - before, std, min(1.0, places * chance))
 
 
@@ -162,7 +162,7 @@ def _slope(time: Array, value: Array, std: Array, chance: float) -> Slope | None
     slope = float(np.sum(weight * from_middle * value) / spread)
     widening, freedom = _scatter(value - slope * from_middle, std, (), fitted=2)
     error = widening * spread**-0.5
-    probability = 2.0 * float(student.sf(abs(slope) / error, freedom))
+    probability = 2.0 * float(stdtr(freedom, -abs(slope) / error))
     return Slope(slope, error, probability, probability <= chance)
 
 
@@ -177,4 +177,4 @@ def _alarm(value: Array, std: Array, steps: Sequence[Step], chance: float) -> Al
     widening, freedom = _scatter(value[:last], std[:last], places)
     mean, error = _mean(value, std * widening, begin, last)
     distance = (value[last] - mean) / np.hypot(error, widening * std[last])
-    return Alarm(float(distance), float(student.isf(0.5 * chance, freedom)))
+    return Alarm(float(distance), -float(stdtrit(freedom, 0.5 * chance)))

@@ -49,6 +49,9 @@ TEXT_KEYS = frozenset(
 )
 
 
+RUNNING_COLUMNS = ("voltage_u_v", "voltage_v_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s")
+
+
 @dataclass(frozen=True)
 class ColumnReading:
     """What a column of a file was taken for: `meaning` is the contract's name or None, `factor` goes to SI."""
@@ -68,6 +71,11 @@ class Table:
     source: str
     notes: tuple[ReadingNote, ...] = ()
     readings: tuple[ColumnReading, ...] = ()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it is of a running motor: voltages of phases, or a speed, and no voltage along an axis."""
+        return "voltage_axis_v" not in self.columns and any(c in self.columns for c in RUNNING_COLUMNS)
 
 
 HOW_TO_MAP = (

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from commissioner.diagnose.intake.points import Array, Points
 
@@ -58,7 +58,7 @@ def slow_rotor(points: Points) -> SlowRotor | None:
     constant, *others = all_three = [_Fit(points, z, scatter, family) for family in FAMILIES]
     evidence = np.array([f.log_evidence for f in all_three])
     gain = float(np.sum(constant.missed**2) - min(np.sum(f.missed**2) for f in others))
-    p_value = float(chi2.sf(max(gain, 0.0), 2))
+    p_value = float(chdtrc(2, max(gain, 0.0)))
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
     logs, stds = np.array([f.log_slow for f in all_three]), np.array([f.std_log_slow for f in all_three])

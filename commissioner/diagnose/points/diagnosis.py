@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.intake.points import Array, Points
@@ -98,7 +98,7 @@ def _compare(
     if freedom < 2 or not _has_right_sign(x, candidate):
         return 1.0, 0.0
     ratio = (before - after) / candidate.does.numbers / max(after / freedom, 1e-300)
-    p_value = float(fisher.sf(ratio, candidate.does.numbers, freedom))
+    p_value = float(fdtrc(candidate.does.numbers, freedom, ratio))
     if p_value > SIGNIFICANCE:
         return p_value, 0.0
     held_before = float((held_out(points, accepted, scale) ** 2).sum())

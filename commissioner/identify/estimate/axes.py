@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 
@@ -116,7 +116,7 @@ def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[M
     chosen = min(sets, key=lambda s: _fit(axes, logs, covariances, s)[0] + sum(_price(c) for c in s))
     chi_square, degrees, solution, covariance = _fit(axes, logs, covariances, chosen)
     findings = [_finding(c, axes, logs, covariances, chosen, solution, covariance) for c in chosen]
-    chance = float(chi2.sf(chi_square, degrees)) if degrees > 0 else 1.0
+    chance = float(chdtrc(degrees, chi_square)) if degrees > 0 else 1.0
     if chance < SIGNIFICANCE / 10.0:
         rest = math.sqrt(chi_square / degrees)
         findings.append(Finding(Cause.UNEXPLAINED, rest * FLOOR, FLOOR, chance))
@@ -125,7 +125,7 @@ def _explain(axes: Sequence[AxisEstimate], logs: Matrix, covariances: Sequence[M
 
 def _price(cause: Cause) -> float:
     """What a cause must take off chi-square to be named."""
-    return float(chi2.isf(SIGNIFICANCE / len(_GROUPS), len(_GROUPS[cause])))
+    return float(chdtri(len(_GROUPS[cause]), SIGNIFICANCE / len(_GROUPS)))
 
 
 def _order_is_visible(axes: Sequence[AxisEstimate]) -> bool:
@@ -177,7 +177,7 @@ def _finding(
     without = [c for c in chosen if c is not cause]
     gain = _fit(axes, logs, covariances, without)[0] - _fit(axes, logs, covariances, chosen)[0]
     signed = float(solution[mine][0]) if cause is Cause.HEATING else size
-    return Finding(cause, signed, std, float(chi2.sf(max(gain, 0.0), len(_GROUPS[cause]))))
+    return Finding(cause, signed, std, float(chdtrc(len(_GROUPS[cause]), max(gain, 0.0))))
 
 
 # -- the same motor, weeks later ----------------------------------------------------------------------------------

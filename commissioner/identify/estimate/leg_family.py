@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from commissioner.identify.batch.segments import BatchFit
 from commissioner.identify.inverter.leg_law import TAIL, LegLaw
@@ -56,7 +56,7 @@ class Pair:
 
 def one_inverter(fits: Sequence[BatchFit], pairs: Sequence[Pair]) -> list[BatchFit]:
     """The fits with the leg curve they agree on by their `pairs`. Unchanged where a leg was not fitted, or no known law describes it."""
-    if not pairs or chi2.sf(pairs[0].misfit, pairs[0].values.size - 4) < WORST_CHANCE:
+    if not pairs or chdtrc(pairs[0].values.size - 4, pairs[0].misfit) < WORST_CHANCE:
         return list(fits)
     chances = chances_of([p.misfit for p in pairs])
     values, covariance = mixture(chances, [p.values for p in pairs], [p.covariance for p in pairs])

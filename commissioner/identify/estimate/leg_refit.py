@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from commissioner.errors import DataRefused
 from commissioner.identify.batch.fit import fit_segments
@@ -61,7 +61,7 @@ def with_known_law(
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]
     free = sum(f.sum_of_squares / f.noise_a**2 for f in fits)
     spare = sum(f.model.leg_size for f in fits) - 4
-    if not refits or chi2.sf(min(r.misfit for r in refits) - free, spare) < WORST_CHANCE:
+    if not refits or chdtrc(spare, min(r.misfit for r in refits) - free) < WORST_CHANCE:
         return list(drawn)
     return _mean(refits, fits)
 

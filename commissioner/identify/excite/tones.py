@@ -21,6 +21,7 @@ from commissioner.compiled import writable
 from commissioner.identify.excite.kernels import sum_of_tones
 from commissioner.identify.excite.minimax import FEWEST_SHARE, minimax_cost
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
+from commissioner.identify.observer.kernels import forecast
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import admittance_s, held_input, poles_per_s
 from commissioner.records import Signal
@@ -148,16 +149,13 @@ def _rounded_limits(limits: ExcitationLimits) -> ExcitationLimits:
 
 def predicted_peaks(machine: InverseGamma, excitation: Excitation, period_s: float) -> tuple[float, float]:
     """(stator flux, current) peaks of the linear machine under the full excitation, from rest, no inverter error."""
-    from scipy.signal import lfilter
-
     time_s = np.arange(int(excitation.duration_s / period_s)) * period_s
     matrix, gain = held_input(machine, period_s)
-    a = [1.0, -float(np.trace(matrix)), float(np.linalg.det(matrix))]
-    voltage = excitation.voltage_v(np.asarray(time_s, dtype=np.float64))
-    current = lfilter([0.0, gain[0], matrix[0, 1] * gain[1] - matrix[1, 1] * gain[0]], a, voltage)
-    rotor = lfilter([0.0, gain[1], matrix[1, 0] * gain[0] - matrix[0, 0] * gain[1]], a, voltage)
-    stator = rotor + machine.leakage_inductance_h * current
-    return float(np.max(np.abs(stator))), float(np.max(np.abs(current)))
+    flux, current = forecast(
+        excitation.voltage_v(np.asarray(time_s, dtype=np.float64)), period_s, matrix, gain, machine.stator_resistance_ohm,
+        machine.leakage_inductance_h, np.zeros(2), 1.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
+    return float(flux), float(current)
 
 
 def separated(frequencies: Sequence[float], grid_hz: float) -> tuple[float, ...]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.signal import windows
 
 from commissioner.monitor.signals.supply import TurningFrame, Vector
 from commissioner.records import Signal
@@ -68,6 +67,8 @@ def separate(frame: TurningFrame, part: slice, combs: list[Comb], supply_orders:
     The normal equations are summed block by block; block b's score A_b^T W r_b is then its right-hand side minus its part
     of the matrix times the solution. Comb phases are `(n,)` over the segment.
     """
+    from scipy.signal import windows
+
     time = frame.time_s[part]
     window = windows.tukey(time.size + 2, TAPERED)[1:-1]
     phases = [*(comb.phase_rad for comb in combs), frame.supply_angle_rad[part]]

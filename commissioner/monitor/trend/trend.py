@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 FALSE_ALARM = 1e-6
 """Probability per indicator and recording at the threshold: below 1 % for 1000 recordings of six indicators."""
@@ -117,6 +117,6 @@ def compare(entry: Entry, healthy: Sequence[Entry]) -> list[Watched]:
         freedom = count - 1 + PRIOR_WEIGHT
         variance = (np.sum((values - values.mean()) ** 2) + PRIOR_WEIGHT * claimed) / freedom
         std = float(np.sqrt(variance * (1 + 1 / count))) or 1e-12
-        threshold = float(student.isf(0.5 * FALSE_ALARM, freedom))
+        threshold = -float(stdtrit(freedom, 0.5 * FALSE_ALARM))
         out.append(Watched(name, value, float(values.mean()), std, float((value - values.mean()) / std), threshold))
     return out

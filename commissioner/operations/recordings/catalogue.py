@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -24,7 +24,6 @@ from commissioner.identify.catalogue.document import KIND, document
 from commissioner.identify.catalogue.sheet import Sheet
 from commissioner.identify.contract import SheetDocument
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS, InverseGamma, Quantity, to_t_model
-from commissioner.recordings.catalogue.reading import sheet_in
 from commissioner.recordings.whole import whole_file, write_texts
 from commissioner.settings import load_motor
 
@@ -34,11 +33,6 @@ TELLS = (
     "A manufacturer's sheet leaves nothing over: its circuit meets the values, no cause can be seen or ruled out. The circuit is below; "
     "`identify` shows each value beside what the circuit makes of it."
 )
-
-
-def sheet_of(files: Sequence[Path], said: object) -> Sheet | None:
-    """The sheet where the one file is one and no channels are mapped."""
-    return sheet_in(files[0]) if len(files) == 1 and said is None else None
 
 
 def answered(sheet: Sheet, motor: str | None, trust: str | None) -> Answer:

@@ -27,10 +27,11 @@ from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
-from commissioner.operations.recordings.running import diagnosed, is_running
+from commissioner.operations.recordings.running import diagnosed
 from commissioner.operations.recordings.sheets import are_sheets, are_three, require_whole_sheets
 from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
+from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
@@ -87,13 +88,13 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     said = read_mapping(request.mapping) if request.mapping else None
     if request.out is not None:
         folder_to_write(request.out)
-    if (sheet := catalogue.sheet_of(request.files, said)) is not None:
+    if (sheet := sheet_of(request.files, said)) is not None:
         return Diagnosed(catalogue.diagnosed(sheet, request.motor, request.trust, request.out), request.out)
     tables = [contract_table(Path(path), said, request.motor) for path in request.files]
     if are_sheets(tables):
         return _points(tables, request)
     require_whole_sheets(tables)
-    if any(is_running(t) for t in tables):
+    if any(t.is_running for t in tables):
         document, running = diagnosed(tables, request.motor, request.out, request.excluded, observe, go_on)
         return Diagnosed(document, request.out, running=running)
     return _recordings(tables, request, observe, go_on)

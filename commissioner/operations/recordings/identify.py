@@ -35,6 +35,7 @@ from commissioner.operations.recordings.trust import (
     trusted_plate,
     with_currents_over,
 )
+from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import to_standstill
@@ -98,23 +99,25 @@ def identify_any(
 ) -> Identified | IdentifiedRunning | IdentifiedSheets | IdentifiedCatalogue:
     """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine, test sheets
     by their three tests, a manufacturer's sheet by its values."""
-    from commissioner.operations.recordings import catalogue
-    from commissioner.operations.recordings.running import identified, is_running
     from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
     if request.out is not None:
         folder_to_write(request.out)
-    if (sheet := catalogue.sheet_of(request.files, said)) is not None:
+    if (sheet := sheet_of(request.files, said)) is not None:
+        from commissioner.operations.recordings import catalogue
+
         made = catalogue.identified(sheet, request.motor, request.trust, request.out)
         return IdentifiedCatalogue(made, request.files)
     tables = [contract_table(path, said, request.motor) for path in request.files]
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     require_whole_sheets(tables)
-    if not any(is_running(t) for t in tables):
+    if not any(t.is_running for t in tables):
         return identify(request, observe)
+    from commissioner.operations.recordings.running import identified
+
     observe(Began("identifying"))
     return IdentifiedRunning(identified(tables, request.motor, request.out), request.files)
 
@@ -138,8 +141,6 @@ def identify(request: IdentifyRequest, observe: Observe = nobody) -> Identified:
 
 def _require_measured(files: Sequence[Path], said: object) -> None:
     """DataRefused: a manufacturer's sheet, from which no drive is set."""
-    from commissioner.operations.recordings.catalogue import sheet_of
-
     if sheet_of(files, said) is not None:
         raise DataRefused(
             f"{files[0]}: a manufacturer's sheet is no measurement of the motor at the drive", step="identify", value=str(files[0]),

@@ -23,17 +23,10 @@ from commissioner.records import RunningRecording
 from commissioner.running.diagnosis import Diagnosis
 from commissioner.running.search import Step
 
-COLUMNS = ("voltage_u_v", "voltage_v_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s")
-
-
-def is_running(table: Table) -> bool:
-    """Whether the table is of a running motor: voltages of three phases, or a speed, and no voltage along an axis."""
-    return "voltage_axis_v" not in table.columns and any(c in table.columns for c in COLUMNS)
-
 
 def readable(tables: Sequence[Table], motor: str | None, step: str) -> tuple[list[RunningRecording], Nameplate]:
     """The tables as recordings of one motor. DataRefused where a table is not of a running motor, or of another one."""
-    odd = [t for t in tables if not is_running(t)]
+    odd = [t for t in tables if not t.is_running]
     if odd:
         raise DataRefused(
             f"{odd[0].source}: some of the files are of a running motor and this one is not", step=step, value=odd[0].source,

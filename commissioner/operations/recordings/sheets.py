@@ -7,8 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-from commissioner.diagnose.contract import DiagnosisDocument
-from commissioner.diagnose.document import CONVENTION
+from commissioner.diagnose.contract import CONVENTION, DiagnosisDocument
 from commissioner.diagnose.points.table import is_points_table
 from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
 from commissioner.errors import DataRefused

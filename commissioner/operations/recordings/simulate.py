@@ -23,6 +23,7 @@ from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.paths import no_file
+from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.table import check_ending, read_table, to_standstill, write_table
 from commissioner.settings import load_motor
 
@@ -145,7 +146,7 @@ def _motor(name: str, plain: bool) -> _Motor:
     path = Path(name)
     if path.suffix == ".json":
         return _extended(path, plain)
-    if (sheet := catalogue.sheet_of([path], None)) is not None:
+    if (sheet := sheet_of([path], None)) is not None:
         return _of_document(catalogue.model_document(catalogue.answered(sheet, None, None)))
     plate = load_motor(name)
     typical = prior(plate).typical.as_tuple()

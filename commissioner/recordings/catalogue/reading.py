@@ -50,6 +50,11 @@ class Entry:
     unit: str = ""
 
 
+def sheet_of(files: Sequence[Path], said: object) -> Sheet | None:
+    """The sheet where the one file is one and no channels are mapped."""
+    return sheet_in(files[0]) if len(files) == 1 and said is None else None
+
+
 def sheet_in(path: Path) -> Sheet | None:
     """The sheet in a file, None where the file is none. DataRefused: it holds several motors, a value twice, or an impossible one."""
     if path.suffix.lower() not in ENDINGS or not path.is_file() or not 0 < path.stat().st_size <= LARGEST_BYTES:
