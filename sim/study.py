@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from sim.physics.effects import CATALOGUE
+from sim.physics.inductance import inverse_gamma
 from sim.scenario import Scenario, ScenarioError, build, read_document, table_machine, table_rows
+from sim.truth import apparent_resistance_ohm
 from sim.wire.in_process import Station
 
 LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
@@ -39,13 +41,9 @@ class Drawn:
 
     def parameters_at(self, stator_flux_wb: float) -> Mapping[str, float]:
         """Secant inverse-Gamma values at a peak stator flux; the stator's resistance with that of the devices."""
-        truth = self.station.truth()
-        rows = truth["inverse_gamma"]["over_flux"]
-        flux = [row["stator_flux_wb"] for row in rows]
-        values = {
-            name: float(np.interp(stator_flux_wb, flux, [row["secant"][name] for row in rows])) for name in NAMES[1:]
-        }
-        return {NAMES[0]: float(truth["apparent_stator_resistance_ohm"]), **values}
+        plant = self.station.scenario.plant
+        secant = inverse_gamma(plant, stator_flux_wb)
+        return {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
 
 
 class Factory:

@@ -25,15 +25,13 @@ def answer_key(scenario: Scenario, seed: int = 0) -> dict[str, Any]:
     """Everything a judge needs, JSON-ready. Parameters in SI, per-phase star, referred to the stator."""
     plant = scenario.plant
     rated = plant.nameplate.rated_flux_wb
-    p, _ = pack(plant)
-    slope = float(p[at.P_SLOPE_OHM])
     return {
         "scenario": scenario.name,
         "seed": seed,
         "nameplate": dataclasses.asdict(plant.nameplate),
         "rated_flux_wb": rated,
         "stator_resistance_ohm": plant.machine.stator_resistance_ohm,
-        "apparent_stator_resistance_ohm": plant.machine.stator_resistance_ohm + slope,
+        "apparent_stator_resistance_ohm": apparent_resistance_ohm(plant),
         "gamma": dataclasses.asdict(saturated(plant)),
         "inverse_gamma": {
             "unsaturated": inverse_gamma(plant, 1e-3 * rated),
@@ -52,6 +50,12 @@ def answer_key(scenario: Scenario, seed: int = 0) -> dict[str, Any]:
             )
         ),
     }
+
+
+def apparent_resistance_ohm(plant: Plant) -> float:
+    """Of the stator with that of the devices, which no measurement at the terminals tells apart."""
+    p, _ = pack(plant)
+    return plant.machine.stator_resistance_ohm + float(p[at.P_SLOPE_OHM])
 
 
 def _row(plant: Plant, flux_wb: float) -> dict[str, Any]:

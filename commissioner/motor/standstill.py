@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commissioner.compiled import njit
 from commissioner.motor.circuit import InverseGamma
 
 Matrix = NDArray[np.float64]
@@ -72,25 +73,23 @@ def to_pulse_transfer(machine: InverseGamma, period_s: float) -> PulseTransfer:
     return PulseTransfer(*pulse_transfers(np.array([machine.as_tuple()]), period_s)[0].tolist())
 
 
+@njit()
 def pulse_transfers(machines: Matrix, period_s: float) -> Matrix:
     """(n, 4): (a1, a0, b1, b0) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M)."""
-    r_s, r_r, l_s, l_m = machines.T
-    alpha = r_r / l_m
-    half = 0.5 * ((r_s + r_r) / l_s + alpha)
-    product = alpha * r_s / l_s
-    fast = -(half + np.sqrt(np.maximum(half * half - product, 0.0)))
-    slow = product / fast
-    slow_z, fast_z = np.exp(slow * period_s), np.exp(fast * period_s)
-    residue_slow = (slow + alpha) / (l_s * (slow - fast)) * np.expm1(slow * period_s) / slow
-    residue_fast = (fast + alpha) / (l_s * (fast - slow)) * np.expm1(fast * period_s) / fast
-    return np.column_stack(
-        [
-            -(slow_z + fast_z),
-            slow_z * fast_z,
-            residue_slow + residue_fast,
-            -(residue_slow * fast_z + residue_fast * slow_z),
-        ]
-    )
+    out = np.empty_like(machines)
+    for k in range(machines.shape[0]):
+        r_s, r_r, l_s, l_m = machines[k]
+        alpha = r_r / l_m
+        half = 0.5 * ((r_s + r_r) / l_s + alpha)
+        product = alpha * r_s / l_s
+        fast = -(half + math.sqrt(max(half * half - product, 0.0)))
+        slow = product / fast
+        slow_z, fast_z = math.exp(slow * period_s), math.exp(fast * period_s)
+        residue_slow = (slow + alpha) / (l_s * (slow - fast)) * math.expm1(slow * period_s) / slow
+        residue_fast = (fast + alpha) / (l_s * (fast - slow)) * math.expm1(fast * period_s) / fast
+        out[k, 0], out[k, 1] = -(slow_z + fast_z), slow_z * fast_z
+        out[k, 2], out[k, 3] = residue_slow + residue_fast, -(residue_slow * fast_z + residue_fast * slow_z)
+    return out
 
 
 def from_pulse_transfer(transfer: PulseTransfer, period_s: float) -> InverseGamma | None:

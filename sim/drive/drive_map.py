@@ -9,6 +9,7 @@ import math
 import struct
 import tomllib
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,11 @@ class Item:
     highest: float
     scale: float
 
-    @property
+    @cached_property
     def words_each(self) -> int:
         return struct.calcsize(FORMATS[self.kind]) // 2 if self.kind != "ascii" else 1
 
-    @property
+    @cached_property
     def words(self) -> int:
         return self.length * self.words_each
 

@@ -79,6 +79,8 @@ class Registers:
         if skip % item.words_each or len(words) < min(item.words_each, item.words - skip):
             return None, 0
         used = min(item.words - skip, len(words) - len(words) % item.words_each)
+        if used == item.words:
+            return item.decode(words[:used]), used
         present = item.encode(self.drive.values[item.name])
         present[skip : skip + used] = words[:used]
         return item.decode(present), used

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commissioner.identify.excite.forecast import Forecast
+from commissioner.identify.excite.kernels import flux_behind
 from commissioner.identify.observer.observer import BlockEstimate
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import admittance_s
@@ -86,11 +87,7 @@ class Amplitude:
         admittance = admittance_s(worst, f)
         flux = np.abs((1.0 - worst.stator_resistance_ohm * admittance) / (2j * np.pi * f))
         lost = SURE_LOSS * math.sqrt(2.0 / math.pi) * self.plateau_v
-        amplitude = commanded
-        for _ in range(6):  # the inverter's equivalent resistance, see excitation.design
-            sigma = math.sqrt(0.5 * float(np.sum(np.abs(amplitude * admittance) ** 2)))
-            amplitude = commanded / np.abs(1.0 + lost / max(sigma, 1e-12) * admittance)
-        return TARGET * self.limit_wb / max(float(np.sum(flux * amplitude)), 1e-12)
+        return TARGET * self.limit_wb / max(float(flux_behind(flux, commanded, admittance, lost)), 1e-12)
 
     def by_current(
         self, worst: InverseGamma, estimate: BlockEstimate, time_s: float, scale: float, wanted: float, seen_a: float

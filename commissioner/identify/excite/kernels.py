@@ -76,3 +76,16 @@ def integrated_flux(
         z2 = -a2 * flux[k]
     state[0], state[1] = z1, z2
     return flux
+
+
+@njit()
+def flux_behind(flux: Array, commanded: Array, admittance: NDArray[np.complex128], lost_v: float) -> float:
+    """Sum of the tones' fluxes behind an inverter that acts like a resistance in series, `lost_v` over the rms current (see
+    `tones.design`); `flux` per volt, all `(m,)`."""
+    amplitude = commanded
+    for _ in range(6):
+        squares = 0.0
+        for m in range(commanded.size):
+            squares += abs(amplitude[m] * admittance[m]) ** 2
+        amplitude = commanded / np.abs(1.0 + lost_v / max(math.sqrt(0.5 * squares), 1e-12) * admittance)
+    return np.sum(flux * amplitude)
