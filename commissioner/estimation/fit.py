@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.kernels.march import STATES, march, tangents
+from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
 from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
 from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
@@ -206,38 +206,18 @@ def held_part(problem: Problem, parts: Sequence[Array]) -> Array:
     return np.concatenate([x[u:].reshape(-1) for x, u in zip(parts, problem.until, strict=True)])
 
 
-DELAY_MIXES = 4
-"""Samples, and one more: a sensor's delay takes a cubic through four."""
-
-
 def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> Array:
     """Whitened sensitivities of the simulated current, (columns, fitted samples x channels)."""
-    p, slope, scales = machine.physical(), machine.slope(), problem.record.scales.as_tuple()
     parts = []
     for k, (w, u) in enumerate(zip(problem.record.windows, problem.until, strict=True)):
-        places = machine.places(k, u, problem.period)
-        since = [_acts_from(c, places) for c in columns]
-        own = sorted((j for j, c in enumerate(columns) if c.kind == "p" or c.window == k), key=since.__getitem__)
-        dp, dx, dk = (
-            np.zeros((len(own), COUNT)),
-            np.zeros((len(own), STATES)),
-            np.zeros((len(own), machine.knots.shape[1])),
-        )
-        for row, j in enumerate(own):
-            column = columns[j]
-            if column.kind == "p":
-                dp[row, column.index] = slope[column.index]
-            elif column.kind == "x":
-                dx[row, column.index] = 1.0
-            else:
-                dk[row, column.index] = 1.0
-        run, shaft = np.empty((len(own), u, 3)), np.empty((len(own), u))
-        tangents(
-            p, scales, machine.first[k], dp, dx, dk, np.array([since[j] for j in own], dtype=np.int64), w.voltage[: 2 * u - 1],
-            w.speed[: 2 * u - 1], machine.knots[k], places, problem.period, machine.has_shaft, run, shaft,
-        )  # fmt: skip
-        white = np.zeros((len(columns), u, 3 if problem.record.has_zero else 2))
-        white[own] = problem.noise.white(np.nan_to_num(run))
+        run = np.zeros((len(columns), u, 3))
+        own = [j for j, c in enumerate(columns) if c.kind == "p" or (c.kind == "x" and c.window == k)]
+        by_load = [j for j, c in enumerate(columns) if c.kind == "k" and c.window == k]
+        run[own] = _along_numbers(problem, machine, k, [columns[j] for j in own])
+        if by_load:
+            indices = [columns[j].index for j in by_load]
+            run[by_load] = _along_loads(problem, machine, k, max(indices) + 1)[indices]
+        white = problem.noise.white(np.nan_to_num(run, copy=False))
         white[:, :EDGE] = 0.0
         if u == w.count:
             white[:, -EDGE:] = 0.0
@@ -245,11 +225,32 @@ def jacobian(problem: Problem, machine: Machine, columns: Sequence[Column]) -> A
     return np.concatenate(parts, axis=1)
 
 
-def _acts_from(column: Column, places: Array) -> int:
-    """The sample before which a column changes nothing: of a knot of the load where the knot before it lies, less what a delay mixes."""
-    if column.kind != "k":
-        return 0
-    return max(int(np.searchsorted(places, column.index - 1.0, side="right")) // 2 - DELAY_MIXES, 0)
+def _along_numbers(problem: Problem, machine: Machine, k: int, columns: Sequence[Column]) -> Array:
+    """(columns, n, 3) of window k: its currents by numbers of the machine and of its own first state."""
+    slope, w, u = machine.slope(), problem.record.windows[k], problem.until[k]
+    dp, dx = np.zeros((len(columns), COUNT)), np.zeros((len(columns), STATES))
+    for row, column in enumerate(columns):
+        if column.kind == "p":
+            dp[row, column.index] = slope[column.index]
+        else:
+            dx[row, column.index] = 1.0
+    run = np.empty((len(columns), u, 3))
+    tangents(
+        machine.physical(), problem.record.scales.as_tuple(), machine.first[k], dp, dx, w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
+        machine.knots[k], machine.places(k, u, problem.period), problem.period, machine.has_shaft, run,
+    )  # fmt: skip
+    return run
+
+
+def _along_loads(problem: Problem, machine: Machine, k: int, count: int) -> Array:
+    """(count, n, 3) of window k: its currents by the first knots of its load."""
+    w, u = problem.record.windows[k], problem.until[k]
+    run = np.empty((count, u, 3))
+    load_tangents(
+        machine.physical(), problem.record.scales.as_tuple(), machine.first[k], w.voltage[: 2 * u - 1], w.speed[: 2 * u - 1],
+        machine.knots[k], machine.places(k, u, problem.period), problem.period, run,
+    )  # fmt: skip
+    return run
 
 
 @dataclass(frozen=True)
@@ -304,64 +305,88 @@ def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots:
     return tuple(out)
 
 
+class _Sensitivity:
+    """A Jacobian (columns, samples), its products, and what steps with it have taught: Broyden's update, a simulation's worth, where the
+    Jacobian of an unknown load costs some hundred (C. G. Broyden, Math. Comp. 19, 1965; in units of each column's size)."""
+
+    def __init__(self, jacobian: Array) -> None:
+        self.jacobian = jacobian
+        self._gram = jacobian @ jacobian.T
+
+    def step(self, rest: Array, columns: Sequence[Column], damping: float) -> Array:
+        """Levenberg-Marquardt."""
+        size = np.sqrt(np.maximum(np.diag(self._gram), 1e-30))
+        scaled = self._gram / np.outer(size, size) + (damping + 1e-11) * np.eye(size.size)
+        wanted = (self.jacobian @ rest) / size
+        try:
+            step = np.linalg.solve(scaled, wanted) / size
+        except np.linalg.LinAlgError:
+            step = np.linalg.lstsq(scaled, wanted, rcond=None)[0] / size
+        largest = max(
+            (abs(s) for c, s in zip(columns, step, strict=True) if c.kind == "p" and c.index in LOGARITHMIC),
+            default=0.0,
+        )
+        return np.asarray(step * min(1.0, LARGEST_STEP / max(largest, 1e-30)))
+
+    def learn(self, step: Array, change: Array) -> None:
+        """`change`: of the simulated current, which the Jacobian had told as `step` times itself."""
+        missed = change - step @ self.jacobian
+        weight = step * np.maximum(np.diag(self._gram), 1e-30)
+        weight /= max(float(step @ weight), 1e-300)
+        along = self.jacobian @ missed
+        self._gram += (
+            np.outer(weight, along) + np.outer(along, weight) + float(missed @ missed) * np.outer(weight, weight)
+        )
+        self.jacobian = self.jacobian + np.outer(weight, missed)
+
+
 def refine(
     problem: Problem, machine: Machine, columns: Sequence[Column], *, most: int = 12, first_jacobian: Array | None = None,
     tolerance: float = ENDED, is_final: bool = True,
 ) -> Fit:  # fmt: skip
-    """Levenberg-Marquardt from `machine`; a given first Jacobian is used for the first steps.
+    """Levenberg-Marquardt from `machine`; `first_jacobian` as known from near by.
 
-    A Jacobian serves as long as steps with it shrink fast (a simulation costs a thirtieth of it). `is_final`: end with a
-    fresh one.
+    A Jacobian serves, and learns, as long as steps with it shrink fast (a simulation costs a hundredth of it). `is_final`: end
+    with a fresh one.
     """
     parts = residuals(problem, machine)
     rest = fitted_part(problem, parts)
-    chi2, damping, j, is_fresh, before = float(rest @ rest), 0.0, first_jacobian, False, np.inf
+    chi2, damping, is_fresh, before = float(rest @ rest), 0.0, False, np.inf
+    known = None if first_jacobian is None else _Sensitivity(first_jacobian)
     for _ in range(most):
-        if j is None:
-            j, is_fresh, before = jacobian(problem, machine, columns), True, np.inf
-        trial = machine.moved(columns, _step(j, rest, columns, damping))
+        if known is None:
+            known, is_fresh, before = _Sensitivity(jacobian(problem, machine, columns)), True, np.inf
+        step = known.step(rest, columns, damping)
+        trial = machine.moved(columns, step)
         trial_parts = residuals(problem, trial)
         trial_rest = fitted_part(problem, trial_parts)
         gained = chi2 - float(trial_rest @ trial_rest)
         if gained > 0.0:
+            known.learn(step, rest - trial_rest)
             machine, parts, rest, chi2 = trial, trial_parts, trial_rest, chi2 - gained
             damping *= 0.1
             if gained < tolerance * max(chi2 / rest.size, 1.0):
                 break
-            if gained > SLOW * before or (before == np.inf and not is_fresh):
-                j = None
+            if gained > SLOW * before:
+                known = None
             is_fresh, before = False, gained
         elif not is_fresh:
-            if j is not None and before < np.inf and -gained < tolerance:
+            if before < np.inf and -gained < tolerance:
                 break
-            j = None
+            known = None
         elif -gained < tolerance or damping > 1e6:
             break
         else:
             damping = max(10.0 * damping, 1e-3)
-    if j is None or (is_final and not is_fresh):
-        j = jacobian(problem, machine, columns)
+    if known is None or (is_final and not is_fresh):
+        known = _Sensitivity(jacobian(problem, machine, columns))
     held = held_part(problem, parts)
-    return Fit(machine, tuple(columns), chi2, rest, j, float(held @ held), int(held.size))
+    return Fit(machine, tuple(columns), chi2, rest, known.jacobian, float(held @ held), int(held.size))
 
 
 def refreshed(problem: Problem, fit: Fit) -> Fit:
     """The same fit with the Jacobian of where it ended."""
     return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
-
-
-def _step(j: Array, rest: Array, columns: Sequence[Column], damping: float) -> Array:
-    gram = j @ j.T
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
-    scaled = gram / np.outer(size, size) + (damping + 1e-11) * np.eye(size.size)
-    try:
-        step = np.linalg.solve(scaled, (j @ rest) / size) / size
-    except np.linalg.LinAlgError:
-        step = np.linalg.lstsq(scaled, (j @ rest) / size, rcond=None)[0] / size
-    largest = max(
-        (abs(s) for c, s in zip(columns, step, strict=True) if c.kind == "p" and c.index in LOGARITHMIC), default=0.0
-    )
-    return np.asarray(step * min(1.0, LARGEST_STEP / max(largest, 1e-30)))
 
 
 def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:

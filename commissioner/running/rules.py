@@ -23,6 +23,8 @@ class Rules:
     """Of the cause's gain: a closer rival is a tie although noise alone would part them (models are not that exact)."""
     least_cosine: float = 0.85
     """Canonical correlation from which a rival is tried in a cause's place."""
+    nothing_left: float = 1.05
+    """Chi-square a sample below which no further candidate of a round is refitted: none could gain more."""
     tried: int = 5
     """Candidates refitted in each round."""
     most_causes: int = 6

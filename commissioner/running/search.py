@@ -95,14 +95,23 @@ class Search:
         own = [Column("p", AT[n]) for c in causes for n in c.numbers(with_spare=True)]
         return (*self.base.columns, *own)
 
-    def fitted(self, start: Machine, causes: Sequence[Named], *, first: Array | None = None) -> Fit:
-        """With these causes free; `first`: Jacobian for the first step, without spare numbers then."""
+    def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
+        """With these causes free; `near` is a fit near by, whose sensitivities serve as long as they do. `first`: Jacobian for the first
+        step, without spare numbers then."""
         if first is not None:
             own = [Column("p", AT[n]) for c in causes[-1:] for n in c.form.numbers]
             before = self.columns(causes[:-1])
             start = refine(self.problem, start, (*before, *own), most=1, first_jacobian=first, is_final=False).machine
-        start = self._inside(start, causes)
-        return refine(self.problem, start, self.columns(causes), most=10, is_final=False)
+        start, columns = self._inside(start, causes), self.columns(causes)
+        place = {column: row for row, column in enumerate(near.columns)}
+        new = [c for c in columns if c not in place]
+        rows = np.empty((len(columns), near.rest.size))
+        rows[[j for j, c in enumerate(columns) if c in place]] = near.jacobian[
+            [place[c] for c in columns if c in place]
+        ]
+        if new:
+            rows[[j for j, c in enumerate(columns) if c not in place]] = jacobian(self.problem, start, new)
+        return refine(self.problem, start, columns, most=10, first_jacobian=rows, is_final=False)
 
     def _inside(self, machine: Machine, causes: Sequence[Named]) -> Machine:
         """A first step that left what a sign allows begins from little instead."""
@@ -199,8 +208,12 @@ def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit,
         if gain / fit.scale < 0.6 * rules.least_gain:
             continue
         first = np.concatenate([fit.jacobian, own])
-        other = seeking.fitted(fit.machine, (*accepted, one), first=first)
+        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
         tried.append((fit.chi2 - other.chi2, one, other))
+        if other.chi2 < rules.nothing_left * other.count and not _refusal(
+            seeking, fit, other, (*accepted, one), tried[-1][0]
+        ):
+            break  # whoever explains as much is told apart as its rival
     tried.sort(key=lambda item: -item[0])
     for gain, one, other in tried:
         why = _refusal(seeking, fit, other, (*accepted, one), gain)
@@ -244,7 +257,7 @@ def _backward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[F
     """Without each cause that the others make needless."""
     for one in accepted if len(accepted) > 1 else ():
         others = tuple(c for c in accepted if c != one)
-        less = seeking.fitted(_without(fit.machine, one), others)
+        less = seeking.fitted(_without(fit.machine, one), others, fit)
         if (less.chi2 - fit.chi2) / fit.scale < _needed(seeking, one):
             seeking.say(Step("dropped", one.cause, one.form.name, (less.chi2 - fit.chi2) / fit.scale))
             return _backward(seeking, refreshed(seeking.problem, less), others)
@@ -255,8 +268,16 @@ def _without(machine: Machine, one: Named) -> Machine:
     return machine.with_values(dict.fromkeys(one.form.numbers, 0.0))
 
 
-def _rivals(seeking: Search, fit: Fit, accepted: Sequence[Named], k: int, most: int) -> list[tuple[float, Named, Fit]]:
-    """Fits with cause k replaced by those that look alike: (chi-square lost, rival, fit)."""
+def _less(seeking: Search, fit: Fit, accepted: Sequence[Named], k: int) -> Fit:
+    """Without cause k. Of a single one that is the nominal fit, which is known."""
+    others = tuple(c for j, c in enumerate(accepted) if j != k)
+    return seeking.fitted(_without(fit.machine, accepted[k]), others, fit) if others else seeking.base
+
+
+def _rivals(
+    seeking: Search, fit: Fit, accepted: Sequence[Named], k: int, most: int, less: Fit | None = None
+) -> list[tuple[float, Named, Fit]]:
+    """Fits with cause k replaced by those that look alike: (chi-square lost, rival, fit); `less` is the one without either."""
     one, names = accepted[k], {c.cause for c in accepted}
     own_names = set(one.numbers(with_spare=True))
     own = np.array([j for j, c in enumerate(fit.columns) if c.kind == "p" and NAMES[c.index] in own_names])
@@ -277,11 +298,11 @@ def _rivals(seeking: Search, fit: Fit, accepted: Sequence[Named], k: int, most: 
     alike.sort(key=lambda item: -item[0])
     out = []
     others = tuple(c for j, c in enumerate(accepted) if j != k)
-    bare = _without(fit.machine, one)
     for cosine, rival in alike[:most]:
         if cosine < seeking.rules.least_cosine:
             break
-        other = seeking.fitted(seeking.fitted(bare, others).machine, (*others, rival))
+        less = less or _less(seeking, fit, accepted, k)
+        other = seeking.fitted(less.machine, (*others, rival), less)
         out.append((other.chi2 - fit.chi2, rival, other))
     return out
 
@@ -299,9 +320,10 @@ def _judged(
     rivals: dict[str, dict[str, float]] = {}
     for k, one in enumerate(accepted):
         others = tuple(c for c in accepted if c != one)
-        gain[one.cause] = max(seeking.fitted(_without(fit.machine, one), others).chi2 - fit.chi2, 0.0)
+        less = _less(seeking, fit, accepted, k)
+        gain[one.cause] = max(less.chi2 - fit.chi2, 0.0)
         rivals[one.cause] = {}
-        for lost, rival, other in _rivals(seeking, fit, accepted, k, most=4):
+        for lost, rival, other in _rivals(seeking, fit, accepted, k, 4, less):
             if rival.cause != one.cause and seeking.is_plausible(other, (*others, rival)):
                 known = rivals[one.cause].get(rival.cause, np.inf)
                 rivals[one.cause][rival.cause] = min(known, max(lost, 0.0))

@@ -102,14 +102,14 @@ def _told(found: Found, true: list[str]) -> Fit:
         return found.fit
     seeking = Search(found.problem, found.nominal, frozenset(), RULES, lambda _: None, lambda: True)
     needless = {number: 0.0 for one in found.accepted if one.cause not in wanted for number in one.form.numbers}
-    best, causes = seeking.fitted(found.fit.machine.with_values(needless), ()), ()
+    best, causes = seeking.fitted(found.fit.machine.with_values(needless), (), found.fit), ()
     for name in wanted:
         forms = (
             [named[name]]
             if name in named
             else [Named(name, f) for f in CATALOGUE[name].forms if f.needs(found.problem.record)]
         )
-        fits = [(seeking.fitted(best.machine, (*causes, one)), one) for one in forms]
+        fits = [(seeking.fitted(best.machine, (*causes, one), best), one) for one in forms]
         if fits:
             best, taken_in = min(fits, key=lambda pair: pair[0].chi2)
             causes = (*causes, taken_in)

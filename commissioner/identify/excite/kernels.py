@@ -89,3 +89,17 @@ def flux_behind(flux: Array, commanded: Array, admittance: NDArray[np.complex128
             squares += abs(amplitude[m] * admittance[m]) ** 2
         amplitude = commanded / np.abs(1.0 + lost_v / max(math.sqrt(0.5 * squares), 1e-12) * admittance)
     return np.sum(flux * amplitude)
+
+
+@njit()
+def driven_peaks(voltage_v: Array, matrix: Array, gain: Array, leakage_h: float) -> tuple[float, float]:
+    """(largest |stator flux|, largest |current|) of the linear machine under the voltages `(n,)`, from rest; `matrix`, `gain`: held-input
+    model of current and rotor flux."""
+    i, rotor, top_wb, top_a = 0.0, 0.0, 0.0, 0.0
+    for k in range(voltage_v.size):
+        i, rotor = (
+            matrix[0, 0] * i + matrix[0, 1] * rotor + gain[0] * voltage_v[k],
+            matrix[1, 0] * i + matrix[1, 1] * rotor + gain[1] * voltage_v[k],
+        )
+        top_wb, top_a = max(top_wb, abs(rotor + leakage_h * i)), max(top_a, abs(i))
+    return top_wb, top_a

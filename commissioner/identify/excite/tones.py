@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from commissioner.compiled import writable
-from commissioner.identify.excite.kernels import sum_of_tones
+from commissioner.identify.excite.kernels import driven_peaks, sum_of_tones
 from commissioner.identify.excite.minimax import FEWEST_SHARE, minimax_cost
 from commissioner.identify.inverter.staircase import IDEAL_INVERTER, InverterError
-from commissioner.identify.observer.kernels import forecast
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.standstill import admittance_s, held_input, poles_per_s
 from commissioner.records import Signal
@@ -151,10 +150,8 @@ def predicted_peaks(machine: InverseGamma, excitation: Excitation, period_s: flo
     """(stator flux, current) peaks of the linear machine under the full excitation, from rest, no inverter error."""
     time_s = np.arange(int(excitation.duration_s / period_s)) * period_s
     matrix, gain = held_input(machine, period_s)
-    flux, current = forecast(
-        excitation.voltage_v(np.asarray(time_s, dtype=np.float64)), period_s, matrix, gain, machine.stator_resistance_ohm,
-        machine.leakage_inductance_h, np.zeros(2), 1.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+    voltage = excitation.voltage_v(np.asarray(time_s, dtype=np.float64))
+    flux, current = driven_peaks(voltage, matrix, gain, machine.leakage_inductance_h)
     return float(flux), float(current)
 
 
