@@ -9,6 +9,8 @@ import numpy as np
 
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
+from sim.motoring import kernel as at
+from sim.motoring.effects import machine_array
 from sim.motoring.hidden import draw
 from sim.motoring.machine import Scenario
 from sim.motoring.recording import record
@@ -90,6 +92,10 @@ def true_size(effect: dict[str, Any], scenario: Scenario) -> float | None:
         return 1e6 * size
     if name == "speed_sensor_lag":
         return 1e3 * size
+    if name == "rotor_skin_effect":  # the key's is that of high frequencies, ours that of the rated one
+        m, omega = machine_array(scenario), 2.0 * np.pi * plate["rated_frequency_hz"]
+        bars = ((m[at.BAR_1], m[at.CORNER_1]), (m[at.BAR_2], m[at.CORNER_2]))
+        return float(sum(added / (1.0 + (corner / omega) ** 2) for added, corner in bars))
     if name == "line_resistance":
         return size * scenario.machine.stator_resistance_ohm
     return size

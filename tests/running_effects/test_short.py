@@ -9,7 +9,7 @@ from tests.running_effects.cases import Case, taken, true_size
 from tests.running_effects.protocol import failures, false_names, gains_elsewhere, run, table
 
 NAMED = {
-    "magnetizing_saturation": 0.15, "rotor_skin_effect": 0.4, "iron_loss": 0.05, "rotor_asymmetry": 0.05, "stator_asymmetry": 0.05,
+    "magnetizing_saturation": 0.15, "rotor_skin_effect": 0.15, "iron_loss": 0.05, "rotor_asymmetry": 0.05, "stator_asymmetry": 0.05,
     "line_resistance": 0.1, "sensor_gain_mismatch": 0.05, "voltage_gain_mismatch": 0.05, "speed_sensor_gain": 0.05,
     "speed_sensor_lag": 0.1,
 }  # fmt: skip

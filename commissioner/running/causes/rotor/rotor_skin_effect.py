@@ -8,8 +8,11 @@ from commissioner.estimation.numbers import Scales
 from commissioner.running.causes.cause import Cause, Confounder, Form, Sizes, Values
 
 
-def _sizes(v: Values, _: Scales) -> Sizes:
-    return {"added_at_standstill": (v["bar_resistance"], ""), "corner_hz": (v["bar_corner"] / (2 * math.pi), "Hz")}
+def _sizes(v: Values, s: Scales) -> Sizes:
+    """At standstill the slip has the rated frequency: of k there is what (w / w_b)^2 leaves."""
+    share = 1.0 / (1.0 + (v["bar_corner"] / s.frequency_rad_per_s) ** 2)
+    corner_hz = v["bar_corner"] / (2 * math.pi)
+    return {"added_at_standstill": (v["bar_resistance"] * share, ""), "corner_hz": (corner_hz, "Hz")}
 
 
 CAUSE = Cause(
@@ -29,5 +32,5 @@ CAUSE = Cause(
         Confounder("stator_asymmetry", "a start"),
         Confounder("iron_loss", "a start from the mains with the speed recorded"),
     ),
-    scenario=lambda v, s: {"size": _sizes(v, s)["added_at_standstill"][0]},
+    scenario=lambda v, _: {"size": v["bar_resistance"]},
 )
