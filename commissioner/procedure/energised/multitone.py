@@ -9,9 +9,13 @@ import numpy as np
 
 from commissioner.errors import Aborted, DataRefused
 from commissioner.identify.batch.fit import fit_segments
-from commissioner.identify.batch.model import ModelChoice
+from commissioner.identify.batch.model import OWN, ModelChoice, start_theta
+from commissioner.identify.batch.problem import Problem
 from commissioner.identify.batch.segments import Segment
+from commissioner.identify.excite.amplitude import Amplitude
+from commissioner.identify.excite.current_flux import CurrentFlux
 from commissioner.identify.excite.flux_guard import FluxAdvice, FluxGuard, FluxReading
+from commissioner.identify.excite.forecast import Forecast
 from commissioner.identify.excite.tones import DesignedExcitation, Excitation, ExcitationLimits, Tone, design
 from commissioner.identify.intake.averaged import on_its_period
 from commissioner.identify.inverter.compensation import Compensation
@@ -218,15 +222,20 @@ def warm_up(nameplate: Nameplate) -> None:
     guard = FluxGuard(1.0, 0.01, tone, period_s, 1.0)
     for part in np.array_split(signal, 4):
         guard.advance(part, part, observer.advance(part, part, 1), 0.1)
+    machine = prior(nameplate).typical
+    CurrentFlux(machine, period_s).advance(signal)
+    Amplitude(Forecast.behind(IDEAL_INVERTER, tone, 0.0), 1.0, 1.0, 0.0, period_s).by_flux(machine)
     design(
-        prior(nameplate).typical,
+        machine,
         ExcitationLimits(1.0, nameplate.rated_current_peak_a, nameplate.rated_voltage_v),
         period_s,
     )
     cut = [Segment(signal[:FITTED_SAMPLES], signal[:FITTED_SAMPLES], 0.0, starts_at_rest=False)]
     for model in (ModelChoice(), ModelChoice(extra_powers=1, leg=LegLaw(1.0), with_delay=True)):
         with suppress(DataRefused):
-            fit_segments(cut, period_s, prior(nameplate).typical, model, max_iterations=1)
+            fit_segments(cut, period_s, machine, model, max_iterations=1)
+        problem, theta, own = Problem(cut, period_s, model), start_theta(machine, model), np.zeros((1, OWN))
+        problem.evaluate(theta, own, near=problem.evaluate(theta, own))
 
 
 def _compensation(inverter: InverterError, axis_deg: float, span_a: float) -> Compensation:
