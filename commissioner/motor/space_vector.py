@@ -13,12 +13,6 @@ import numpy as np
 from commissioner.records import Signal
 
 
-def clarke(u: Signal, v: Signal, w: Signal | None) -> tuple[Signal, Signal]:
-    """(alpha, beta) of three phase quantities; without the third, the sum is taken as zero."""
-    third = -u - v if w is None else w
-    return (2.0 * u - v - third) / 3.0, (v - third) / math.sqrt(3.0)
-
-
 def axis_current_a(current_u_a: Signal, current_v_a: Signal, current_w_a: Signal | None, axis_deg: float) -> Signal:
     """The current vector's component along the axis."""
     of_u, of_v, of_w = (2.0 / 3.0 * cosine for cosine in phase_cosines(axis_deg))

@@ -41,13 +41,6 @@ def poles_per_s(machine: InverseGamma) -> tuple[float, float]:
     return product / fast, fast
 
 
-def continuous(machine: InverseGamma) -> tuple[Matrix, Matrix]:
-    """(A, b) of d(i, psi_R)/dt = A (i, psi_R) + b u; A is (2, 2), b is (2,)."""
-    r_s, r_r, l_s, l_m = machine.as_tuple()
-    alpha = r_r / l_m
-    return np.array([[-(r_s + r_r) / l_s, alpha / l_s], [r_r, -alpha]]), np.array([1.0 / l_s, 0.0])
-
-
 def held_input(machine: InverseGamma, period_s: float) -> tuple[Matrix, Matrix]:
     """(Ad, bd): x[k+1] = Ad x[k] + bd u[k] with x = (i, psi_R) and u held over `period_s`. Exact."""
     r_s, r_r, l_s, l_m = machine.as_tuple()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from commissioner.motor.space_vector import phase_cosines
-from commissioner.records import DriveStatus, SampleBlock, Signal
+from commissioner.records import DriveStatus, SampleBlock, Signal, peak
 from commissioner.safety.watch import StopReason
 
 ZERO_S, WINDOW_S = 0.05, 0.04
@@ -73,7 +73,7 @@ class SensorWatch:
         claimed, self._claimed = self._claimed[1], None
         if place < 0:
             return None
-        shown = float(np.max(np.abs(_three(phases)[:, place])))
+        shown = peak(_three(phases)[:, place])
         noise_a = NOISES * float(np.max(self._zero.noise_a)) if self._zero else 0.0
         floor_a = (SCALE_FLOOR * self.current_limit_a + noise_a) * (1 if len(phases) == 3 else UNSEEN)
         if abs(shown - claimed) <= SCALE * max(shown, claimed) + floor_a:

@@ -12,7 +12,6 @@ from sim.physics import layout as at
 
 VOLTAGE_STEP_V = 0.01
 LINK_STEP_V = 0.02
-HEADER = 8
 
 
 class SampleRing:
@@ -59,11 +58,11 @@ class SampleRing:
         first, count = self._around_gaps(first, max(0, min(samples, self.produced - first)))
         self.next_unread = max(self.next_unread, oldest, first + count)
         link = round(link_v / LINK_STEP_V) & 0xFFFF
-        words = np.zeros(self.map.window_words, np.int64)
-        seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[HEADER:]))
+        words, header = np.zeros(self.map.window_words, np.int64), self.map.window_header_words
+        seen = int(copy_samples(self.ring, self.flags, first, count, self.mask, words[header:]))
         flags = seen | self._flags(first + count, was_overrun=wanted < oldest, is_running=is_running)
-        words[: HEADER - 1] = session, first >> 16 & 0xFFFF, first & 0xFFFF, count, self.mask, flags, link
-        words[HEADER - 1] = check_sum(words, HEADER, count * len(self.channels))
+        words[: header - 1] = session, first >> 16 & 0xFFFF, first & 0xFFFF, count, self.mask, flags, link
+        words[header - 1] = check_sum(words, header, count * len(self.channels))
         return words.tolist()
 
     def forget(self) -> None:

@@ -98,7 +98,7 @@ def _compare(
     if freedom < 2 or not _has_right_sign(x, candidate):
         return 1.0, 0.0
     ratio = (before - after) / candidate.does.numbers / max(after / freedom, 1e-300)
-    p_value = float(fdtrc(candidate.does.numbers, freedom, ratio))
+    p_value = float(fdtrc(candidate.does.numbers, freedom, max(ratio, 0.0)))
     if p_value > SIGNIFICANCE:
         return p_value, 0.0
     held_before = float((held_out(points, accepted, scale) ** 2).sum())

@@ -268,8 +268,8 @@ def tangents(p, scales, x0, dp, dx, voltage, speed, knots, places, period, is_fr
 
 @_kernel
 def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
-    """Derivatives along every knot of the load, `out` (knots, n, 3): what `tangents` gives, for a tenth of its price where there are
-    many. A load moves the shaft alone, so that its response is that of one linear machine whose numbers change from sample to
+    """Derivatives along every knot of the load, `out` (knots, n, 3): what a march along each gives, for a fifth of its price where there
+    are many. A load moves the shaft alone, so that its response is that of one linear machine whose numbers change from sample to
     sample: those are computed once, by a step from each state and from the load's three values within it.
     """
     step = 1e-30
@@ -286,19 +286,19 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
     to_state, to_current, by_load = np.zeros((STATES, STATES)), np.zeros((2, STATES)), np.zeros((STATES, 3))
     run, shaft = np.empty((2, 3), dtype=np.complex128), np.empty((2, 2), dtype=np.complex128)
     loads, among = np.empty(3, dtype=np.complex128), np.array([0.0, 1.0, 2.0])
+    low, part = np.zeros(3, dtype=np.int64), np.empty(3)
     is_still = np.zeros(STATES, dtype=np.bool_)
     is_still[4:6], is_still[6:8] = p[BAR] == 0.0, p[HEAT_S] == 0.0 and p[HEAT_R] == 0.0
     for q in range(n):
-        first = min(q, n - 2)  # the last sample has no step of its own
-        from_sample = q - first
-        if from_sample == 0:
+        is_last = q == n - 1  # which has no step of its own
+        if not is_last:
             for m in range(3):
-                low = min(int(places[2 * q + m]), knots.shape[0] - 2)
-                part = places[2 * q + m] - low
-                loads[m] = knots[low] * (1.0 - part) + knots[low + 1] * part
-        for j in range(STATES + 3):
-            if from_sample == 1 and j >= STATES:
-                break
+                low[m] = min(int(places[2 * q + m]), knots.shape[0] - 2)
+                part[m] = places[2 * q + m] - low[m]
+                loads[m] = knots[low[m]] * (1.0 - part[m]) + knots[low[m] + 1] * part[m]
+        rows = 1 if is_last else 2
+        voltages, speeds = voltage[2 * q : 2 * q + 3], speed[2 * q : 2 * q + 3]
+        for j in range(STATES if is_last else STATES + 3):
             if j < STATES and is_still[j]:
                 continue
             for i in range(STATES):
@@ -307,9 +307,6 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
                 x[j] += 1j * step
             else:
                 loads[j - STATES] += 1j * step
-            voltages = voltage[2 * q : 2 * q + 3] if from_sample == 0 else voltage[2 * q : 2 * q + 1]
-            speeds = speed[2 * q : 2 * q + 3] if from_sample == 0 else speed[2 * q : 2 * q + 1]
-            rows = 2 - from_sample
             march(bare, scales, x, voltages, speeds, loads, among, period, True, run[:rows], shaft[:rows])
             if j < STATES:
                 to_current[0, j], to_current[1, j] = run[0, 0].imag / step, run[0, 1].imag / step
@@ -325,7 +322,7 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
                 a += to_current[0, j] * moved[j, c]
                 b += to_current[1, j] * moved[j, c]
             out[c, q, 0], out[c, q, 1], out[c, q, 2] = a, b, 0.0
-        if from_sample == 1:
+        if is_last:
             break
         for i in range(STATES):
             state[i] = x[i].real
@@ -337,13 +334,11 @@ def load_tangents(p, scales, x0, voltage, speed, knots, places, period, out):
                     for c in range(many):
                         ahead[i, c] += share * moved[j, c]
         for m in range(3):
-            low = min(int(places[2 * q + m]), knots.shape[0] - 2)
-            part = places[2 * q + m] - low
             for i in range(STATES):
-                if low < many:
-                    ahead[i, low] += by_load[i, m] * (1.0 - part)
-                if low + 1 < many:
-                    ahead[i, low + 1] += by_load[i, m] * part
+                if low[m] < many:
+                    ahead[i, low[m]] += by_load[i, m] * (1.0 - part[m])
+                if low[m] + 1 < many:
+                    ahead[i, low[m] + 1] += by_load[i, m] * part[m]
         moved, ahead = ahead, moved
     plain = p.copy()
     for j in range(3):

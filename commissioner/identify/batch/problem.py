@@ -124,7 +124,7 @@ class Problem:
         self, theta: Matrix, own: Matrix, over: Evaluation | None = None, near: Evaluation | None = None
     ) -> Evaluation:
         """All segments simulated; the signals of `over`, which is not needed any more, are written over. With the sensitivities of
-        `near`, where they are kept: a third of the time."""
+        `near`, where they are kept: under half the time."""
         is_linear = self.model.size == SHARED and not self.model.with_delay and theta[DELAY] == 0.0
         is_near = near is not None and self.knows(near)
         held = () if is_linear else self._held(theta[:CIRCUIT], is_linearised=not is_near)

@@ -61,7 +61,7 @@ def with_known_law(
     refits = [r for f in begun[:MOST_KEPT] if (r := _fit_all(fits, tests, f)) is not None]
     free = sum(f.sum_of_squares / f.noise_a**2 for f in fits)
     spare = sum(f.model.leg_size for f in fits) - 4
-    if not refits or chdtrc(spare, min(r.misfit for r in refits) - free) < WORST_CHANCE:
+    if not refits or chdtrc(spare, max(min(r.misfit for r in refits) - free, 0.0)) < WORST_CHANCE:
         return list(drawn)
     return _mean(refits, fits)
 

@@ -20,7 +20,7 @@ from commissioner.identify.excite.forecast import Forecast
 from commissioner.identify.excite.tones import Excitation, ExcitationLimits, predicted_peaks
 from commissioner.identify.inverter.staircase import DcLevel, InverterError
 from commissioner.motor.circuit import InverseGamma
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 ABOVE_TONES = 1.25
 """Bias over the tones' peak current."""
@@ -107,7 +107,7 @@ class BiasGuard:
         """(largest |stator flux| of the block, the same over latency and reaction as well), in Wb; `ends_s` is the end of
         the block from the excitation's start."""
         seen = self._flux.advance(current_a, lost_before)
-        peak_wb = float(np.max(np.abs(seen)))
+        peak_wb = peak(seen)
         steps = max(2, math.ceil((self.latency_s + self.reaction_s) / self.sample_period_s))
         stride = max(1, steps // AHEAD_POINTS)
         ahead = ends_s + (np.arange(steps // stride + 1, dtype=np.float64) + 0.5) * self.sample_period_s * stride

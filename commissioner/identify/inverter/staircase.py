@@ -234,7 +234,8 @@ def _fit_shape(
     def jacobian(p: Signal) -> NDArray[np.float64]:
         """The unit loss is a function of current over knee."""
         true = current - (p[3] if has_both_signs else 0.0)
-        unit, slope = _with_slope(knee_shape(1.0, p[2], tail), true, axis_deg)
+        shape = knee_shape(1.0, p[2], tail)
+        unit, slope = shape.on_axis(true, axis_deg), _slope_on_axis(shape, true, axis_deg)
         rows = np.column_stack([-true, -unit, p[1] / p[2] * true * slope, has_both_signs * (p[0] + p[1] * slope)])
         return np.vstack([rows / noise, [0.0, 0.0, 0.3 / p[2], 0.0], [0.0, 0.0, 0.0, 1.0 / (0.03 * largest)]])
 
@@ -249,17 +250,15 @@ def _fit_shape(
     return _ShapeFit(tail, fit.x, std, max(float(np.mean(residual**2)), (1e-5 * top_v) ** 2))
 
 
-def _with_slope(shape: InverterError, axis_current_a: Signal, axis_deg: float) -> tuple[Signal, Signal]:
-    """(loss along the axis, its derivative by the axis current), all current along the axis."""
-    loss, slope = np.zeros_like(axis_current_a), np.zeros_like(axis_current_a)
+def _slope_on_axis(shape: InverterError, axis_current_a: Signal, axis_deg: float) -> Signal:
+    """Derivative of `shape.on_axis` by the axis current."""
     knots, volts = np.array(shape.current_a), np.array(shape.voltage_v)
     per_a = np.append(np.diff(volts) / np.diff(knots), 0.0)
+    slope = np.zeros_like(axis_current_a)
     for cosine in phase_cosines(axis_deg):
-        leg_a = cosine * axis_current_a
-        size = np.abs(leg_a)
-        loss += 2.0 / 3.0 * cosine * np.sign(leg_a) * np.interp(size, knots, volts)
-        slope += 2.0 / 3.0 * cosine**2 * per_a[np.searchsorted(knots, size, side="right") - 1]
-    return loss, slope
+        cell = np.searchsorted(knots, np.abs(cosine * axis_current_a), side="right") - 1
+        slope += 2.0 / 3.0 * cosine**2 * per_a[cell]
+    return slope
 
 
 def knee_shape(plateau_v: float, knee_a: float, tail: float) -> InverterError:

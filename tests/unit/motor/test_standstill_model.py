@@ -11,7 +11,6 @@ from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.space_vector import axis_current_a, orthogonal_current_a
 from commissioner.motor.standstill import (
     admittance_s,
-    continuous,
     from_pulse_transfer,
     held_input,
     poles_per_s,
@@ -19,6 +18,13 @@ from commissioner.motor.standstill import (
 )
 
 MACHINE = InverseGamma(3.7, 2.09, 0.021, 0.224)
+
+
+def continuous(machine):
+    """(A, b) of d(i, psi_R)/dt = A (i, psi_R) + b u; A is (2, 2), b is (2,)."""
+    r_s, r_r, l_s, l_m = machine.as_tuple()
+    alpha = r_r / l_m
+    return np.array([[-(r_s + r_r) / l_s, alpha / l_s], [r_r, -alpha]]), np.array([1.0 / l_s, 0.0])
 
 
 def test_published_machine_has_its_published_poles():
