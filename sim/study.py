@@ -12,7 +12,7 @@ import numpy as np
 from sim.physics.effects import CATALOGUE
 from sim.physics.inductance import inverse_gamma
 from sim.scenario import Scenario, ScenarioError, build, read_document, table_machine, table_rows
-from sim.truth import apparent_resistance_ohm
+from sim.truth import apparent_resistance_ohm, sensor_gain
 from sim.wire.in_process import Station
 
 LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
@@ -40,10 +40,13 @@ class Drawn:
         return self.station.highest_flux_wb
 
     def parameters_at(self, stator_flux_wb: float) -> Mapping[str, float]:
-        """Secant inverse-Gamma values at a peak stator flux; the stator's resistance with that of the devices."""
+        """Secant inverse-Gamma values at a peak stator flux, as they are at the drive's terminals and through its sensors: the
+        stator's resistance with that of the devices, and every impedance over the mean gain of the three sensors, for nothing that
+        the drive measures tells either apart."""
         plant = self.station.scenario.plant
         secant = inverse_gamma(plant, stator_flux_wb)
-        return {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
+        truth = {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
+        return {name: value / sensor_gain(plant) for name, value in truth.items()}
 
 
 class Factory:

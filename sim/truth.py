@@ -58,6 +58,12 @@ def apparent_resistance_ohm(plant: Plant) -> float:
     return plant.machine.stator_resistance_ohm + float(p[at.P_SLOPE_OHM])
 
 
+def sensor_gain(plant: Plant) -> float:
+    """Mean of the three current sensors' gains, what was hidden in them included."""
+    _, s = pack(plant)
+    return float(np.mean(s[at.S_GAIN_U : at.S_GAIN_W + 1]))
+
+
 def _row(plant: Plant, flux_wb: float) -> dict[str, Any]:
     return {"stator_flux_wb": flux_wb, **{kind: inverse_gamma(plant, flux_wb, kind) for kind in KINDS}}
 

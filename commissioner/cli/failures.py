@@ -30,7 +30,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     try:
         error = _carried_out(app, arguments, as_json, hide)
     except KeyboardInterrupt:  # a second one while the first was being answered
-        error = _stopped()
+        error = _stopped(arguments)
     finally:
         be_deaf()
     _say(error, as_json, hide)
@@ -45,7 +45,7 @@ def _carried_out(
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
         if code != INTERRUPTED:
             sys.exit(code)
-        error: CommissionerError = _stopped()
+        error: CommissionerError = _stopped(arguments)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
@@ -59,8 +59,10 @@ def _carried_out(
         if not as_json and hasattr(usage, "show") and hide(error.what) == error.what:
             usage.show()
             sys.exit(UsageError.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        error = _stopped()
+    except KeyboardInterrupt:
+        error = _stopped(arguments)
+    except typer.Abort:
+        error = _stopped(arguments, by="the answer no, or none")
     except CommissionerError as failure:
         error = failure
     except OSError as failure:
@@ -90,14 +92,9 @@ def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     )
 
 
-def _stopped() -> CommissionerError:
-    return Aborted(
-        "stopped by the operator",
-        step="wait",
-        value="Ctrl-C, SIGTERM or no",
-        limit="no stop",
-        remedy="start again when ready",
-    )
+def _stopped(arguments: Sequence[str], by: str = "Ctrl-C or SIGTERM") -> CommissionerError:
+    again = "the same call with --resume goes on" if "study" in arguments[:1] else "start again when ready"
+    return Aborted("stopped by the operator", step=_verb(arguments), value=by, limit="no stop", remedy=again)
 
 
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:

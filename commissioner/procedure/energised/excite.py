@@ -26,6 +26,7 @@ from commissioner.procedure.energised.session import (
     measure_offset,
     next_block,
     ramp_down,
+    rest,
     tone_period_s,
 )
 from commissioner.procedure.findings import ExcitationChosen, FirstLook, GuardActed
@@ -163,6 +164,7 @@ def _test(
         )
     )  # fmt: skip
     under_test = UnderTest(job, findings, axis_deg, chosen, seconds)
+    yield from rest(job, findings)
     if findings.link.captured:
         yield from captured(job, findings, STEP, axis_deg, tones, under_test, seconds, is_look=is_look)
         return
