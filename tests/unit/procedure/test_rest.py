@@ -1,0 +1,39 @@
+"""What a direct current leaves in the rotor is gone before the tones begin: the guard starts from no flux."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import prior
+from commissioner.procedure.course import Findings
+from commissioner.procedure.energised.session import LEFT, OFFSET_S, REST_STEP_S, rest
+from commissioner.safety.commands import Wait
+from commissioner.study.commissioning import commissioned
+from commissioner.study.specification import Case
+from tests.unit.procedure.test_course import _job
+
+SLOW = InverseGamma(0.2, 0.16, 0.004, 0.09)
+
+
+@pytest.mark.parametrize("machine", [SLOW, replace(SLOW, rotor_resistance_ohm=0.05), None])
+def test_the_rest_lasts_until_a_twentieth_of_the_flux_is_left(machine):
+    job, findings = _job(), Findings(estimate=machine)
+    waits = list(rest(job, findings))
+    slowest = machine or prior(job.nameplate).typical
+    rested_s = sum(wait.seconds for wait in waits) + OFFSET_S
+    assert math.exp(-rested_s / slowest.rotor_time_constant_s) == pytest.approx(LEFT)
+    assert all(isinstance(wait, Wait) and 0.0 < wait.seconds <= REST_STEP_S for wait in waits)
+
+
+def test_a_fast_motor_is_not_waited_for():
+    fast = replace(SLOW, rotor_resistance_ohm=100.0 * SLOW.rotor_resistance_ohm)
+    assert list(rest(_job(), Findings(estimate=fast))) == []
+
+
+def test_true_flux_stays_below_the_limit_where_a_staircase_leaves_much_of_it():
+    """18.5 kW, rotor time constant 0.45 s: 1.05 of the limit was reached half a second after the second axis' staircase."""
+    row = commissioned(Case(0, 1402414796, "commission", "msl_18kw5", 0.2, ("any",), None, "memory", (), (0.0, 60.0)))
+    assert row["outcome"] == "commissioned" and row["effects"] == "dead_time"
+    assert row["peak_flux_fraction"] < 1.0
