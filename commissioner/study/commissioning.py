@@ -48,7 +48,7 @@ def commissioned(case: Case) -> Row:
     began = time.process_time()
     row: dict[str, Any] = {
         "case": case.number, "seed": case.seed, "motor": case.motor, "outcome": "impossible", "reason": "", "effects": "",
-        "energised_s": None, "peak_flux_fraction": None,
+        "rated_power_w": None, "energised_s": None, "peak_flux_fraction": None,
     }  # fmt: skip
     row |= {f"{name}_{what}": None for name in PARAMETERS for what in ("true", "value", "std")}
     try:
@@ -57,7 +57,11 @@ def commissioned(case: Case) -> Row:
         )
     except ValueError as error:
         return cast("Row", row | {"reason": str(error), "cpu_s": time.process_time() - began})
-    row |= {"effects": " ".join(drawn.effects), "motor": drawn.motor}
+    row |= {
+        "effects": " ".join(drawn.effects),
+        "motor": drawn.motor,
+        "rated_power_w": float(drawn.plate["rated_power_w"]),
+    }
     plate = Nameplate(**drawn.plate)
     warm_up(plate)
     findings = Findings()

@@ -27,6 +27,7 @@ class Row(TypedDict):
     seed: NotRequired[int]
     motor: NotRequired[str]
     effects: NotRequired[str]
+    rated_power_w: NotRequired[float | None]
     energised_s: NotRequired[float | None]
     peak_flux_fraction: NotRequired[float | None]
     stator_resistance_ohm_true: NotRequired[float | None]

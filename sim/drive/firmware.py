@@ -377,7 +377,8 @@ class Firmware:
 
     @property
     def current_scale_a(self) -> float:
-        return self.plant.sensors.lsb_a / COUNTS_PER_LSB
+        """Of one count (A): the converter has the step that it has, a coarse one that was put in included."""
+        return float(self.s[at.S_LSB_A]) / COUNTS_PER_LSB
 
     # --- what was written -------------------------------------------------------------------------------------------
 

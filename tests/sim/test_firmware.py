@@ -14,7 +14,7 @@ from sim.drive.firmware import Firmware
 from sim.drive.memory import Memory
 from sim.drive.states import Answer, Setup, State, Trip
 from sim.physics import layout as at
-from sim.physics.machine import Plant, Sensors
+from sim.physics.machine import Effect, Plant, Sensors
 from tests.sim.client import crc_bytes, floats
 
 MAP = load_map()
@@ -164,6 +164,17 @@ def test_current_limit_trips_at_the_sample_that_passes_it():
     before = firmware.samples.ring[firmware.produced - 2, 1:] * firmware.current_scale_a
     assert np.abs(last).max() > 0.6 - firmware.plant.sensors.lsb_a
     assert np.abs(before).max() <= 0.6 + firmware.plant.sensors.lsb_a
+
+
+def test_a_coarse_converter_reads_the_same_current_in_coarse_steps():
+    """It read a seventh of the current: samples were counted in its step and told in the usual converter's."""
+    step_a, seen = 0.1, []
+    for effects in ((), (Effect("quantization", step_a),)):
+        firmware = switch_on(ready(drive(Plant(effects=effects)), dc_bias_v=15.0, current_limit_a=20.0))
+        firmware.advance(0.3)
+        seen.append(firmware.samples.ring[firmware.produced - 1, 1] * get(firmware, "current_scale_a"))
+    assert seen[0] > 5.0 * step_a and abs(seen[1] - seen[0]) < step_a
+    assert seen[1] / step_a == pytest.approx(round(seen[1] / step_a), abs=1e-3)
 
 
 def test_test_ends_by_itself_with_a_ramp_down():
