@@ -123,8 +123,9 @@ def _of_scale(what: str, value: float, limit: str, impedances: float, plate: Nam
             "current sensors' scale",
         )  # fmt: skip
     return PlateMismatch(
-        f"{what}: all impedances are {impedances:.2g} times what the plate's motor has",
-        value, limit, "check that --motor is the motor at the drive, its connection (factor 3), and the current sensors' scale",
+        what, value, limit,
+        f"all impedances are {impedances:.2g} times what the plate's motor has: check that --motor is the motor at the drive, its "
+        "connection (factor 3), and the current sensors' scale",
     )  # fmt: skip
 
 

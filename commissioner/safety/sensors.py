@@ -28,6 +28,8 @@ NOISES = 5.0
 magnitude of 0.037 A against 0.004 A ended a sound run."""
 SCALE, SCALE_FLOOR = 0.1, 0.004
 """How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""
+SILENT = 1e-9
+"""Of the current limit: a sensor of less noise at rest shows one number there, and its converter's step is looked for."""
 UNSEEN = 3
 """A third current that is the others' negative sum has the offsets of both, and the drive's own has that of its sensor."""
 MOVES, LEAST_SHARE = 0.1, 0.1
@@ -53,6 +55,8 @@ class SensorWatch:
     _window: list[tuple[Signal, Signal]] = field(default_factory=list)
     _zero: _Zero | None = None
     _claimed: tuple[int, float] | None = None
+    _step_a: float = 0.0
+    """Of sensors without noise at rest: the smallest difference that one has shown since, the step of their converter."""
 
     def claim(self, status: DriveStatus) -> None:
         """The drive says how large its newest sample's largest phase current is."""
@@ -92,7 +96,9 @@ class SensorWatch:
         seen = np.concatenate([part for part, _ in self._window], axis=1)
         volts = np.concatenate([part for _, part in self._window])
         self._window.clear()
-        return _misfit(seen, volts, self._zero, block.axis_deg)
+        if float(np.min(self._zero.noise_a)) < SILENT * self.current_limit_a:
+            self._step_a = _smallest_step(seen, self._step_a)
+        return _misfit(seen, volts, self._zero, block.axis_deg, self._step_a)
 
     def _learn(self, block: SampleBlock, phases: Signal) -> None:
         """Offsets and noise, from the time before the first volt."""
@@ -104,21 +110,27 @@ class SensorWatch:
             self._zero = _Zero(seen.mean(axis=1), seen.std(axis=1))
 
 
-def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float) -> StopReason | None:
-    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still, or the worst one's rms distance from the
-    axis' pattern."""
+def _smallest_step(seen: Signal, known_a: float) -> float:
+    """The smallest difference between two values of a phase, or the one known before; 0 while none has moved."""
+    steps = (np.diff(np.unique(phase)) for phase in seen)
+    return min([float(s.min()) for s in steps if s.size] + [known_a] * (known_a > 0.0), default=0.0)
+
+
+def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_a: float = 0.0) -> StopReason | None:
+    """Of one window, `(phases, n)` and `(n,)`: a phase that stands still though it should show more than one step, or the worst
+    one's rms distance from the axis' pattern."""
     cosines = np.array(phase_cosines(axis_deg))[: seen.shape[0]]
     current = seen - zero.offset_a[:, None]
     along = cosines @ current / float(cosines @ cosines)
     size_a, noise_a = math.sqrt(float(np.mean(np.square(along)))), SIGMAS * float(np.max(zero.noise_a))
-    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE)
+    still = (np.ptp(seen, axis=1) == 0.0) & (np.abs(cosines) > LEAST_SHARE) & (size_a * np.abs(cosines) > step_a)
     if still.any() and size_a > noise_a and np.ptp(voltage_v) > MOVES * np.max(np.abs(voltage_v)):
         names = " and ".join(name for name, is_still in zip(NAMES, still, strict=False) if is_still)
         return _distrusted(
             f"the current sensor of phase {names} stands still", 0.0, "a current that moves with the voltage"
         )
     rest = np.sqrt(np.mean(np.square(current - np.outer(cosines, along)), axis=1))
-    allowed = MISFIT * size_a + noise_a
+    allowed = MISFIT * size_a + noise_a + step_a
     if float(np.max(rest)) <= allowed:
         return None
     return _distrusted(

@@ -11,9 +11,10 @@ from pathlib import Path
 from commissioner.encoding import HIDDEN
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.study.rows import Rows
+from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
 from commissioner.study.specification import cases_of, load_study
-from commissioner.study.summary import Summary, page, summarise
+from commissioner.study.summary import Summary, summarise
 from commissioner.study.workers import here, on_cluster
 
 PAGE = "study.html"

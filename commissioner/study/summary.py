@@ -1,4 +1,4 @@
-"""What a study's rows say together: outcomes, errors against the truth, flux; as numbers and as a sheet with pictures."""
+"""What a study's rows say together: outcomes, errors against the truth by parameter, size of motor and effect; flux."""
 
 from __future__ import annotations
 
@@ -6,21 +6,18 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
-from markupsafe import Markup
 
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.report.run.quantities import BY_FIELD
-from commissioner.report.sheet import marks
-from commissioner.report.sheet.document import Margins, Page, document
-from commissioner.report.sheet.drawing import Panel
-from commissioner.report.sheet.numbers import digits
+from commissioner.study.rows import Row
 
-Row = Mapping[str, Any]
+COMMISSIONED = "commissioned"
 QUANTILES = (0.5, 0.95, 1.0)
 MOST_REASONS = 20
+SIZES_KW = (1.0, 10.0)
+"""Ends of the classes of rated power that errors are told for."""
 
 
 @dataclass(frozen=True)
@@ -35,102 +32,86 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class Group:
+    """The cases that have something in common: how they ended, and the errors of those that were accepted."""
+
+    name: str
+    outcomes: Mapping[str, int]
+    errors: tuple[Errors, ...]
+
+    @property
+    def cases(self) -> int:
+        return sum(self.outcomes.values())
+
+
+@dataclass(frozen=True)
 class Summary:
-    """`reasons`: how often each reason ended a case that was not accepted."""
+    """`reasons`: how often each reason ended a case that was not accepted; `sizes`: by rated power; `effects`: a case with
+    several counts for each of them."""
 
     cases: int
     outcomes: Mapping[str, int]
     reasons: Mapping[str, int]
     errors: tuple[Errors, ...]
+    sizes: tuple[Group, ...]
+    effects: tuple[Group, ...]
     worst_flux_fraction: float | None
     cpu_s: float
 
 
 def summarise(rows: Sequence[Row]) -> Summary:
     """Over all rows; parameters over those that were commissioned."""
-    outcomes = Counter(str(row["outcome"]) for row in rows)
-    reasons = Counter(f"{row['outcome']}: {row.get('reason', '')}" for row in rows if row["outcome"] != "commissioned")
-    accepted = [row for row in rows if row["outcome"] == "commissioned"]
-    flux = [row["peak_flux_fraction"] for row in rows if row.get("peak_flux_fraction") is not None]
-    found = (_errors(name, accepted) for name in PARAMETERS)
+    reasons = Counter(f"{row['outcome']}: {row['reason']}" for row in rows if row["outcome"] != COMMISSIONED)
+    flux = [fraction for row in rows if (fraction := row.get("peak_flux_fraction")) is not None]
+    whole = _group("all", rows)
     return Summary(
-        len(rows), dict(outcomes.most_common()), dict(reasons.most_common(MOST_REASONS)), tuple(e for e in found if e is not None),
+        whole.cases, whole.outcomes, dict(reasons.most_common(MOST_REASONS)), whole.errors, tuple(_sizes(rows)), tuple(_effects(rows)),
         max(flux, default=None), math.fsum(row.get("cpu_s") or 0.0 for row in rows),
     )  # fmt: skip
 
 
-def _errors(name: str, rows: Iterable[Row]) -> Errors | None:
-    known = [row for row in rows if row.get(f"{name}_true") and row.get(f"{name}_value") is not None]
+def accepted(rows: Iterable[Row], name: str) -> list[Row]:
+    """The rows that were commissioned and know of this parameter what is true and what was found."""
+    return [
+        r for r in rows if r["outcome"] == COMMISSIONED and r.get(f"{name}_true") and r.get(f"{name}_value") is not None
+    ]
+
+
+def _group(name: str, rows: Sequence[Row]) -> Group:
+    outcomes = Counter(str(row["outcome"]) for row in rows)
+    found = (_errors(field, accepted(rows, field)) for field in PARAMETERS)
+    return Group(name, dict(outcomes.most_common()), tuple(errors for errors in found if errors is not None))
+
+
+def _sizes(rows: Sequence[Row]) -> Iterable[Group]:
+    ends_w = (0.0, *(1e3 * kw for kw in SIZES_KW), math.inf)
+    for low, high in pairwise(ends_w):
+        inside = [row for row in rows if low < (row.get("rated_power_w") or 0.0) <= high]
+        if inside:
+            yield _group(_between(low / 1e3, high / 1e3), inside)
+
+
+def _between(low_kw: float, high_kw: float) -> str:
+    if math.isinf(high_kw):
+        return f"above {low_kw:g} kW"
+    return f"{low_kw:g} to {high_kw:g} kW" if low_kw else f"up to {high_kw:g} kW"
+
+
+def _effects(rows: Sequence[Row]) -> Iterable[Group]:
+    named = [(row, str(row.get("effects") or "").split()) for row in rows]
+    for name in sorted({name for _, names in named for name in names}):
+        yield _group(name, [row for row, names in named if name in names])
+    without = [row for row, names in named if not names and "effects" in row]
+    if without:
+        yield _group("none", without)
+
+
+def _errors(name: str, known: Sequence[Row]) -> Errors | None:
     if not known:
         return None
-    off = np.array([row[f"{name}_value"] - row[f"{name}_true"] for row in known])
-    true, std = (np.array([row[f"{name}_{what}"] for row in known], dtype=float) for what in ("true", "std"))
-    relative = np.abs(off) / true
-    inside = np.abs(off) <= 1.96 * std
+    value, true, std = (
+        np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("value", "true", "std")
+    )
+    relative = np.abs(value - true) / true
+    inside = np.abs(value - true) <= 1.96 * std
     return Errors(name, len(known), tuple(float(np.quantile(relative, q)) for q in QUANTILES), float(np.mean(inside)))
-
-
-def page(rows: Sequence[Row], title: str) -> str:
-    """One sheet: what ended how, how far off, and each case's error over the motor's size where it is known."""
-    seen = summarise(rows)
-    body = [
-        Markup("<h1>{}</h1>").format(title),
-        marks.strip(
-            [
-                (outcome, str(number), f"{100 * number / seen.cases:.1f} %")
-                for outcome, number in list(seen.outcomes.items())[:4]
-            ]
-            + [("Worst true flux", _share(seen.worst_flux_fraction), "of the guard’s limit")]
-        ),
-    ]
-    if seen.errors:
-        columns = (
-            marks.Column("Parameter"), *(marks.Column(f"{100 * q:.0f} % of cases within" if q < 1 else "worst", right=True) for q in QUANTILES),
-            marks.Column("truth inside the 95 % interval", right=True), marks.Column("cases", right=True),
-        )  # fmt: skip
-        body.append(marks.table(columns, (_error_row(error) for error in seen.errors)))
-        body.append(
-            marks.figure(
-                "Error of each accepted case, %",
-                marks.multiples(_scatter(rows), 4),
-                "In the order of cases; zero is the truth.",
-            )
-        )
-    if seen.reasons:
-        reasons = [(reason, str(number)) for reason, number in seen.reasons.items()]
-        body.append(marks.table((marks.Column("Not accepted because"), marks.Column("Cases", right=True)), reasons))
-    margins = Margins("Study", "", title, "", f"{seen.cases} cases, {seen.cpu_s:.0f} CPU-s")
-    return document(title, margins, [Page("study", "Study", Markup("\n").join(body))])
-
-
-def _share(value: float | None) -> str:
-    return "not known" if value is None else digits(value, 3)
-
-
-def _error_row(error: Errors) -> tuple[marks.Text, ...]:
-    quantity = BY_FIELD[error.field]
-    shown = (f"{digits(100 * value, 2)} %" for value in error.quantiles)
-    name = Markup("{} {}").format(quantity.symbol, quantity.words)
-    return name, *shown, f"{100 * error.coverage:.1f} %", str(error.count)
-
-
-def _scatter(rows: Sequence[Row]) -> Iterable[tuple[marks.Text, Markup]]:
-    for name in PARAMETERS:
-        points = [
-            (row["case"], 100.0 * (row[f"{name}_value"] / row[f"{name}_true"] - 1.0))
-            for row in rows
-            if row["outcome"] == "commissioned" and row.get(f"{name}_true")
-        ]
-        if not points:
-            continue
-        reach = 1.1 * max(abs(error) for _, error in points) or 1.0
-        panel = Panel(
-            160,
-            104,
-            (0.0, max(1.0, float(max(case for case, _ in points)))),
-            (-reach, reach),
-            f"errors of {name}",
-            left=30,
-        )
-        panel.grid(4).axis("", 3).level(0.0, "res").dots([case for case, _ in points], [error for _, error in points])
-        yield Markup("{}, %").format(BY_FIELD[name].symbol), panel.drawn()

@@ -99,7 +99,7 @@ def test_a_machine_fits_its_own_plate(name, machine, plate):
 def test_star_for_delta_and_the_reverse_are_named(name, machine, plate):
     delta = replace(plate, connection="delta")
     found = mismatch(plate_match(scaled(machine, 3.0), delta), delta)
-    assert (found is not None and "wired" in found.what) or "impedances are" in found.what
+    assert (found is not None and "wired" in found.what) or "impedances are" in found.remedy
     found = mismatch(plate_match(scaled(machine, 1 / 3), plate), plate)
     assert found is not None
 
@@ -160,7 +160,7 @@ def test_the_bounds_are_where_they_are_said_to_be(current, copper, what):
 def test_the_connection_is_named_where_all_impedances_are_its_factor_off(impedances, connection, says):
     plate = replace(PLATE, connection=connection)
     found = mismatch(PlateMatch(1.0 / impedances, 0.1, impedances), plate)
-    assert says in found.what
+    assert says in f"{found.what}; {found.remedy}"
     assert ("wire the motor in" in found.remedy) is ("wired" in says)
 
 

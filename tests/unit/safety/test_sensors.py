@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from commissioner.records import SampleBlock
-from commissioner.safety.sensors import MISFIT, WINDOW_S, ZERO_S, SensorWatch, _culprit, _misfit, _Zero
+from commissioner.safety.sensors import MISFIT, WINDOW_S, ZERO_S, SensorWatch, _culprit, _misfit, _smallest_step, _Zero
 from tests.unit.safety.test_watch import STATUS
 
 PERIOD_S, LIMIT_A, ROWS = 2e-4, 10.0, 50
@@ -124,7 +124,7 @@ def test_what_was_learnt_at_rest_stays():
 
 
 # --- one window, in closed form ---------------------------------------------------------------------------------------
-ACROSS = 90.0
+ACROSS, COS_30 = 90.0, math.cos(math.pi / 6.0)
 """Degrees at which phase u carries nothing, and v and w the same."""
 
 
@@ -168,6 +168,56 @@ def test_two_phases_that_agree_to_the_last_digit_leave_the_third():
 
 def test_a_phase_of_two_sensors_that_stands_still_is_named():
     assert "phase v stands still" in window(([0.0, 0.1], 4.0)).what
+
+
+def coarse(step_a, damage=lambda seen: seen):
+    """What a converter of this step shows of sensors without noise."""
+    return lambda seen, start: damage(step_a * np.floor(seen / step_a + 0.5))
+
+
+@pytest.mark.parametrize("step_a", [0.1, 0.3, 1.0, 3.0, 7.0])
+def test_a_coarse_converter_is_no_sensor_that_lies(step_a):
+    """From a fortieth of the current to nearly twice of it; phases v and w carry half of what u does."""
+    assert verdict(damage=coarse(step_a), offset=(0.0, 0.0, 0.0)) is None
+    assert verdict(damage=coarse(step_a), offset=(0.9 * step_a, -0.8 * step_a, 1.1 * step_a)) is None
+
+
+@pytest.mark.parametrize("axis_deg", [0.0, 60.0])
+def test_behind_a_coarse_converter_a_lie_larger_than_its_steps_is_seen(axis_deg):
+    frozen = verdict(
+        damage=coarse(0.3, lambda seen: np.vstack([seen[:2], 0.0 * seen[2:]])),
+        offset=(0.0, 0.0, 0.0),
+        axis_deg=axis_deg,
+    )
+    assert "phase w stands still" in frozen.what
+    damped = verdict(
+        damage=coarse(0.3, lambda seen: seen * np.array([[1.0], [1.0], [0.0]]) + 0.3), offset=(0.0, 0.0, 0.0)
+    )
+    assert damped is not None
+
+
+@pytest.mark.parametrize(("step_a", "is_seen"), [(0.0, True), (3.4, True), (3.5, False)])
+def test_a_phase_may_stand_still_within_its_step(step_a, is_seen):
+    """At 90 deg v and w show cos 30 deg of 4 A."""
+    seen = np.array([[0.0, 0.0], [4.0 * COS_30, 4.0 * COS_30], [-4.0 * COS_30, -4.0 * COS_30]])
+    found = _misfit(seen, np.array([20.0, 30.0]), _Zero(np.zeros(3), np.zeros(3)), ACROSS, step_a)
+    assert (found is not None) is is_seen
+
+
+@pytest.mark.parametrize(("u", "is_seen"), [(1.0, False), (1.1, True)])
+def test_a_step_and_the_misfit_add(u, is_seen):
+    """0.12 of 4 / cos 30 deg and a step of 0.48 are 1.034."""
+    seen = np.array([[u, -u], [4.0, 4.1], [-4.0, -4.1]])
+    found = _misfit(seen, np.array([20.0, 30.0]), _Zero(np.zeros(3), np.zeros(3)), ACROSS, 0.48)
+    assert (found is not None) is is_seen
+
+
+def test_the_smallest_step_is_kept():
+    assert _smallest_step(np.array([[1.0, 1.0], [2.0, 2.0]]), 0.0) == 0.0
+    assert _smallest_step(np.array([[1.0, 1.5], [2.0, 2.25]]), 0.0) == 0.25
+    assert _smallest_step(np.array([[1.0, 1.0], [2.0, 2.0]]), 0.25) == 0.25
+    assert _smallest_step(np.array([[1.0, 1.5], [2.0, 2.0]]), 0.25) == 0.25
+    assert _smallest_step(np.array([[1.0, 1.125], [2.0, 2.0]]), 0.25) == 0.125
 
 
 @pytest.mark.parametrize(("ratio", "names"), [(1.4, "u or v"), (2.0, "v")])

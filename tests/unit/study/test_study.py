@@ -20,9 +20,10 @@ from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load_procedure
 from commissioner.study.commissioning import NoArchive
 from commissioner.study.rows import ENDED, TABLE, Rows
+from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
 from commissioner.study.specification import cases_of, load_study
-from commissioner.study.summary import page, summarise
+from commissioner.study.summary import summarise
 from commissioner.study.workers import carried_out, here
 from tests.support.service.described import judge
 

@@ -1,0 +1,111 @@
+"""The study's page: how its cases ended, errors by parameter, size and effect, flux; with pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from markupsafe import Markup
+
+from commissioner.motor.circuit import PARAMETERS
+from commissioner.report.run.quantities import BY_FIELD
+from commissioner.report.sheet import marks
+from commissioner.report.sheet.document import Margins, Page, document
+from commissioner.report.sheet.drawing import Panel
+from commissioner.report.sheet.numbers import digits
+from commissioner.study.rows import Row
+from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, summarise
+
+OUTCOMES = (COMMISSIONED, "rejected", "aborted", "faulted")
+
+
+def page(rows: Sequence[Row], title: str) -> str:
+    """One sheet of all rows; what the kind of the study does not know is left out."""
+    seen = summarise(rows)
+    parts = [Markup("<h1>{}</h1>").format(title), _head(seen)]
+    if seen.errors:
+        parts += [_by_parameter(seen), _scatter(rows)]
+    if any(row.get("peak_flux_fraction") for row in rows):
+        parts.append(_flux(rows))
+    if seen.reasons:
+        reasons = [(reason, str(number)) for reason, number in seen.reasons.items()]
+        parts.append(marks.table((marks.Column("Not accepted because"), marks.Column("Cases", right=True)), reasons))
+    if any(group.errors for group in seen.effects):
+        parts.append(_by_effect(seen.effects))
+    margins = Margins("Study", "", title, "", f"{seen.cases} cases, {seen.cpu_s:.0f} CPU-s")
+    return document(title, margins, [Page("study", "Study", Markup("\n").join(parts))])
+
+
+def _head(seen: Summary) -> Markup:
+    ends = [(outcome, str(n), f"{100 * n / seen.cases:.1f} %") for outcome, n in list(seen.outcomes.items())[:4]]
+    worst = "not known" if seen.worst_flux_fraction is None else digits(seen.worst_flux_fraction, 3)
+    return marks.strip([*ends, ("Worst true flux", worst, "of the guard’s limit")])
+
+
+def _by_parameter(seen: Summary) -> Markup:
+    columns = (
+        marks.Column("Parameter"), marks.Column("Motors"),
+        *(marks.Column(f"{100 * q:.0f} % of cases within" if q < 1 else "worst", right=True) for q in QUANTILES),
+        marks.Column("truth inside the 95 % interval", right=True), marks.Column("cases", right=True),
+    )  # fmt: skip
+    rows = []
+    for errors in seen.errors:
+        rows.append(_error_row(errors, "all"))
+        of_sizes = ((group.name, e) for group in seen.sizes for e in group.errors if e.field == errors.field)
+        rows += [_error_row(e, name, is_first=False) for name, e in of_sizes]
+    return marks.table(columns, rows)
+
+
+def _error_row(errors: Errors, motors: str, *, is_first: bool = True) -> tuple[marks.Text, ...]:
+    quantity = BY_FIELD[errors.field]
+    name = Markup("{} {}").format(quantity.symbol, quantity.words) if is_first else quantity.symbol
+    shown = (f"{digits(100 * value, 2)} %" for value in errors.quantiles)
+    return name, motors, *shown, f"{100 * errors.coverage:.1f} %", str(errors.count)
+
+
+def _by_effect(groups: Iterable[Group]) -> Markup:
+    """A row for each effect: how its cases ended, and what 95 % of the accepted are within."""
+    columns = (
+        marks.Column("Effect in the drive or the motor"), *(marks.Column(outcome, right=True) for outcome in OUTCOMES),
+        *(marks.Column(Markup("{}, 95 % within").format(BY_FIELD[name].symbol), right=True) for name in PARAMETERS),
+    )  # fmt: skip
+    rows = []
+    for group in groups:
+        within = {errors.field: f"{digits(100 * errors.quantiles[1], 2)} %" for errors in group.errors}
+        ends = (str(group.outcomes.get(outcome, 0)) for outcome in OUTCOMES)
+        rows.append((group.name.replace("_", " "), *ends, *(within.get(name, "–") for name in PARAMETERS)))
+    return marks.table(columns, rows)
+
+
+def _scatter(rows: Sequence[Row]) -> Markup:
+    return marks.figure(
+        "Error of each accepted case, %",
+        marks.multiples(_errors_over_cases(rows), 4),
+        "In the order of cases; zero is the truth.",
+    )
+
+
+def _errors_over_cases(rows: Sequence[Row]) -> Iterator[tuple[marks.Text, Markup]]:
+    for name in PARAMETERS:
+        known = accepted(rows, name)
+        if not known:
+            continue
+        cases = [float(row["case"]) for row in known]
+        errors = [100.0 * (float(row[f"{name}_value"]) / float(row[f"{name}_true"]) - 1.0) for row in known]  # type: ignore[literal-required]
+        reach = 1.1 * max(abs(error) for error in errors) or 1.0
+        panel = Panel(160, 104, (0.0, max(1.0, *cases)), (-reach, reach), f"errors of {name}", left=30)
+        panel.grid(4).axis("", 3).level(0.0, "res").dots(cases, errors)
+        yield Markup("{}, %").format(BY_FIELD[name].symbol), panel.drawn()
+
+
+def _flux(rows: Sequence[Row]) -> Markup:
+    known = [(float(row["case"]), fraction) for row in rows if (fraction := row.get("peak_flux_fraction"))]
+    cases, fractions = [case for case, _ in known], [fraction for _, fraction in known]
+    panel = Panel(
+        660, 130, (0.0, max(1.0, *cases)), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30
+    )
+    panel.grid(4).axis("", 6).level(1.0).dots(cases, fractions)
+    return marks.figure(
+        "Highest true flux of each case, of the guard’s limit",
+        panel.drawn(),
+        "By the simulator; cases that ended before much flux lie low.",
+    )
