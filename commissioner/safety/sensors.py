@@ -28,8 +28,6 @@ NOISES = 5.0
 magnitude of 0.037 A against 0.004 A ended a sound run."""
 SCALE, SCALE_FLOOR = 0.1, 0.004
 """How far the drive's magnitude of one sample may be off the stream's: of the larger, and of the current limit."""
-SILENT = 1e-9
-"""Of the current limit: a sensor of less noise at rest shows one number there, and its converter's step is looked for."""
 UNSEEN = 3
 """A third current that is the others' negative sum has the offsets of both, and the drive's own has that of its sensor."""
 MOVES, LEAST_SHARE = 0.1, 0.1
@@ -56,7 +54,7 @@ class SensorWatch:
     _zero: _Zero | None = None
     _claimed: tuple[int, float] | None = None
     _step_a: float = 0.0
-    """Of sensors without noise at rest: the smallest difference that one has shown since, the step of their converter."""
+    """The smallest difference that a sensor has shown: the step of a coarse converter, next to nothing of any other."""
 
     def claim(self, status: DriveStatus) -> None:
         """The drive says how large its newest sample's largest phase current is."""
@@ -96,8 +94,7 @@ class SensorWatch:
         seen = np.concatenate([part for part, _ in self._window], axis=1)
         volts = np.concatenate([part for _, part in self._window])
         self._window.clear()
-        if float(np.min(self._zero.noise_a)) < SILENT * self.current_limit_a:
-            self._step_a = _smallest_step(seen, self._step_a)
+        self._step_a = _smallest_step(seen, self._step_a)
         return _misfit(seen, volts, self._zero, block.axis_deg, self._step_a)
 
     def _learn(self, block: SampleBlock, phases: Signal) -> None:

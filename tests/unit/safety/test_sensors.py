@@ -6,6 +6,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
+from commissioner.motor.space_vector import phase_cosines
 from commissioner.records import SampleBlock
 from commissioner.safety.sensors import MISFIT, WINDOW_S, ZERO_S, SensorWatch, _culprit, _misfit, _smallest_step, _Zero
 from tests.unit.safety.test_watch import STATUS
@@ -124,7 +125,7 @@ def test_what_was_learnt_at_rest_stays():
 
 
 # --- one window, in closed form ---------------------------------------------------------------------------------------
-ACROSS, COS_30 = 90.0, math.cos(math.pi / 6.0)
+ACROSS = 90.0
 """Degrees at which phase u carries nothing, and v and w the same."""
 
 
@@ -196,12 +197,15 @@ def test_behind_a_coarse_converter_a_lie_larger_than_its_steps_is_seen(axis_deg)
     assert damped is not None
 
 
-@pytest.mark.parametrize(("step_a", "is_seen"), [(0.0, True), (3.4, True), (3.5, False)])
-def test_a_phase_may_stand_still_within_its_step(step_a, is_seen):
-    """At 90 deg v and w show cos 30 deg of 4 A."""
-    seen = np.array([[0.0, 0.0], [4.0 * COS_30, 4.0 * COS_30], [-4.0 * COS_30, -4.0 * COS_30]])
-    found = _misfit(seen, np.array([20.0, 30.0]), _Zero(np.zeros(3), np.zeros(3)), ACROSS, step_a)
-    assert (found is not None) is is_seen
+@pytest.mark.parametrize("is_more", [False, True])
+def test_a_phase_may_stand_still_that_should_show_no_more_than_a_step(is_more):
+    """Phase u has all of the axis current: what it should show is the size of that, and the others half."""
+    cosines = np.array(phase_cosines(0.0))
+    seen = np.outer(cosines, [3.0, 3.0])
+    size_a = math.sqrt(float(np.mean(np.square(cosines @ seen / float(cosines @ cosines))))) * abs(cosines[0])
+    step_a = math.nextafter(size_a, 0.0) if is_more else size_a
+    found = _misfit(seen, np.array([20.0, 30.0]), _Zero(np.zeros(3), np.zeros(3)), 0.0, step_a)
+    assert (found is not None and "phase u stands still" in found.what) is is_more
 
 
 @pytest.mark.parametrize(("u", "is_seen"), [(1.0, False), (1.1, True)])
