@@ -45,6 +45,9 @@ BELOW_TRIP = 0.85
 """Of the drive's current limit: what tests aim at where that is less than they would take otherwise."""
 WINDOWS_A_WATCHDOG = 4.0
 """Whole windows that a watchdog must outlast: one that is lost, its time-out, and one more."""
+AT_WORST = 3.0
+"""Standard errors of a look's L_M that a direct current reckons with, as the flux guard of the tones does: looks that knew L_M to 13 and
+17 % let a staircase reach 1.18 and 1.04 of the limit, and a closing bias 1.08."""
 DWELL_READINGS = 4
 """Status readings spread over the standstill dwell time."""
 
@@ -167,6 +170,11 @@ class Findings:
     def test_current_a(self, job: Job) -> float:
         """The largest current along the axis that a test on this drive aims at, peak."""
         return min(job.test_current_a, BELOW_TRIP * self.trip_current_a(job))
+
+    def at_worst(self, machine: InverseGamma) -> InverseGamma:
+        """A machine that was measured, with the largest L_M that the newest look allows."""
+        doubt_h = AT_WORST * self.look.std[3] if self.look is not None else 0.0
+        return replace(machine, magnetizing_inductance_h=machine.magnetizing_inductance_h + doubt_h)
 
     def resistance_ohm(self, job: Job) -> float:
         """The best stator resistance so far: newest look, else last staircase, else the plate's typical value."""

@@ -26,7 +26,7 @@ def under_bias(
 ) -> Generator[Command, Any, None]:
     """Tones down, bias on for `seconds`, the flux watched through the current; bias off. Left out where no bias fits, which
     is told."""
-    machine = findings.estimate
+    machine = findings.at_worst(findings.estimate) if findings.estimate is not None else None
     limits = ExcitationLimits(test.limit_wb, findings.test_current_a(job), job.test_voltage_v)
     levels = findings.staircases[-1].levels
     plan = None

@@ -38,7 +38,7 @@ RUNGS, UNKNOWN_RUNGS, FIRST_LOWER = (1.0, 0.6, 0.3), (0.6, 0.3), 0.55
 FIRST_SHARE = 0.2
 """The first current, of the top that the plate's most inductive motor could take."""
 TOP, KNOWN_TOP = 0.9, 0.95
-"""Flux of the top DC level, of the limit, and once all of the machine is known."""
+"""Flux of the top DC level, of the limit, and of a machine that is known at its worst (`Findings.at_worst`)."""
 SLOWLY_STEERED = 0.8
 """Of that top, on an unknown motor over a link on which steering takes tenths of a second: flux reached 1.00 of its limit without."""
 TOP_ROOM = 1.15
@@ -139,7 +139,8 @@ class _Stair(DirectCurrent):
         if findings.link.captured and not is_first:
             self._top_a *= SLOWLY_STEERED
         if self._known is not None:
-            inductance_h = machine.leakage_inductance_h + machine.magnetizing_inductance_h
+            worst = findings.at_worst(self._known)
+            inductance_h = worst.leakage_inductance_h + worst.magnetizing_inductance_h
             self._top_a = min(KNOWN_TOP * flux_wb / inductance_h, self._most_a)
         step = FIRST_STEP if is_first else STEP
         super().__init__(job, findings, step, axis_deg, self._plan.largest_inductance_h, self._known)
