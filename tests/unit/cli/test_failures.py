@@ -89,6 +89,13 @@ def test_a_damaged_archive_is_refused_by_name(capsys, archive, name, content, ve
     assert code == 0 or "defect" not in document["reason"]
 
 
+@pytest.mark.parametrize(("verb", "goes_on"), [("study", "--resume"), ("demo", "start again")])
+def test_who_stops_a_verb_is_told_how_it_goes_on(verb, goes_on):
+    stopped = failures._stopped([verb, "campaign.toml"])
+    assert (stopped.exit_code, stopped.what) == (4, "stopped by the operator")
+    assert goes_on in stopped.remedy and str(stopped.step).startswith(verb)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -182,7 +189,7 @@ def test_a_signal_behind_the_end_of_a_run_is_not_answered(capsys):
 def test_a_second_ctrl_c_while_the_first_is_answered_is_no_other_end(capsys, monkeypatch):
     plain = failures._stopped
 
-    def interrupted():
+    def interrupted(*_arguments):
         monkeypatch.setattr(failures, "_stopped", plain)
         signal.raise_signal(signal.SIGINT)
 
