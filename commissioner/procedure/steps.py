@@ -108,8 +108,11 @@ class Job:
         return self.plan.limits.total_time_s * self.stretch
 
     def flux_limit_wb(self, stator_resistance_ohm: float) -> float:
-        """The stator-flux peak at which the guard acts."""
-        return self.plan.limits.flux_fraction * rated_flux(self.nameplate, stator_resistance_ohm).stator_peak_wb
+        """The stator-flux peak at which the guard acts. No resistance that the plate does not allow moves it: 55 ohm of a 75 kW motor,
+        seen through a converter coarser than the current, had made it thirtyfold."""
+        box = prior(self.nameplate)
+        most_ohm = min(stator_resistance_ohm, box.upper.stator_resistance_ohm)
+        return self.plan.limits.flux_fraction * rated_flux(self.nameplate, most_ohm).stator_peak_wb
 
 
 @dataclass
@@ -184,7 +187,8 @@ class Findings:
                 return look.parameters.stator_resistance_ohm
         box = prior(job.nameplate)
         if self.staircases:
-            return max(self.staircases[-1].stator_resistance.value, box.lower.stator_resistance_ohm)
+            seen_ohm = self.staircases[-1].stator_resistance.value
+            return min(max(seen_ohm, box.lower.stator_resistance_ohm), box.upper.stator_resistance_ohm)
         return box.typical.stator_resistance_ohm
 
 

@@ -1,4 +1,4 @@
-"""A direct current reckons with the largest inductance that a look at the motor allows."""
+"""What limits a test does not trust what was measured further than the plate and the measurement's own error allow."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import prior
 from commissioner.procedure.course import Findings
 from commissioner.procedure.energised.staircase import KNOWN_TOP, _Stair
 from commissioner.procedure.steps import AT_WORST
@@ -34,3 +35,18 @@ def test_only_l_m_is_doubted_and_only_where_there_was_a_look():
     assert worst.magnetizing_inductance_h == pytest.approx(0.33)
     assert replace(worst, magnetizing_inductance_h=FOUND.magnetizing_inductance_h) == FOUND
     assert Findings().at_worst(FOUND) == FOUND
+
+
+def test_no_measured_resistance_moves_the_flux_limit_beyond_what_the_plate_allows():
+    job = _job()
+    box, at_typical_wb = prior(job.nameplate), job.flux_limit_wb(prior(job.nameplate).typical.stator_resistance_ohm)
+    for absurd_ohm in (10.0, 1e3, 1e6):
+        limit_wb = job.flux_limit_wb(absurd_ohm * box.typical.stator_resistance_ohm)
+        assert 0.7 * at_typical_wb < limit_wb <= at_typical_wb
+
+
+@pytest.mark.parametrize(("seen_ohm", "end"), [(-1.0, "lower"), (1e3, "upper")])
+def test_a_staircase_of_nonsense_leaves_a_resistance_of_the_plate(seen_ohm, end):
+    job = _job()
+    stair = SimpleNamespace(stator_resistance=SimpleNamespace(value=seen_ohm))
+    assert Findings(staircases=[stair]).resistance_ohm(job) == getattr(prior(job.nameplate), end).stator_resistance_ohm
