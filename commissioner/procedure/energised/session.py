@@ -20,7 +20,7 @@ BIAS_RAMP_PER_S = 4.0
 """The drive's bias ramp in test voltages per second: a DC level is reached in a few hundredths of a second."""
 OFFSET_S = 0.1
 """Enabled without voltage before each test: what the current sensors show then is their offset."""
-LEFT = 0.05
+LEFT = 0.1
 """Of its flux: what a test with tones may find in the rotor. Half a second after a staircase a motor with a rotor time constant of 0.45 s
 still held 0.27 of the limit, which the guard did not know: 1.05 of the limit was reached."""
 REST_STEP_S = 0.5
@@ -45,9 +45,10 @@ def load(
 
 
 def rest(job: Job, findings: Findings) -> Generator[Command, Any, None]:
-    """De-energised, until the rotor has lost what the test before has left in it: exp(-t / T_R) of that flux is `LEFT`."""
+    """De-energised, until the rotor has lost what the test before has left in it: exp(-t / T_R) of that flux is `LEFT`, the ramp to
+    zero before and the zero volts after counted in. A fast motor needs none."""
     machine = findings.estimate or prior(job.nameplate).typical
-    left_s = -math.log(LEFT) * machine.rotor_time_constant_s - OFFSET_S
+    left_s = -math.log(LEFT) * machine.rotor_time_constant_s - 1.0 / BIAS_RAMP_PER_S - OFFSET_S
     while left_s > 0.0:
         yield Wait(min(left_s, REST_STEP_S))
         left_s -= REST_STEP_S
