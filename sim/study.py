@@ -46,7 +46,8 @@ class Drawn:
         plant = self.station.scenario.plant
         secant = inverse_gamma(plant, stator_flux_wb)
         truth = {NAMES[0]: apparent_resistance_ohm(plant), **{name: float(secant[name]) for name in NAMES[1:]}}
-        return {name: value / sensor_gain(plant) for name, value in truth.items()}
+        gain = sensor_gain(plant)
+        return {name: value / gain for name, value in truth.items()}
 
 
 class Factory:

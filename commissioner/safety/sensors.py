@@ -109,8 +109,9 @@ class SensorWatch:
 
 def _smallest_step(seen: Signal, known_a: float) -> float:
     """The smallest difference between two values of a phase, or the one known before; 0 while none has moved."""
-    steps = (np.diff(np.unique(phase)) for phase in seen)
-    return min([float(s.min()) for s in steps if s.size] + [known_a] * (known_a > 0.0), default=0.0)
+    steps = np.concatenate([np.diff(np.unique(phase)) for phase in seen])
+    least_a = float(np.min(steps, initial=known_a or math.inf))
+    return least_a if least_a < math.inf else 0.0
 
 
 def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_a: float = 0.0) -> StopReason | None:

@@ -74,9 +74,8 @@ def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lamb
     finally:
         table = rows.close() if rows.ended else None
     ordered = [rows.ended[number] for number in sorted(rows.ended)]
-    report = request.out / PAGE
+    seen, report = summarise(ordered), request.out / PAGE
     with whole_file(report) as temporary:
-        temporary.write_text(page(ordered, f"Study {request.file.name}"), "utf-8")
-    seen = summarise(ordered)
+        temporary.write_text(page(ordered, seen, f"Study {request.file.name}"), "utf-8")
     minutes = max(time.monotonic() - began, 1e-9) / 60.0
     return Studied(seen.cases, dict(seen.outcomes), len(missing) / minutes, str(table), str(report), seen)

@@ -7,20 +7,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from markupsafe import Markup
 
 from commissioner.motor.circuit import PARAMETERS
+from commissioner.records import peak
 from commissioner.report.run.quantities import BY_FIELD
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
 from commissioner.report.sheet.drawing import Panel
 from commissioner.report.sheet.numbers import digits
 from commissioner.study.rows import Row
-from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, summarise
+from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, relative_errors
 
 OUTCOMES = (COMMISSIONED, "rejected", "aborted", "faulted")
 
 
-def page(rows: Sequence[Row], title: str) -> str:
-    """One sheet of all rows; what the kind of the study does not know is left out."""
-    seen = summarise(rows)
+def page(rows: Sequence[Row], seen: Summary, title: str) -> str:
+    """One sheet of all rows and their summary; what the kind of the study does not know is left out."""
     parts = [Markup("<h1>{}</h1>").format(title), _head(seen)]
     if seen.errors:
         parts += [_by_parameter(seen), _scatter(rows)]
@@ -90,8 +90,8 @@ def _errors_over_cases(rows: Sequence[Row]) -> Iterator[tuple[marks.Text, Markup
         if not known:
             continue
         cases = [float(row["case"]) for row in known]
-        errors = [100.0 * (float(row[f"{name}_value"]) / float(row[f"{name}_true"]) - 1.0) for row in known]  # type: ignore[literal-required]
-        reach = 1.1 * max(abs(error) for error in errors) or 1.0
+        errors = 100.0 * relative_errors(known, name)
+        reach = 1.1 * peak(errors) or 1.0
         panel = Panel(160, 104, (0.0, max(1.0, *cases)), (-reach, reach), f"errors of {name}", left=30)
         panel.grid(4).axis("", 3).level(0.0, "res").dots(cases, errors)
         yield Markup("{}, %").format(BY_FIELD[name].symbol), panel.drawn()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.study.rows import Row
@@ -77,6 +78,13 @@ def accepted(rows: Iterable[Row], name: str) -> list[Row]:
     ]
 
 
+def relative_errors(known: Sequence[Row], name: str) -> NDArray[np.float64]:
+    """Of what was found, from the truth, in rows that are `accepted`."""
+    value, true = (np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("value", "true"))
+    errors: NDArray[np.float64] = (value - true) / true
+    return errors
+
+
 def _group(name: str, rows: Sequence[Row]) -> Group:
     outcomes = Counter(str(row["outcome"]) for row in rows)
     found = (_errors(field, accepted(rows, field)) for field in PARAMETERS)
@@ -109,9 +117,7 @@ def _effects(rows: Sequence[Row]) -> Iterable[Group]:
 def _errors(name: str, known: Sequence[Row]) -> Errors | None:
     if not known:
         return None
-    value, true, std = (
-        np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("value", "true", "std")
-    )
-    relative = np.abs(value - true) / true
-    inside = np.abs(value - true) <= 1.96 * std
+    relative = np.abs(relative_errors(known, name))
+    true, std = (np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("true", "std"))
+    inside = relative * true <= 1.96 * std
     return Errors(name, len(known), tuple(float(np.quantile(relative, q)) for q in QUANTILES), float(np.mean(inside)))

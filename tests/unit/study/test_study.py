@@ -111,7 +111,7 @@ def test_the_summary_is_that_of_its_rows():
     assert errors.count == 11
     assert errors.quantiles == pytest.approx((0.005, 0.0095, 0.01))
     assert errors.coverage == pytest.approx(10 / 11)  # 1.96 * 0.01 of 2.0 is 0.98 %
-    text = page(rows, "<b>Study</b>")
+    text = page(rows, seen, "<b>Study</b>")
     assert "&lt;b&gt;Study" in text
     assert "91.7 %" in text
 
