@@ -94,7 +94,7 @@ def page(service: ServiceProcess, run: str) -> None:
 
 def viewers(service: ServiceProcess, count: int) -> dict[str, object]:
     """One run, half of the watchers scripts and half pages."""
-    run = service.start_run()
+    run = service.start_run(axes_deg=[0])
     scripts = [Viewer(service, run) for _ in range(count // 2)]
     threads = [threading.Thread(target=viewer.watch) for viewer in scripts]
     threads += [threading.Thread(target=page, args=(service, run)) for _ in range(count - count // 2)]
@@ -194,11 +194,11 @@ def main() -> int:
         pid = service.process.pid
         report: dict[str, object] = {"ready_s": round(service.ready_s, 2), "ready_cpu_s": round(cpu_s(pid), 2)}
         service.start_simulator()
-        service.wait_over(service.start_run(), 600)
+        service.wait_over(service.start_run(axes_deg=[0]), 600)
         memory, through_page = [round(resident_mb(pid), 1)], []
         for _ in range(asked.runs):
             before = cpu_s(pid, with_children=True)
-            page(service, service.start_run())
+            page(service, service.start_run(axes_deg=[0]))
             time.sleep(0.5)
             through_page.append(round(cpu_s(pid, with_children=True) - before, 2))
             memory.append(round(resident_mb(pid), 1))

@@ -25,7 +25,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceProcess
 @pytest.fixture(scope="session")
 def finished(service: ServiceProcess) -> str:
     """A run of one axis that ended well and was not written."""
-    run = service.start_run()
+    run = service.start_run(axes_deg=[0])
     assert service.wait_over(run)["outcome"] == "commissioned"
     return run
 

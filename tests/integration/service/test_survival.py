@@ -25,7 +25,6 @@ from tests.support.sim_process import SimProcess
 ZERO_VOLTS_S, WATCHDOG_S = 0.5, 0.5
 SEEN_S = 2.0
 """A run of another process is on the page so soon after it has a folder."""
-AXIS = {"drive": "bench", "axes_deg": [0]}
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +125,7 @@ def test_a_run_from_the_command_line_is_shown_and_can_be_stopped_from_the_page(s
 
 
 def test_a_killed_service_leaves_zero_volts_and_its_successor_explains_what_was(folder, service, bench):
-    run = service.start_run(**AXIS)
+    run = service.start_run(drive="bench")
     service.wait_energised(run)
     began = time.time()
     service.kill()
@@ -140,7 +139,7 @@ def test_a_killed_service_leaves_zero_volts_and_its_successor_explains_what_was(
         page = successor.page(f"/runs/{run}")
         assert "Stopped by the operator" in page and "the service that started this run is gone" in page
         assert successor.client.get("/api/audit").json()["chain"]["is_intact"]
-        again = successor.start_run(**AXIS)
+        again = successor.start_run(drive="bench")
         successor.wait_energised(again)
         assert successor.client.post(f"/api/runs/{again}/stop").json()["zero_volts"]
         successor.wait_over(again)

@@ -102,7 +102,7 @@ class Technician:
             expect(self.page.locator("main .actions")).to_be_visible(timeout=SLOW_MS)
         self.button("what")
         expect(self.page.locator("#energise")).to_be_visible()
-        expect(self.page.locator("#hold")).to_be_visible(timeout=180_000)
+        expect(self.page.locator("#hold")).to_be_enabled(timeout=180_000)
 
     def confirm(self) -> None:
         for box in self.page.locator(".must").all():

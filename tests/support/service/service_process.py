@@ -20,6 +20,7 @@ from typing import Any
 import httpx
 
 START_S = 30.0
+SIX_AXES_DEG = [0, 60, 120, 180, 240, 300]
 
 
 class ServiceProcess:
@@ -83,8 +84,8 @@ class ServiceProcess:
         assert answer.status_code == 201, answer.text
 
     def start_run(self, **more: Any) -> str:
-        """A run on the simulator; its id."""
-        wish = {"drive": "simulator", "motor": "motor_2kw2", "axes_deg": [0], "confirm": True} | more
+        """A run on the simulator, of six tests so that it is there when it is to be stopped; its id."""
+        wish = {"drive": "simulator", "motor": "motor_2kw2", "axes_deg": SIX_AXES_DEG, "confirm": True} | more
         end = time.monotonic() + 15.0
         while True:
             answer = self.client.post("/api/runs", json=wish)

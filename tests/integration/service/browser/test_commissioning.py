@@ -108,7 +108,8 @@ def test_a_plate_is_judged_while_it_is_typed(service, browser):
         speed = hand.page.locator("[data-field=rated_speed_rpm]")
         expect(speed.locator(".msg")).to_contain_text("Widerspricht dem übrigen Schild")
         expect(hand.page.locator("#why")).to_have_text("1 zu berichtigen")
-        hand.button("check")
+        with hand.page.expect_navigation():
+            hand.button("check")
         expect(speed.locator("input")).to_have_attribute("aria-invalid", "true")
         hand.page.locator("#rated_speed_rpm").fill("1436")
         hand.page.locator("#rated_current_a").fill("8,66")
@@ -141,7 +142,7 @@ def test_the_keyboard_alone_energises_and_a_held_key_is_no_stop(service, browser
             reach(name)
             page.keyboard.press("Enter")
             expect(page).to_have_url(re.compile(then), timeout=SLOW_MS)
-        expect(page.locator("#hold")).to_be_visible(timeout=SLOW_MS)
+        expect(page.locator("#hold")).to_be_enabled(timeout=SLOW_MS)
         reach("Hold 2 s")
         page.keyboard.press("Enter")
         expect(page.locator("#holdmsg")).to_contain_text("confirm 3 more")

@@ -48,7 +48,7 @@ def begin(hand, drive):
     hand.go(f"/drives/{drive}")
     hand.check()
     hand.button("what")
-    expect(hand.page.locator("#hold")).to_be_visible(timeout=SLOW_MS)
+    expect(hand.page.locator("#hold")).to_be_enabled(timeout=SLOW_MS)
     assert hand.violations() == [] and hand.fits()
     hand.page.locator("#repeat").select_option("1")
     hand.confirm()

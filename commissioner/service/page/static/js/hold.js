@@ -44,4 +44,5 @@ if (hold) {
   hold.addEventListener("keydown", (event) => { if (isKey(event)) { event.preventDefault(); if (!event.repeat) begin(); } });
   hold.addEventListener("keyup", (event) => { if (isKey(event)) { event.preventDefault(); release(); } });
   hold.addEventListener("contextmenu", (event) => event.preventDefault());
+  hold.disabled = false; // only now does it hear a hand
 } else if (document.querySelector("#warming")) setTimeout(() => location.reload(), 3000);
