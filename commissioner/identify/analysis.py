@@ -32,7 +32,12 @@ from commissioner.identify.estimate.axis import (
 )
 from commissioner.identify.estimate.leg_family import one_inverter, pairs_of
 from commissioner.identify.estimate.leg_refit import with_known_law
-from commissioner.identify.estimate.sufficiency import require_amperes, require_tones, require_volts
+from commissioner.identify.estimate.sufficiency import (
+    require_amperes,
+    require_positive,
+    require_tones,
+    require_volts,
+)
 from commissioner.identify.intake.alignment import (
     FARTHEST,
     TimeShift,
@@ -285,10 +290,11 @@ def told_level_wb(reached_wb: float, rated_wb: float) -> float:
 
 
 def axis_at(result: AxisResult, flux_wb: float) -> AxisEstimate:
-    """An axis' values at a flux all axes reached, or nearly: only there can saturating iron be compared."""
+    """An axis' values at a flux all axes reached, or nearly: only there can saturating iron be compared (DataRefused where they
+    make no machine there)."""
     machine, covariance = result.batch.inverse_gamma_at(flux_wb)
     own = result.batch.inverse_gamma_at(result.peak_stator_flux_wb)[0]
-    machine = carry_over(result.parameters, own, machine)
+    machine = require_positive(carry_over(result.parameters, own, machine), flux_wb)
     law_std = result.law_error * np.array(machine.as_tuple())
     if flux_wb > result.peak_stator_flux_wb:
         beyond_h = machine.magnetizing_inductance_h - result.parameters.magnetizing_inductance_h

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 PARAMETERS = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
 """The inverse-Gamma circuit's four as results name them, in its order."""
+SYMBOLS = ("R_s", "R_R", "L_sigma", "L_M")
+"""The same as a sentence writes them."""
 
 
 class Quantity(NamedTuple):

@@ -9,6 +9,7 @@ from commissioner.diagnose.fit.normal_equations import whiten
 from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.intake.record import Record
 from commissioner.diagnose.intake.refusal import ONE_BY_ONE, refused
+from commissioner.motor.circuit import SYMBOLS
 
 MOST_UNANSWERED, FAINT = 0.5, 0.1
 """Refused: currents, not below a tenth of the noise's power, of which the four-parameter model explains no more than half."""
@@ -46,11 +47,10 @@ def _compare_files(fitted: Fit, record: Record, which: slice, most: float) -> No
         gram, slope = fitted.normal.gram[rows].sum(axis=0)[:4, :4], fitted.normal.slope[rows].sum(axis=0)[:4]
         estimates.append(np.linalg.pinv(gram) @ slope)
     spread = np.ptp(np.array(estimates), axis=0)
-    names = ("R_s", "R_R", "L_sigma", "L_M")
     worst = which.start + int(np.argmax(spread[which]))
     if spread[worst] > most:
         raise refused(
-            f"the files are not of one motor in one state: {names[worst]} differs by {spread[worst]:.0%} between them "
+            f"the files are not of one motor in one state: {SYMBOLS[worst]} differs by {spread[worst]:.0%} between them "
             f"(fitted together: {fitted.model.nominal[worst]:.4g})",
             float(spread[worst]),
             f"at most {most:.0%}",

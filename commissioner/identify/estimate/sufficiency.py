@@ -10,6 +10,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.batch.segments import BatchFit
 from commissioner.identify.intake.audit import Audit
 from commissioner.identify.intake.stretches import Stretch, tones_in
+from commissioner.motor.circuit import SYMBOLS, InverseGamma
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.standstill import admittance_s
 
@@ -95,11 +96,25 @@ def _share_beside(stretch: Stretch, frequency_hz: float, period_s: float) -> flo
     return float(np.sum(power[~around]) / np.sum(power))
 
 
+def require_positive(machine: InverseGamma, flux_wb: float) -> InverseGamma:
+    """The machine itself; DataRefused where the fit's iron, taken to this peak stator flux, leaves a value at zero or below."""
+    for name, value in zip(SYMBOLS, machine.as_tuple(), strict=True):
+        if not value > 0.0:
+            raise DataRefused(
+                f"the excitation does not fix {name}",
+                step="identify",
+                value=f"{value:.3g} at a peak stator flux of {flux_wb:.3g} Wb",
+                limit="above zero",
+                remedy="excite with more current, or record longer",
+            )
+    return machine
+
+
 def require_conditioned(batch: BatchFit) -> None:
     machine, covariance = batch.inverse_gamma_at(0.0)
+    require_positive(machine, 0.0)
     relative = np.sqrt(np.diag(covariance)) / np.array(machine.as_tuple())
     if not np.all(np.isfinite(relative)) or np.max(relative) > WORST_RELATIVE_STD:
-        names = ("R_s", "R_R", "L_sigma", "L_M")
         worst = int(np.argmax(np.where(np.isfinite(relative), relative, np.inf)))
         if _misfit(batch) > LARGEST_MISFIT:
             raise DataRefused(
@@ -112,7 +127,7 @@ def require_conditioned(batch: BatchFit) -> None:
             )
         impedance = 1.0 / admittance_s(machine, np.array([1.0, 10.0]))
         raise DataRefused(
-            f"the excitation does not fix {names[worst]}",
+            f"the excitation does not fix {SYMBOLS[worst]}",
             step="identify",
             value=f"relative standard error {relative[worst]:.0%}",
             limit=f"{WORST_RELATIVE_STD:.0%}",

@@ -95,5 +95,6 @@ def require_near(shift: TimeShift) -> None:
         f"the current lies {periods:+.2f} sample periods ({shift.value_s * 1e6:+.0f} us) behind the voltage",
         f"within {MOST_PERIODS:g} sample periods of {shift.sample_period_s * 1e6:.0f} us",
         "voltage_axis_v holds from its own row's time to the next, currents are read at the row's time: shift the "
-        "voltage column by the missing rows",
+        "voltage column by the missing rows; where the rows are right, the motor or the link does what these models lack "
+        "(a skin effect, a rippling link): `commissioner diagnose` names it",
     )

@@ -11,7 +11,7 @@ from commissioner.identify.analysis import Identification, identify
 from commissioner.identify.excite import tones as excitation
 from commissioner.identify.excite.flux_guard import FluxAdvice
 from commissioner.identify.excite.tones import DesignedExcitation, ExcitationLimits
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import SYMBOLS, InverseGamma
 from commissioner.motor.nameplate import ParameterBox, prior
 from commissioner.motor.plate_match import PlateMismatch, sure_mismatch
 from commissioner.procedure.assembly import assemble
@@ -160,7 +160,7 @@ def _test(
     yield Tell(
         ExcitationChosen(
             axis_deg, is_look, tones, seconds, chosen.peak_flux_wb, chosen.peak_current_a,
-            dict(zip(("R_s", "R_R", "L_sigma", "L_M"), (100 * s for s in chosen.relative_std), strict=True)),
+            dict(zip(SYMBOLS, (100 * s for s in chosen.relative_std), strict=True)),
         )
     )  # fmt: skip
     under_test = UnderTest(job, findings, axis_deg, chosen, seconds)

@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from commissioner.errors import DataRefused
 from commissioner.identify import analysis
 from commissioner.identify.analysis import BEYOND_DOUBT, LEVEL, NEAR, axis_at, told_level_wb
 from commissioner.motor.circuit import InverseGamma
@@ -48,3 +49,10 @@ def test_beyond_what_was_reached_a_part_of_the_way_is_error():
     assert short.parameters.magnetizing_inductance_h == pytest.approx(0.4 - 0.1 * level_wb)
     assert math.sqrt(short.covariance[3, 3]) == pytest.approx(BEYOND_DOUBT * 0.1 * 0.05, rel=1e-3)
     assert math.sqrt(far.covariance[3, 3]) == pytest.approx(1e-6)
+
+
+def test_iron_that_leaves_no_inductance_at_the_level_is_refused():
+    """A 37 kW motor behind a converter of two steps: its look's L_M was -0.25 H, and the next limits were no numbers."""
+    with pytest.raises(DataRefused, match="does not fix L_M") as refusal:
+        axis_at(Axis(0.5), 4.5)
+    assert (refusal.value.value, refusal.value.limit) == ("-0.05 at a peak stator flux of 4.5 Wb", "above zero")
