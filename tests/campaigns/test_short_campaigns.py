@@ -15,7 +15,7 @@ from tests.campaigns.short_run.sequences import Sequence
 from tests.campaigns.short_run.short_course import Script
 
 SCENARIO = short_scenario()
-SEQUENCES, FIRST_SEED = 40, 100_000
+SEQUENCES, FIRST_SEED = 24, 100_000
 
 
 @pytest.mark.timeout(1800)
