@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.identify.excite.tones import DesignedExcitation
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import SYMBOLS, InverseGamma
 
-SYMBOLS = ("R_s", "R_R", "L_σ", "L_M")
 TIMES = 2.0
 
 

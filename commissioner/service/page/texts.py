@@ -98,6 +98,11 @@ class Texts:
             text = text.replace(".", ",")
         return text + (NBSP + unit if unit else "")
 
+    def with_error(self, value: float, error: float, unit: str) -> str:
+        """`0.025640 ± 0.000097 A`: the error (above zero) to two digits, the value as far as these."""
+        digits = min(max(0, 1 - math.floor(math.log10(error))), 9)
+        return f"{self.number(value, digits)} ± {self.number(error, digits, UNIT_SIGNS.get(unit, unit))}"
+
     def signed(self, value: float | None, digits: int, unit: str = "") -> str:
         text = self.number(value, digits, unit)
         return f"+{text}" if value is not None and value > 0 and not text.startswith("\u2212") else text

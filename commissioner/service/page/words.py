@@ -122,15 +122,17 @@ class Words:
         return self._t.gettext(advice) if advice else ""
 
     def size(self, parameters: Mapping[str, Mapping[str, Any]]) -> str:
-        """Sizes of a cause, each with its 95 % interval and unit."""
-        shown = [self._one_size(size) for size in parameters.values() if isinstance(size.get("value"), int | float)]
-        return "; ".join(shown[:3])
+        """The first size of a cause, which is the one that its words mean, with its 95 % interval and unit; beside it what is
+        measured alike, as the offsets of the other phases."""
+        known = [size for size in parameters.values() if isinstance(size.get("value"), int | float)]
+        alike = [size for size in known[1:] if size.get("unit") == known[0].get("unit") and size.get("std")]
+        return "; ".join(self._one_size(size) for size in (known[:1] + alike)[:3])
 
     def _one_size(self, size: Mapping[str, Any]) -> str:
         value, std, unit = float(size["value"]), float(size.get("std") or 0.0), str(size.get("unit") or "")
         if std <= 0.0:
             return self._t.short(value, unit)
-        return f"{self._t.short(value)} ± {self._t.short(float(f'{1.96 * std:.2g}'), unit)}"
+        return self._t.with_error(value, 1.96 * std, unit)
 
     def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
         plain = re.sub(r", deg[A-Z]$", "", str(check["name"]))

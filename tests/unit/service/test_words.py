@@ -1,0 +1,28 @@
+"""Sizes of causes as the page writes them."""
+
+import pytest
+
+from commissioner.service.page.texts import NBSP, Texts
+from commissioner.service.page.words import Words
+
+
+def size(value, std, unit):
+    return {"value": value, "std": std, "unit": unit}
+
+
+LOSS = {"voltage_v": size(7.7558, 0.0541, "V"), "half_current_a": size(0.1052, 0.0, "A"), "tail": size(-0.93, 0.04, "")}
+OFFSETS = {f"offset_{phase}_a": size(a, 4.95e-5, "A") for phase, a in zip("uvw", (0.02564, -0.01793, 0.0), strict=True)}
+
+
+@pytest.mark.parametrize(
+    ("sizes", "shown"),
+    [
+        (LOSS, "7.76 ± 0.11 V"),
+        (OFFSETS, "0.025640 ± 0.000097 A; −0.017930 ± 0.000097 A; 0.000000 ± 0.000097 A"),
+        ({"resistance_ohm": size(120.0, 14.0, "ohm")}, "120 ± 27 Ω"),
+        ({"share": size(0.25, None, "1")}, "0.25"),
+        ({}, ""),
+    ],
+)  # fmt: skip
+def test_the_first_size_is_shown_and_what_is_measured_alike_to_the_digits_of_its_error(sizes, shown):
+    assert Words(Texts("en")).size(sizes).replace(NBSP, " ") == shown
