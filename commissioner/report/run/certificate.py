@@ -63,7 +63,7 @@ def _verdict(subject: Subject) -> Markup:
 def _said(subject: Subject) -> tuple[str, str]:
     """Title and sentence; the title of a run that went wrong says what the drive holds."""
     tests = len(subject.tests)
-    agree = f", the {_counted(tests)} tests agree" if tests > 1 else ""
+    agree = f", the {_tests(tests)} agree" if tests > 1 else ""
     if subject.standing == ACCEPTED:
         return (
             "Accepted, not written: the drive holds its old values",
@@ -144,7 +144,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
         yield (
             "Energised in all",
             f"{float(result['energised_s']):.1f} s",
-            f"{_counted(len(subject.estimates))} tests begun",
+            f"{_tests(len(subject.estimates))} begun",
         )
         yield (
             "Written",
@@ -237,8 +237,7 @@ def _measurement(subject: Subject) -> Markup:
     rows.append(
         (
             "Energised",
-            f"{float(result['energised_s']):.1f} s"
-            + (f" in {_counted(len(subject.tests))} tests: {axes}" if axes else ""),
+            f"{float(result['energised_s']):.1f} s" + (f" in {_tests(len(subject.tests))}: {axes}" if axes else ""),
         )
     )
     if (seconds := subject.seconds) is not None:
@@ -458,3 +457,7 @@ def sentence(text: str) -> str:
 def _counted(number: int) -> str:
     words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
     return words[number] if number < len(words) else fixed(number, 0)
+
+
+def _tests(number: int) -> str:
+    return f"{_counted(number)} test" + ("" if number == 1 else "s")
