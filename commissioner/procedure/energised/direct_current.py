@@ -21,6 +21,7 @@ from commissioner.procedure.energised.session import (
     next_block,
     period_s,
     ramp_down,
+    rest,
 )
 from commissioner.procedure.steps import Findings, Job
 from commissioner.records import SampleBlock, Signal, peak
@@ -54,8 +55,10 @@ class DirectCurrent:
         self._flux = CurrentFlux(machine, period_s(findings)) if machine else None
 
     def begin(self, limits: SetDriveLimits) -> Generator[Command, Any, None]:
-        """The drive's own ceilings, then energised at zero volts: what the sensors show there is offset."""
+        """Rested, the drive's own ceilings, then energised at zero volts: what the sensors show there is offset, where no flux is
+        left that drives a current."""
         job = self.job
+        yield from rest(job, self.findings)
         yield limits
         yield load(job, self.findings, self.axis_deg, ())
         yield Enable(self._step)

@@ -46,7 +46,9 @@ def load(
 
 def rest(job: Job, findings: Findings) -> Generator[Command, Any, None]:
     """De-energised, until the rotor has lost what the test before has left in it: exp(-t / T_R) of that flux is `LEFT`, the ramp to
-    zero before and the zero volts after counted in. A fast motor needs none."""
+    zero before and the zero volts after counted in. A fast motor needs none, nor one that was not energised before."""
+    if not findings.blocks:
+        return
     machine = findings.estimate or prior(job.nameplate).typical
     left_s = -math.log(LEFT) * machine.rotor_time_constant_s - 1.0 / BIAS_RAMP_PER_S - OFFSET_S
     while left_s > 0.0:
