@@ -34,6 +34,8 @@ MOVES, LEAST_SHARE = 0.1, 0.1
 """A phase stands still that shows one and the same number while the voltage moves by this share of itself; a phase whose
 share of the axis current is smaller than the second is not asked."""
 NAMES = ("u", "v", "w")
+CHECK = "check the current sensors, their plugs, order, sign and scale in the drive, and the motor cable"
+TURNING = "see that the shaft stands still, for one that turns makes currents beside the axis, too; "
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ def _misfit(seen: Signal, voltage_v: Signal, zero: _Zero, axis_deg: float, step_
         return None
     return _distrusted(
         f"the current sensor of phase {_culprit(current, cosines)} does not follow the test axis",
-        float(np.max(rest)), f"at most {allowed:.3g} A beside the axis",
+        float(np.max(rest)), f"at most {allowed:.3g} A beside the axis", TURNING + CHECK,
     )  # fmt: skip
 
 
@@ -149,11 +151,8 @@ def _culprit(current: Signal, cosines: Signal) -> str:
     return " or ".join(NAMES[k] for k, rest in enumerate(left) if rest <= 1.5 * min(left))
 
 
-def _distrusted(what: str, value: float, limit: str) -> StopReason:
-    return StopReason(
-        what, value, limit,
-        "check the current sensors, their plugs, order, sign and scale in the drive, and the motor cable", is_fault=True,
-    )  # fmt: skip
+def _distrusted(what: str, value: float, limit: str, remedy: str = CHECK) -> StopReason:
+    return StopReason(what, value, limit, remedy, is_fault=True)
 
 
 def _phases(block: SampleBlock) -> Signal:
