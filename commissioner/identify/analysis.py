@@ -41,7 +41,7 @@ from commissioner.identify.estimate.sufficiency import (
 from commissioner.identify.intake.alignment import (
     FARTHEST,
     TimeShift,
-    is_at_bound,
+    beyond_bound,
     more_periods,
     require_near,
     rows_off,
@@ -183,9 +183,9 @@ def _aligned(
         period_s = found.batch.sample_period_s
         more = more_periods(found.batch.delay, period_s)
         is_sure = more != 0
-        if not is_sure and not is_at_bound(found.batch.delay, period_s):
+        if not (more := more or beyond_bound(found.batch.delay, period_s)):
             return found, late
-        more, seen = more or -1, coarse() if not late else 0
+        seen = coarse() if not late else 0
         best = found, late
         late += seen if seen * more > 0 and abs(seen) <= FARTHEST else more
         if abs(late) > FARTHEST:

@@ -21,8 +21,8 @@ COARSE = 0.6
 SLACK = 0.01
 """Of a period, beyond none and one, that is still the fit's own: 0.05 moved L_sigma of a drive's recording by nine standard errors."""
 
-LOWEST = -0.999
-"""Periods: a fitted delay no larger lies at its lower bound, the period before."""
+LOWEST, HIGHEST = -0.999, 1.999
+"""Periods: a fitted delay beyond lies at its bound, one period early or two late."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,10 @@ def more_periods(delay: Quantity, period_s: float) -> int:
     return math.floor(late) if late > 1.0 + SLACK and late > 1.0 + 3.0 * std else 0
 
 
-def is_at_bound(delay: Quantity, period_s: float) -> bool:
-    """Whether a fitted delay lies at its lower bound: where its standard error is as large, nothing says where it belongs."""
-    return delay.value <= LOWEST * period_s
+def beyond_bound(delay: Quantity, period_s: float) -> int:
+    """-1 or 1 where a fitted delay lies at its bound, towards which it wants more; else 0. Where its standard error is as large as the
+    way to there, nothing says where it belongs."""
+    return int(delay.value >= HIGHEST * period_s) - int(delay.value <= LOWEST * period_s)
 
 
 def rows_off(coarse_periods: float) -> int:

@@ -1,13 +1,17 @@
 """Currents early or late against the voltage, up to three sample periods: found with its error, and the values stay right."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 from commissioner.errors import DataRefused
+from commissioner.identify import analysis
 from commissioner.identify.analysis import identify
+from commissioner.identify.intake.alignment import TimeShift, require_near
+from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import StandstillRecording
 
@@ -120,3 +124,22 @@ def test_a_shift_by_rows_moves_no_value_of_a_drives_recording(of_a_drive, rows):
     assert seen.delay_s[0] - sound.delay_s[0] == pytest.approx(rows * period, abs=0.02 * period)
     away = np.abs(np.array(seen.parameters.as_tuple()) - sound.parameters.as_tuple()) / np.array(sound.std)
     assert away.max() < 0.2
+
+
+def test_a_delay_at_its_upper_bound_asks_for_other_rows_though_its_error_is_as_large(monkeypatch):
+    """A current 4.4 periods late: misfit widened the error of a delay at its bound of two to half a period, and the rows stayed where
+    they were, with L_sigma 12 % off."""
+
+    def fit(stretches):
+        left = 4.4 - stretches
+        std = 0.5 if left > 2.0 else 0.01
+        batch = SimpleNamespace(
+            delay=Quantity(min(left, 2.0) * T, std * T), sample_period_s=T, noise_a=0.1 + max(left - 2.0, 0.0)
+        )
+        return SimpleNamespace(batch=batch)
+
+    monkeypatch.setattr(analysis, "shifted", lambda stretches, late: late)
+    found, late = analysis._aligned([], lambda: 0, fit)
+    assert late * T + found.batch.delay.value == pytest.approx(4.4 * T)
+    with pytest.raises(DataRefused, match="answers too late"):
+        require_near(TimeShift(late, late * T + found.batch.delay.value, 0.0, T))
