@@ -74,8 +74,9 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     levels.plausible_size(fundamental, plate, findings)
     even_i = evened(straight_i, True, supply, period)
     even_v = evened(straight_v, recording.voltages_are_line_to_line, supply, period)
-    for even, kind in ((even_i, "current"), (even_v, "voltage")):
+    for even, kind, order in ((even_i, "current", pairing.current_order), (even_v, "voltage", pairing.voltage_order)):
         levels.unlike_gains(even.difference, kind, findings)
+        levels.open_sum(even.odd, kind, ["uvw"[k] for k in order], findings)
     i, v = _vectors(even_i.signals, even_v.signals, recording.voltages_are_line_to_line)
     return Audited(
         low,

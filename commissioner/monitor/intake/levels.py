@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from commissioner.monitor.intake.findings import Finding, Fundamental
@@ -69,6 +71,21 @@ def unlike_gains(difference: Signal, kind: str, findings: list[Finding]) -> None
                 f"calibrate the {kind} sensors against each other",
             )
         )
+
+
+def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], findings: list[Finding]) -> None:
+    """A refusal where three channels cannot be the lines of one motor; `odd` as in `Evened`."""
+    if odd is None:
+        return
+    channel, gain = odd
+    findings.append(
+        Finding(
+            "open_sum", "refused",
+            f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
+            gain, "1, within a tenth",
+            f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
+        )
+    )  # fmt: skip
 
 
 def clipped_share(signal: Signal) -> float:

@@ -256,3 +256,12 @@ def test_a_voltage_that_no_such_motor_is_run_at_is_named_where_nothing_turns(sca
     )  # fmt: skip
     code = "no_period" if scale == 1.0 else "plate_contradiction"
     assert observe(still, plate).reason.code == code
+
+
+@pytest.mark.parametrize(("phase", "factor"), [(0, 2.0), (2, 0.5), (1, 1.6)])
+def test_a_current_of_another_range_is_refused_by_its_name_and_factor(phase, factor) -> None:
+    recording = taken("running_compressor", 1, SHORT)[0]
+    currents = tuple(factor * i if k == phase else i for k, i in enumerate(recording.currents_a))
+    (found,) = [f for f in audited(replace(recording, currents_a=currents)).findings if f.code == "open_sum"]
+    assert found.stops and f"current {'uvw'[phase]} is" in found.what
+    assert found.value == pytest.approx(factor, rel=0.02)
