@@ -1,13 +1,16 @@
 """The state of the recording, stretch by stretch, and means over whole carrier periods; truth from an independent machine model."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from commissioner.monitor.intake.carrier import means_over_carrier
+from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import cut_out, states
+from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
 from commissioner.recordings.importers import read_running
@@ -91,3 +94,36 @@ def test_sine_voltages_are_left_alone():
     recording = replace(recording, voltages_v=sine)
     assert means_over_carrier(recording) == (recording, None)
     assert [s.state for s in states(recording, PLATE)] == ["steady"]
+
+
+def levels(seconds=4.0, hop_s=0.02, **changed) -> Levels:
+    count = round(seconds / hop_s)
+    plain = {"current_a": 5.8, "voltage_v": 230.0, "frequency_hz": 50.0, "sense": 1.0}
+    columns = {name: np.full(count, value) for name, value in plain.items()}
+    for name, (begin_s, end_s, value) in changed.items():
+        columns[name][round(begin_s / hop_s) : round(end_s / hop_s)] = value
+    return Levels(np.arange(count) * hop_s, hop_s=hop_s, **columns)
+
+
+def runs_of(names: list[str], hop_s=0.02) -> list[tuple[str, float, float]]:
+    edges = [0, *(k for k in range(1, len(names)) if names[k] != names[k - 1]), len(names)]
+    return [(names[a], round(a * hop_s, 2), round(b * hop_s, 2)) for a, b in pairwise(edges)]
+
+
+def test_a_dip_of_the_voltage_parts_two_steady_stretches():
+    dip = levels(voltage_v=(2.0, 2.2, 140.0), current_a=(2.0, 2.3, 11.0))
+    assert [s[0] for s in runs_of(named(dip, PLATE))] == ["steady", "voltage dip", "steady"]
+    (_, begin_s, end_s) = runs_of(named(dip, PLATE))[1]
+    assert begin_s == pytest.approx(2.0, abs=0.1) and end_s == pytest.approx(2.3, abs=0.1)
+
+
+def test_a_voltage_that_stays_lower_or_falls_with_its_frequency_is_no_dip():
+    stays = levels(voltage_v=(2.0, 4.0, 180.0))
+    assert {s[0] for s in runs_of(named(stays, PLATE))} == {"steady"}
+
+
+def test_nothing_is_steady_while_the_order_of_the_phases_is_reversed():
+    reversal = named(levels(sense=(2.0, 4.0, -1.0), current_a=(2.0, 2.15, 28.0)), PLATE)
+    (ramp,) = [s for s in runs_of(reversal) if s[0] == "ramp"]
+    assert ramp[1] <= 1.9 and ramp[2] >= 2.15
+    assert [s[0] for s in runs_of(reversal)] == ["steady", "ramp", "steady"]

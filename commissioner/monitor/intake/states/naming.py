@@ -1,4 +1,4 @@
-"""What each window of levels is called: off, residual, standstill, start, ramp, load step, steady, coast-down."""
+"""What each window of levels is called: off, residual, standstill, start, ramp, voltage dip, load step, steady, coast-down."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ START_CURRENT = 2.0
 STANDING = 0.02
 """Of the rated frequency: a slower vector is direct current."""
 LEAST_STEADY_S = 0.4
+DIP, LONGEST_DIP_S, SAME_FREQUENCY = 0.12, 1.0, 0.02
+"""A voltage that is lower by this share than that of a second before and after, at the same frequency."""
 OFF_CURRENT = 0.05
 """Of the rated current: an energised motor idles on 0.12 at least."""
 
@@ -44,6 +46,7 @@ def named(levels: Levels, plate: Nameplate) -> list[str]:
     if standing.all():
         return names
     _name_ramps(levels, idle | standing, names)
+    _name_dips(levels, names)
     for begin, end in _runs([n != "steady" for n in names]):
         _name_within(levels, begin, end, names, plate.rated_current_a)
     return names
@@ -56,13 +59,27 @@ def _name_ramps(levels: Levels, idle: np.ndarray, names: list[str]) -> None:
         if idle[a : b + 1].any():
             continue
         change = abs(levels.frequency_hz[b] - levels.frequency_hz[a]) / max(levels.frequency_hz[a : b + 1].max(), 1e-9)
-        if change > FAST_CHANGE * (b - a) / (2 * half):
+        if change > FAST_CHANGE * (b - a) / (2 * half) or levels.sense[a] != levels.sense[b]:
             names[k] = "ramp"
     # what lies between off and a ramp, shorter than a ramp is seen over, belongs to it
     ramps = [k for k, n in enumerate(names) if n == "ramp"]
     if ramps and (k := ramps[0]) <= 2 * half + int(np.argmin(idle)):
         for j in range(int(np.argmin(idle)), k):
             names[j] = "ramp"
+
+
+def _name_dips(levels: Levels, names: list[str]) -> None:
+    around = max(round(LONGEST_DIP_S / levels.hop_s), 1)
+    steady = np.array([name == "steady" for name in names])
+    is_low = np.zeros(steady.size, dtype=bool)
+    for k in np.flatnonzero(steady).tolist():
+        near = slice(max(k - around, 0), k + around + 1)
+        volts, hertz = (float(np.median(x[near][steady[near]])) for x in (levels.voltage_v, levels.frequency_hz))
+        is_lower = levels.voltage_v[k] < (1.0 - DIP) * volts
+        is_low[k] = is_lower and abs(levels.frequency_hz[k] - hertz) < SAME_FREQUENCY * hertz
+    for begin, end in _runs((~is_low).tolist()):
+        if {*names[max(begin - 1, 0) : begin], *names[end : end + 1]} == {"steady"}:
+            names[begin:end] = ["voltage dip"] * (end - begin)
 
 
 def _runs(cut: list[bool]) -> list[tuple[int, int]]:
@@ -86,6 +103,9 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
             settled = HOPS
         for k in range(begin, min(begin + settled, end)):
             names[k] = "start"
+    elif begin > 0 and names[begin - 1] == "voltage dip":
+        settled = int(_first_still(current, 0))
+        names[begin : begin + settled] = ["voltage dip"] * settled
     if end < len(names):
         # windows that reach over the switch-off: half of them lie before it
         for k in range(max(end - HOPS // 2, begin + settled), end):

@@ -20,6 +20,8 @@ class Levels:
     current_a: Signal
     voltage_v: Signal
     frequency_hz: Signal
+    sense: Signal
+    """1 or -1: which way the supply's vector turns."""
     hop_s: float
 
 
@@ -65,5 +67,6 @@ def levels_of(recording: RunningRecording, plate: Nameplate) -> Levels | None:
         np.sqrt((power_i[starts + n] - power_i[starts]) / n / 2.0),
         np.sqrt((power_v[starts + n] - power_v[starts]) / n / 2.0) * scale,
         np.abs(np.angle(turn)) / (2.0 * np.pi * period),
+        np.sign(np.angle(turn)),
         hop * period,
     )
