@@ -8,7 +8,7 @@ What was changed or left unused stands in the table's notes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,12 +23,15 @@ from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
 from commissioner.recordings.reading.mapping import ChannelMap, mapping_in
 from commissioner.recordings.reading.mend import (
+    TIME_MADE,
     against_interval,
     require_seconds,
     require_stamps,
+    with_running_time,
     with_time,
     with_whole_time,
     without_doubled_rows,
+    without_untimed_rows,
 )
 from commissioner.recordings.reading.preface import Clock, clock_in
 from commissioner.recordings.reading.recognise import Recognised, recognise
@@ -37,6 +40,7 @@ from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
     READ,
+    ColumnReading,
     Table,
     read_table,
     to_running,
@@ -221,20 +225,30 @@ def _table(
     period = metadata.get("sample_period_s")
     if clock.interval_s is None and isinstance(period, float):
         clock = replace(clock, interval_s=period, said_by="sample_period_s")
-    made = with_time(columns, clock)
-    if not made:
-        require_seconds(columns, found.readings, source)
-        require_stamps(columns, source)
-        made = against_interval(columns, clock, found.readings, source)
-    if clock.interval_s is not None and "sample_period_s" not in metadata and made:
-        metadata["sample_period_s"] = clock.interval_s
+    columns, timed = _timed(columns, clock, found.readings, source)
+    if clock.interval_s is not None and any(note.code == TIME_MADE for note in timed):
+        metadata.setdefault("sample_period_s", clock.interval_s)
     _with_constants(columns, metadata)
-    if "time_s" in columns and any(name.startswith("current_") for name in columns):
-        columns, doubled = without_doubled_rows(columns)
-        columns, whole = with_whole_time(columns)
-        made += [*doubled, *whole]
     unnamed = [ReadingNote(UNNAMED, f"{name}: its name does not say what it is") for name in found.unnamed]
-    return Table(columns, metadata, source, (*notes, *found.notes, *made, *unnamed), found.readings)
+    return Table(columns, metadata, source, (*notes, *found.notes, *timed, *unnamed), found.readings)
+
+
+def _timed(
+    columns: dict[str, Signal], clock: Clock, readings: Sequence[ColumnReading], source: str
+) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns with a time that runs as the file says, without rows that have none or stand there twice."""
+    notes = with_time(columns, clock)
+    if not notes:
+        require_seconds(columns, readings, source)
+        require_stamps(columns, source)
+        columns, untimed = without_untimed_rows(columns)
+        notes = [*untimed, *against_interval(columns, clock, readings, source)]
+    if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
+        return columns, notes
+    columns, doubled = without_doubled_rows(columns)
+    columns, whole = with_whole_time(columns)
+    columns, running = with_running_time(columns, clock, source)
+    return columns, [*notes, *doubled, *whole, *running]
 
 
 def _of_one_length(columns: Mapping[str, Signal]) -> dict[str, Signal]:

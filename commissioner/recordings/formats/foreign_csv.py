@@ -19,6 +19,7 @@ from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
+from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
 from commissioner.recordings.reading.said_tests import codes, is_title
 from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
@@ -86,28 +87,30 @@ def _sample(body: str, layout: Layout) -> list[str]:
 
 
 def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list[Signal], list[ReadingNote]]:
-    wrong_rows: list[tuple[int | None, int, str]] = []
+    wrong_rows: list[WrongRow] = []
 
     def keep(row: pa_csv.InvalidRow) -> str:
-        wrong_rows.append((row.number, row.actual_columns, row.text or ""))
+        wrong_rows.append(WrongRow(row.number, row.actual_columns, row.text or ""))
         return "skip"
 
     width = len(layout.names) + layout.skip
     table = _parsed(_even(body, layout, width), layout, width, keep, source)
-    columns, rows = [], table.num_rows
-    bad = np.zeros(rows, dtype=np.int64)
-    for name, column in zip(layout.names, table.columns[layout.skip :], strict=False):
+    rows = table.num_rows
+    table, notes = without_headers(table.select(range(layout.skip, width)), wrong_rows, layout)
+    notes += without_torn_row(wrong_rows, body, width)
+    columns = []
+    filled = np.zeros(table.num_rows, dtype=np.int64)
+    for name, column in zip(layout.names, table.columns, strict=True):
         values, _ = to_numbers(column, marks)
-        bad += np.isfinite(values)
+        filled += np.isfinite(values)
         said = codes([str(cell) for cell in column.to_pylist()]) if is_title(name) else None
         columns.append(values if said is None else said)
-    last = int(np.flatnonzero(bad)[-1]) + 1 if bad.any() else 0
-    notes = []
     if wrong_rows:
         _require_footer(wrong_rows, rows, source)
         notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))
-    if rows - last > MOST_FOOTER_ROWS:
-        last = rows
+    last = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
+    if table.num_rows - last > MOST_FOOTER_ROWS:
+        last = table.num_rows
     return [c[:last] for c in columns], notes
 
 
@@ -134,16 +137,16 @@ def _parsed(body: str, layout: Layout, width: int, keep: object, source: str) ->
         ) from error  # fmt: skip
 
 
-def _require_footer(wrong: Sequence[tuple[int | None, int, str]], rows: int, source: str) -> None:
+def _require_footer(wrong: Sequence[WrongRow], rows: int, source: str) -> None:
     """Rows of another width may stand only behind the numbers: inside them they are lost samples or shifted cells."""
-    numbers = [n for n, _, text in wrong if n is not None]
-    holds_numbers = any(sum(map(is_number, text.replace(";", ",").split(","))) >= 2 for _, _, text in wrong)
+    numbers = [row.number for row in wrong if row.number is not None]
+    holds_numbers = any(sum(map(is_number, row.text.replace(";", ",").split(","))) >= 2 for row in wrong)
     if len(wrong) > MOST_FOOTER_ROWS or holds_numbers or (numbers and min(numbers) <= rows):
-        number, cells, _ = wrong[0]
+        first = wrong[0]
         raise DataRefused(
-            f"{source}: a row holds {cells} columns", step="read recording",
-            value=f"row {number}" if number is not None else cells, limit="as many as the first row of numbers",
-            remedy="export again, without footer lines",
+            f"{source}: a row holds {first.cells} columns", step="read recording",
+            value=f"row {first.number}" if first.number is not None else first.cells,
+            limit="as many as the first row of numbers", remedy="export again, without footer lines",
         )  # fmt: skip
 
 

@@ -17,6 +17,8 @@ from commissioner.records import ReadingNote, Signal
 
 LEAST_ROWS = 16
 _COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", "samples", "sequence"}
+TIME_MADE = "time_made"
+"""Code of the note that the rows were counted by the interval which the file gives."""
 SAME_INTERVAL = 0.02
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
@@ -35,7 +37,7 @@ def with_time(columns: dict[str, Signal], clock: Clock) -> list[ReadingNote]:
     else:
         return []
     return [
-        ReadingNote("time_made", f"time from {clock.said_by or 'the sample interval'}: {clock.interval_s:.6g} s a row")
+        ReadingNote(TIME_MADE, f"time from {clock.said_by or 'the sample interval'}: {clock.interval_s:.6g} s a row")
     ]
 
 
@@ -64,6 +66,41 @@ def require_stamps(columns: Mapping[str, Signal], source: str) -> None:
             limit="seconds, or a time of day as 10:11:12.345", remedy="export the time in seconds, or leave it out and give "
             "`# sample_period_s: 0.000125` as the first line, with the period of your recording",
         )  # fmt: skip
+
+
+def without_untimed_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """The columns without rows whose time is none: statistics below the samples, header lines, lost stamps."""
+    time = columns.get("time_s")
+    if time is None or np.isfinite(time).all():
+        return dict(columns), []
+    keep = np.isfinite(time)
+    note = ReadingNote("no_time", f"{int((~keep).sum())} rows hold no time: they were left out")
+    return {name: v[keep] if v.size == time.size else v for name, v in columns.items()}, [note]
+
+
+def with_running_time(
+    columns: Mapping[str, Signal], clock: Clock, source: str
+) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """Stamps so coarse that most rows share the one before them, as the rows counted by the interval that the file gives.
+    DataRefused: it gives none, or one that the stamps contradict."""
+    time = columns.get("time_s")
+    if time is None or time.size < LEAST_ROWS or np.median(np.diff(time)) != 0.0:
+        return dict(columns), []
+    step, interval = _printing_step(time), clock.interval_s
+    made = None if interval is None else time[0] + interval * np.arange(time.size, dtype=np.float64)
+    if made is None or np.ptp(time - made) > 2.0 * step:
+        stamps = np.unique(time).size
+        raise DataRefused(
+            f"{source}: the time stands still from row to row", step="read the time",
+            value=f"{stamps} different stamps in {time.size} rows" + (f", in steps of {step:.6g} s" if step > 0.0 else ""),
+            limit="a stamp for each row", remedy="export a finer time column, or give `# sample_period_s: 0.000125` as the first line, "
+            "with the period of your recording",
+        )  # fmt: skip
+    note = ReadingNote(
+        TIME_MADE,
+        f"time from {clock.said_by or 'the sample interval'}: {interval:.6g} s a row; the stamps stand still for several rows",
+    )
+    return {**columns, "time_s": made}, [note]
 
 
 def against_interval(

@@ -48,6 +48,8 @@ def cut(recording: RunningRecording, keep: slice | np.ndarray) -> RunningRecordi
 def levels_of(recording: RunningRecording, plate: Nameplate) -> Levels | None:
     completed, _ = complete(recording)
     period = recording.sample_period_s
+    if not period > 0.0:
+        return None
     n = round(WINDOW_PERIODS / plate.rated_frequency_hz / period)
     hop = max(n // HOPS, 1)
     time = recording.time_s

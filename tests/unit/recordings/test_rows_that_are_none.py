@@ -1,0 +1,91 @@
+"""Rows of a text that are no samples, and stamps that do not tell rows apart: left out and said, or refused."""
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.recordings.imported import understand
+from commissioner.recordings.importers import read_running
+
+NAMES = "Time (s),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)"
+STEP_S = 5e-4
+TIME = np.arange(600) * STEP_S
+WAVES = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
+SIGNALS = [*(4.2 * w for w in WAVES), *(325 * w for w in WAVES)]
+
+
+def rows(stamps=None):
+    stamps = [f"{t:.4f}" for t in TIME] if stamps is None else stamps
+    return [",".join([stamp, *(f"{x[k]:.4f}" for x in SIGNALS)]).strip(",") for k, stamp in enumerate(stamps)]
+
+
+def written(tmp_path, lines):
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def read(path):
+    """(the recording, the notes' codes, with every understanding of it made)"""
+    with np.errstate(all="raise"):
+        _, document = understand(path)
+    return read_running(path), {note["code"] if isinstance(note, dict) else note.code for note in document["changes"]}
+
+
+@pytest.mark.parametrize("header", [[NAMES], ["t,Ia,Ib,Ic,Va,Vb,Vc", "s,A,A,A,V,V,V"]])
+def test_header_lines_among_the_rows_are_left_out(tmp_path, header):
+    body = rows()
+    recording, codes = read(written(tmp_path, [*header, *body[:250], *header, *body[250:]]))
+    assert codes == {"header_again"} and recording.sample_period_s == pytest.approx(STEP_S)
+    np.testing.assert_allclose(recording.currents_a[0], SIGNALS[0], atol=1e-4)
+
+
+def test_header_lines_do_not_count_where_the_rows_make_the_time(tmp_path):
+    names, body = NAMES.partition(",")[2], rows([""] * TIME.size)
+    recording, codes = read(
+        written(tmp_path, ["# sample_period_s: 0.0005", names, *body[:250], names + ",", *body[250:]])
+    )
+    assert codes == {"header_again", "time_made"}
+    np.testing.assert_allclose(recording.time_s, TIME, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "footer", [["Min,-4,-4,-4,-325,-325,-325", "Max,4,4,4,325,325,325"], ["rms,3,3,3,230,230,230"]]
+)
+def test_statistics_below_the_rows_are_left_out(tmp_path, footer):
+    recording, codes = read(written(tmp_path, [NAMES, *rows(), *footer]))
+    assert codes == {"no_time"} and recording.time_s.size == 600
+    assert recording.currents_a[0][-1] == pytest.approx(SIGNALS[0][-1], abs=1e-4)
+
+
+def test_a_row_that_breaks_off_is_left_out(tmp_path):
+    body = rows()
+    recording, codes = read(written(tmp_path, [NAMES, *body[:-1], body[-1][:25]]))
+    assert codes == {"torn_row"} and recording.time_s.size == 599
+
+
+def test_a_short_row_inside_is_still_refused(tmp_path):
+    body = rows()
+    with pytest.raises(DataRefused, match="holds 4 columns"):
+        read_running(written(tmp_path, [NAMES, *body[:300], body[300][:25], *body[301:]]))
+
+
+def seconds_of_the_day():
+    return rows([f"11:59:{58 + int(0.9 + t):02d}" for t in TIME])
+
+
+def test_stamps_that_stand_still_are_refused_with_the_way_out(tmp_path):
+    with pytest.raises(DataRefused, match="stands still") as refused:
+        read_running(written(tmp_path, [NAMES, *seconds_of_the_day()]))
+    assert refused.value.value == "2 different stamps in 600 rows, in steps of 1 s"
+
+
+def test_stamps_that_stand_still_run_by_the_interval_that_the_file_gives(tmp_path):
+    recording, codes = read(written(tmp_path, ["# sample_period_s: 0.0005", NAMES, *seconds_of_the_day()]))
+    assert codes == {"time_made"} and recording.sample_period_s == STEP_S
+    np.testing.assert_allclose(recording.time_s - recording.time_s[0], TIME, atol=1e-9)
+
+
+def test_stamps_that_contradict_the_interval_of_the_file_are_refused(tmp_path):
+    with pytest.raises(DataRefused, match="stands still"):
+        read_running(written(tmp_path, ["# sample_period_s: 0.5", NAMES, *seconds_of_the_day()]))
