@@ -31,7 +31,7 @@ TRANSLATED = {
     "napiecie": "voltage", "napięcie": "voltage", "转速": "speed", "速度": "speed", "vitesse": "speed", "velocidad": "speed",
     "leiterstrom": "strom", "außenleiterstrom": "strom", "netzstrom": "strom", "motorstrom": "strom", "leiterspannung": "spannung",
     "außenleiterspannung": "spannung", "netzspannung": "spannung", "motorspannung": "spannung", "intensité": "current",
-    "composée": " ", "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
+    "zaman": "time", "akım": "current", "gerilim": "voltage", "composée": " ", "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
 }  # fmt: skip
 """Words of other languages, as the words below; what only joins names in Chinese as a space."""
 SAME_KIND = {"tension": "uv", "spannung": "u", "voltage": "uv", "strom": "i", "courant": "i", "current": "i"}

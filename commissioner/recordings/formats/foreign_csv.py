@@ -15,7 +15,7 @@ from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_FOREIGN_BYTES, bounded_text
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.arrow import arrow_owned
-from commissioner.recordings.reading.cells import Marks, is_number, marks_of, to_numbers
+from commissioner.recordings.reading.cells import Marks, is_number, marks_of, plain, to_numbers
 from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
@@ -41,12 +41,13 @@ class RawTable:
 
 
 def read_text(path: Path) -> tuple[str, str]:
-    """(text, encoding) of a file within its limits; DataRefused where it cannot be unpacked."""
+    """(text with plain numbers, encoding) of a file within its limits; DataRefused where it cannot be unpacked."""
     try:
         data = bounded_text(path, MAX_FOREIGN_BYTES)
     except (OSError, EOFError, zlib.error) as error:
         raise _unreadable(path, str(error)) from error
-    return decode(data)
+    text, encoding = decode(data)
+    return plain(text), encoding
 
 
 def parse_csv(text: str, encoding: str, source: str) -> RawTable:

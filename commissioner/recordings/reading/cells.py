@@ -18,6 +18,8 @@ NOTHING = frozenset(
 )  # fmt: skip
 """What stands in a cell that holds no number, in lower case."""
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+APOSTROPHE = re.compile(r"(?<=\d)['\u2019](?=\d{3}(?!\d))")
+"""Between thousands, as in Switzerland."""
 CLOCK = re.compile(
     r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{2,4})[T ]+)?(\d{1,2}):(\d{2}):(\d{2})([.,:]\d+)?(?:Z|[+-]\d{2}:?\d{2})?"
 )
@@ -29,6 +31,11 @@ class Marks:
 
     decimal: str = "."
     thousands: str = ""
+
+
+def plain(text: str) -> str:
+    """The text with a hyphen for the minus sign, and without apostrophes between thousands: both can be read in one way only."""
+    return APOSTROPHE.sub("", text.replace("\u2212", "-"))
 
 
 def is_numeric(cell: str) -> bool:

@@ -70,6 +70,17 @@ FILES = {
     "stator names": lines("t\tias\tibs\tics\tvas\tvbs\tvcs") + rows(TIME, NAMED, separator="\t"),
     "stator letters": lines("t,isa,isb,isc,usa,usb,usc") + rows(TIME, NAMED),
     "chinese": lines("时间(s),A相电流(A),B相电流(A),C相电流(A),A相电压(V),B相电压(V),C相电压(V)") + rows(TIME, NAMED),
+    "russian": lines("Время, с;" + ";".join(f"{q} {p}, {u}" for q, u in (("Ток", "А"), ("Напряжение", "В")) for p in "ABC"))
+    + rows(TIME, NAMED, separator=";", comma=True),
+    "polish": lines("Czas [ms];" + ";".join(f"{q} L{k} [{u}]" for q, u in (("Prąd", "A"), ("Napięcie", "V")) for k in (1, 2, 3)))
+    + rows(1e3 * TIME, NAMED, separator=";", comma=True),
+    "japanese": lines("時間(s)," + ",".join(f"{p}相{q}" for q in ("電流(A)", "電圧(V)") for p in "UVW")) + rows(TIME, NAMED),
+    "turkish": lines("Zaman (s);" + ";".join(f"{q} L{k} ({u})" for q, u in (("Akım", "A"), ("Gerilim", "V")) for k in (1, 2, 3)))
+    + rows(TIME, NAMED, separator=";", comma=True),
+    "minus signs": lines("Time (s)," + ABC) + rows(TIME, NAMED).replace("-", "\u2212"),
+    "swiss": lines("Zeit [us];" + ";".join(f"I{k} [mA]" for k in (1, 2, 3)) + ";" + ";".join(f"U{k} [V]" for k in (1, 2, 3)))
+    + "".join(";".join([f"{t:,.0f}".replace(",", "'"), *(f"{1e3 * x[k]:,.1f}".replace(",", "\u2019") for x in CURRENTS),
+                        *(f"{x[k]:.4f}" for x in V)]) + "\n" for k, t in enumerate(1e6 * TIME)),
     "rate in the preface": lines("Sampling rate: 2 kS/s", "", "I_U [A];I_V [A];I_W [A];U_L1 [V];U_L2 [V];U_L3 [V]")
     + "\n".join(";".join(f"{x:.4f}" for x in r) for r in zip(*NAMED, strict=True)) + "\n",
     "clock times": lines("Time," + ABC)
@@ -81,6 +92,10 @@ ENCODINGS = {
     "german": "cp1252",
     "french": "latin-1",
     "picoscope microseconds": "cp1252",
+    "russian": "cp1251",
+    "polish": "cp1250",
+    "japanese": "shift_jis",
+    "turkish": "cp1254",
 }
 
 
