@@ -49,10 +49,10 @@ from commissioner.recordings.table import (
 from commissioner.recordings.units import unit_in
 from commissioner.records import ReadingNote, RunningRecording, Signal
 
-_BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str]]]] = {
-    ".mat": lambda path: (matlab.vectors(path), {}),
-    ".tdms": tdms.channels,
-    ".mf4": lambda path: (mdf4.channels(path), {}),
+_BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]]] = {
+    ".mat": lambda path: (matlab.vectors(path), {}, ()),
+    ".tdms": lambda path: (*tdms.channels(path), ()),
+    ".mf4": lambda path: (mdf4.channels(path), {}, ()),
     ".cfg": comtrade.channels,
     ".dat": comtrade.channels,
     ".cff": comtrade.channels,
@@ -176,7 +176,7 @@ def _is_plain(path: Path) -> bool:
 
 
 def _of_binary(path: Path, mapping: ChannelMap) -> Table:
-    columns, metadata = _BINARY[path.suffix.lower()](path)
+    columns, metadata, notes = _BINARY[path.suffix.lower()](path)
     single = [(name.rpartition(".")[2], str(float(v[0])), unit_in(name)) for name, v in columns.items() if v.size == 1]
     said = clock_in([*single, *((k, str(v), "") for k, v in metadata.items())])
     period = metadata.get("sample_period_s")
@@ -187,7 +187,7 @@ def _of_binary(path: Path, mapping: ChannelMap) -> Table:
         list(names.values()), [unit_in(n) for n in several], list(several.values()),
         {**mapping_in({}, tuple(names.values())), **mapping.columns}, str(path),
     )  # fmt: skip
-    return _table(found, metadata, clock, mapping, str(path), ())
+    return _table(found, metadata, clock, mapping, str(path), notes)
 
 
 def _own_name(name: str, others: Mapping[str, Signal]) -> str:

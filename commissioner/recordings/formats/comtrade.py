@@ -16,7 +16,8 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, MAX_FOREIGN_BYTES, bounded_bytes, too_large
 from commissioner.recordings.formats.stretch import Stretch
-from commissioner.records import Signal
+from commissioner.recordings.reading.mend import LEAST_ROWS, SAME_INTERVAL
+from commissioner.records import ReadingNote, Signal
 
 _FORM = "COMTRADE"
 _SECTION = re.compile(rb"^--- file type: ([A-Z]+)([^\r\n]*?)---[ \t]*\r?\n", re.MULTILINE | re.IGNORECASE)
@@ -40,12 +41,14 @@ class _Configuration:
     status_count: int
     rate_hz: float
     """0 where only the time stamps tell."""
+    promised: int
+    """Samples; 0 where it does not say."""
     data_type: str
     time_factor: float
 
 
-def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
-    """(values by `name [unit]`, metadata with the sample period). DataRefused: damaged, or not at one rate."""
+def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str], tuple[ReadingNote, ...]]:
+    """(values by `name [unit]`, metadata with the sample period, what is missing). DataRefused: damaged, or not at one rate."""
     text, data = _parts(path)
     configuration = _configuration(text, path)
     stamps, raw = _samples(configuration, data)
@@ -54,7 +57,17 @@ def channels(path: Path) -> tuple[dict[str, Signal], dict[str, float | str]]:
         values = (channel.slope * raw[:, k] + channel.offset) * channel.to_primary
         columns[_label(channel, k)] = values
     period = _period(configuration, stamps, data)
-    return columns, {"sample_period_s": period}
+    return columns, {"sample_period_s": period}, _fewer(configuration.promised, stamps.size)
+
+
+def _fewer(promised: int, count: int) -> tuple[ReadingNote, ...]:
+    if count >= promised:
+        return ()
+    return (
+        ReadingNote(
+            "fewer_samples", f"the configuration promises {promised} samples, {count} are there: the end is lost"
+        ),
+    )
 
 
 def _parts(path: Path) -> tuple[str, Stretch]:
@@ -102,27 +115,36 @@ def _configuration(text: str, path: Path) -> _Configuration:
         rows = [
             next(lines) for _ in range(analogue)
         ]  # a list: in a generator the end of the lines would be no StopIteration
-        found = tuple(map(_channel, rows))
+        found = tuple(_channel(row, number, analogue) for number, row in enumerate(rows, 3))
         for _ in range(status):
             next(lines)
         next(lines)  # line frequency
         rate_count = int(next(lines)[0])
-        rates = [float(next(lines)[0]) for _ in range(max(rate_count, 1))]
+        stretches = [next(lines) for _ in range(max(rate_count, 1))]
+        rates = [float(row[0]) for row in stretches]
+        promised = int(float(stretches[-1][1])) if len(stretches[-1]) > 1 and stretches[-1][1] else 0
         next(lines), next(lines)  # first sample, trigger
         data_type = next(lines)[0].upper()
         factor = float(next(lines, ["1"])[0] or 1)
         if len(set(rates)) > 1 or data_type not in (*_SAMPLES, "ASCII"):
             raise ValueError(f"rates of {rates[:5]} Hz, {data_type} data")
-    except (ValueError, IndexError, StopIteration, csv.Error) as error:
+    except (ValueError, OverflowError, IndexError, StopIteration, csv.Error) as error:
         Stretch(memoryview(b""), path, _FORM).refuse(f"configuration: {str(error) or _cut_short(_rows_of(text))}")
-    return _Configuration(found, status, rates[0], data_type, factor)
+    return _Configuration(found, status, rates[0], promised, data_type, factor)
 
 
-def _channel(row: list[str]) -> _Channel:
+def _channel(row: list[str], line: int, promised: int) -> _Channel:
     """number, id, phase, component, unit, a, b, skew, min, max, primary, secondary, P|S; the last three since 1999."""
-    primary, secondary = (float(row[k] or 1) for k in (10, 11)) if len(row) > 12 else (1.0, 1.0)
+    try:
+        slope, offset = float(row[5]), float(row[6])
+        primary, secondary = (float(row[k] or 1) for k in (10, 11)) if len(row) > 12 else (1.0, 1.0)
+    except (ValueError, IndexError) as error:
+        said = ",".join(row)[:40]
+        raise ValueError(
+            f"line {line} ({said}) is no channel, where the second promises {promised} analogue ones"
+        ) from error
     is_secondary = len(row) > 12 and row[12].upper() == "S" and secondary != 0
-    return _Channel(row[1], row[2], row[4], float(row[5]), float(row[6]), primary / secondary if is_secondary else 1.0)
+    return _Channel(row[1], row[2], row[4], slope, offset, primary / secondary if is_secondary else 1.0)
 
 
 def _cut_short(lines: list[list[str]]) -> str:
@@ -177,12 +199,27 @@ def _ascii(data: Stretch, count: int) -> tuple[Signal, Signal]:
 
 
 def _period(configuration: _Configuration, stamps: Signal, data: Stretch) -> float:
-    if configuration.rate_hz > 0:
-        return 1.0 / configuration.rate_hz
     steps = np.diff(stamps) * 1e-6 * configuration.time_factor
+    if configuration.rate_hz > 0:
+        _require_agreement(configuration.rate_hz, steps, data.path)
+        return 1.0 / configuration.rate_hz
     if steps.size == 0 or not steps.min() > 0 or steps.max() - steps.min() > 1.5e-6 * configuration.time_factor:
         data.refuse("time stamps that are not at one rate")
     return float(steps.mean())
+
+
+def _require_agreement(rate_hz: float, steps: Signal, path: Path) -> None:
+    """DataRefused: stamps that run, at another rate than the configuration's. Where it names one, they may be left out."""
+    if steps.size < LEAST_ROWS or not steps.min() > 0:
+        return
+    stamped_hz = 1.0 / np.array([np.median(steps), np.mean(steps)])
+    if np.any(np.abs(stamped_hz / rate_hz - 1.0) < SAME_INTERVAL):
+        return
+    raise DataRefused(
+        f"{path}: the configuration and the time stamps name two rates", step="read the time",
+        value=f"{rate_hz:g} Hz in the configuration, stamps at {stamped_hz[0]:.6g} Hz", limit=f"the same within {SAME_INTERVAL:.0%}",
+        remedy="correct the sampling rate in the .cfg file; 0 there lets the time stamps tell",
+    )  # fmt: skip
 
 
 def _label(channel: _Channel, number: int) -> str:

@@ -134,6 +134,38 @@ def test_a_comtrade_that_contradicts_itself_is_refused_or_read_whole(tmp_path, o
         assert_is_the_recording(read_running(path), volts=0.01)
 
 
+@pytest.mark.parametrize("form", ["ASCII", "BINARY32"])
+def test_a_rate_that_the_stamps_contradict_is_refused(tmp_path, form):
+    with pytest.raises(DataRefused, match="two rates") as refused:
+        read_running(write(tmp_path, form, rate="7680,400"))
+    assert refused.value.value == "7680 Hz in the configuration, stamps at 8000 Hz"
+
+
+def test_stamps_rounded_to_microseconds_do_not_contradict_the_rate(tmp_path):
+    path = write(tmp_path, "ASCII", rate="1920,400")
+    rows = [f"{n + 1},{round(n / 1.92e-3)},{','.join(map(str, counts(n)))},0,1" for n in range(400)]
+    path.with_suffix(".dat").write_text("\r\n".join(rows))
+    assert read_running(path).sample_period_s == pytest.approx(1.0 / 1920.0)
+
+
+@pytest.mark.parametrize(("promised", "said"), [(600, True), (400, False), (0, False)])
+def test_fewer_samples_than_the_configuration_promises_are_said(tmp_path, promised, said):
+    notes = contract_table(write(tmp_path, "BINARY32", rate=f"8000,{promised}")).notes
+    expected = "the configuration promises 600 samples, 400 are there: the end is lost"
+    assert [note.what for note in notes if note.code == "fewer_samples"] == [expected] * said
+
+
+def test_a_line_that_is_no_channel_is_named_with_what_was_promised(tmp_path):
+    path = write(tmp_path, "BINARY32")
+    path.write_text(
+        "\n".join(line for line in path.read_text().splitlines() if not line.startswith(("6,", "1,trip", "2,run")))
+    )
+    with pytest.raises(DataRefused) as refused:
+        contract_table(path)
+    said = "configuration: line 8 (50) is no channel, where the second promises 6 analogue ones"
+    assert refused.value.value == said
+
+
 def test_a_missing_half_is_named(tmp_path):
     path = write(tmp_path, "ASCII")
     path.with_suffix(".dat").unlink()
