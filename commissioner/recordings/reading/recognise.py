@@ -32,6 +32,8 @@ MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz"
             "_deg": "angle", "_nm": "torque"}  # fmt: skip
 SHOWN = {"time": "s", "current": "A", "voltage": "V", "power": "W", "frequency": "Hz", "resistance": "ohm", "angle": "deg",
          "torque": "Nm"}  # fmt: skip
+SAME_TIME = 0.01
+"""Of a sample period, by which two columns of one time may differ."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
 
@@ -52,6 +54,7 @@ def recognise(
     with_s = uses_rst([n for n in names if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
     columns: dict[str, Signal] = {}
+    place: dict[str, int] = {}
     readings, notes, unnamed = [], [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
@@ -66,16 +69,37 @@ def recognise(
             unit = unit or _power_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
         if meaning in columns:
+            if meaning == "time_s":
+                _require_one_time(names, (place[meaning], k), (columns[meaning], factor * values[k]), source)
             notes.append(ReadingNote("second_column", f"{name} means {meaning} too, which is there: not used"))
             meaning = None
         if meaning is None:
             unnamed += [name] if is_asked or CHANNEL.fullmatch(IN_NAME.sub("", name).strip()) else []
             columns.setdefault("test" if of_sheet and is_title(name) else name, values[k])
         else:
+            place[meaning] = k
             with np.errstate(invalid="ignore", over="ignore"):
                 columns[meaning] = factor * values[k] if factor != 1.0 else values[k]
         readings.append(ColumnReading(name, meaning, unit or _own_unit(name), factor))
     return Recognised(columns, tuple(readings), tuple(notes), tuple(unnamed))
+
+
+def _require_one_time(names: Sequence[str], places: tuple[int, int], times: tuple[Signal, Signal], source: str) -> None:
+    """DataRefused: two columns of time run at one rate and apart, so that channels were not sampled together. Times that count
+    from another zero (further apart than the recording is long) or in other steps tell nothing of that."""
+    if times[0].size != times[1].size or times[0].size < 3:
+        return
+    steps = [float(np.nanmedian(np.diff(t))) for t in times if np.isfinite(t).sum() > 2]
+    apart = float(np.nanmax(np.abs(times[1] - times[0]), initial=0.0))
+    if len(steps) < 2 or not abs(steps[1] - steps[0]) < SAME_TIME * steps[0]:
+        return
+    if SAME_TIME * steps[0] < apart < float(np.ptp(times[0][np.isfinite(times[0])])):
+        first, second = (f"{names[k]} (column {k + 1})" for k in places)
+        raise DataRefused(
+            f"{source}: {first} and {second} are two times, {apart:.4g} s apart", step="read the time", value=f"{apart / steps[0]:.3g} of a sample period",
+            limit=f"{SAME_TIME} of one: all channels sampled at one time", remedy="resample all channels to one time column and leave "
+            "the others out; where both mean the same, take one as ignore by --map",
+        )  # fmt: skip
 
 
 def _own_unit(name: str) -> str:

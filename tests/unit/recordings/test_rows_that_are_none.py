@@ -89,3 +89,26 @@ def test_stamps_that_stand_still_run_by_the_interval_that_the_file_gives(tmp_pat
 def test_stamps_that_contradict_the_interval_of_the_file_are_refused(tmp_path):
     with pytest.raises(DataRefused, match="stands still"):
         read_running(written(tmp_path, ["# sample_period_s: 0.5", NAMES, *seconds_of_the_day()]))
+
+
+def time_per_channel(skew_s, scale=1.0):
+    """Voltages behind a time of their own, which is that of the currents shifted and scaled."""
+    names = "Time (s),Ia (A),Ib (A),Ic (A),Time (s),Va (V),Vb (V),Vc (V)"
+    own = [f"{scale * t + skew_s:.5f}" for t in TIME]
+    body = [row.split(",") for row in rows()]
+    return [names, *(",".join([*row[:4], t, *row[4:]]) for row, t in zip(body, own, strict=True))]
+
+
+def test_a_time_per_channel_that_is_skewed_is_refused(tmp_path):
+    with pytest.raises(
+        DataRefused, match=r"Time \(s\) \(column 1\) and Time \(s\) \(column 5\) are two times, 0.00025 s apart"
+    ) as refused:
+        read_running(written(tmp_path, time_per_channel(STEP_S / 2)))
+    assert refused.value.value == "0.5 of a sample period"
+
+
+@pytest.mark.parametrize(("skew_s", "scale"), [(0.0, 1.0), (36000.0, 1.0), (0.0, 2000.0)])
+def test_the_same_time_again_or_one_from_another_zero_is_left_out(tmp_path, skew_s, scale):
+    recording, codes = read(written(tmp_path, time_per_channel(skew_s, scale)))
+    assert codes == {"second_column"}
+    np.testing.assert_allclose(recording.time_s, TIME, atol=1e-9)
