@@ -27,6 +27,7 @@ from commissioner.recordings.reading.mend import (
     against_interval,
     require_seconds,
     require_stamps,
+    through_midnight,
     with_running_time,
     with_time,
     with_whole_time,
@@ -242,7 +243,8 @@ def _timed(
         require_seconds(columns, readings, source)
         require_stamps(columns, source)
         columns, untimed = without_untimed_rows(columns)
-        notes = [*untimed, *against_interval(columns, clock, readings, source)]
+        columns, midnight = through_midnight(columns)
+        notes = [*untimed, *midnight, *against_interval(columns, clock, readings, source)]
     if "time_s" not in columns or not any(name.startswith("current_") for name in columns):
         return columns, notes
     columns, doubled = without_doubled_rows(columns)

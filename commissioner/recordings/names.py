@@ -84,7 +84,23 @@ REMARKS = FILLING | {
 CURRENT = r"i|is|il|iph|cur|curr|current|currents|strom|courant|amps"
 VOLTAGE = r"u|v|vs|vl|ul|vph|uph|vll|ull|vol|volt|volts|voltage|voltages|spannung|tension"
 TIME = frozenset(
-    {"t", "time", "times", "zeit", "temps", "timestamp", "x", "xaxis", "second", "seconds", "sec", "xvalue", "timesec"}
+    {
+        "t",
+        "time",
+        "times",
+        "zeit",
+        "temps",
+        "timestamp",
+        "x",
+        "xaxis",
+        "second",
+        "seconds",
+        "sec",
+        "xvalue",
+        "timesec",
+        "zeitstempel",
+        "uhrzeit",
+    }
 )
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
@@ -115,8 +131,13 @@ _CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?",
 _PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
 """Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
 _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
+_RYB_AS_RST = str.maketrans("ybYB", "stST")
 _STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
 """`isa`, `usb`; `ias`, `vbs`: stator quantities."""
+_NEUTRAL = re.compile(r"(?:[iuv]|current|voltage|strom|spannung|courant|tension)(?:n|neutral)")
+"""Of the neutral: no phase, whatever letters its unit adds."""
+_RYB = re.compile(rf"^((?:{CURRENT}|{VOLTAGE})[\s_]*(?:ph(?:ase)?)?[\s_]*)([ryb]{{1,2}})(?![a-mo-z])", re.IGNORECASE)
+"""Phases by their colours, red, yellow and blue."""
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -126,6 +147,8 @@ def meaning_of(name: str, with_s: bool = False) -> str | None:
         return name
     last = _PARAMETER.sub("", name.rsplit(".", maxsplit=1)[-1])
     name = translated(name if last.isdigit() else last)
+    if _NEUTRAL.fullmatch(key_of(IN_NAME.sub("", name))):
+        return None
     if not IN_NAME.sub("", name).strip() and (unit := read_unit(unit_in(name))) and unit.measures == "time":
         return "time_s"
     return _meaning(IN_NAME.sub("", name), with_s) or _meaning(name, with_s)  # `voltage_A` is a phase, not ampere
@@ -178,6 +201,17 @@ def uses_rst(names: Iterable[str]) -> bool:
     """True where the phases are called R, S, T."""
     keys = {key_of(name) for name in names}
     return any({f"{kind}r", f"{kind}t"} <= keys for kind in ("i", "u", "v", "il", "ul", "vl"))
+
+
+def uses_ryb(names: Iterable[str]) -> bool:
+    """True where the phases are called R, Y, B."""
+    found = {letter for name in names if (colours := _RYB.match(name)) for letter in colours[2].lower()}
+    return found == set("ryb")
+
+
+def in_rst(name: str) -> str:
+    """A name whose phases are R, Y, B, with R, S, T in their place."""
+    return _RYB.sub(lambda found: found[1] + found[2].translate(_RYB_AS_RST), name, count=1)
 
 
 def counted_from_zero(names: Iterable[str]) -> frozenset[str]:

@@ -140,7 +140,7 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
             f"{source}: the file unpacks to too much", step="read recording", value=f"{width} columns", limit=MAX_COLUMNS,
             remedy="export fewer columns",
         )  # fmt: skip
-    above = [split(line.text.lstrip("\ufeff").lstrip("# "), separator) for line in lines[:first] if line.text.strip()]
+    above = [_cells_above(line.text, separator, width) for line in lines[:first] if line.text.strip()]
     if skip:
         preface = [split(line.text, separator)[:2] for line in lines[first : first + 30]]
         channel = next((row[1] for row in preface if len(row) > 1 and row[0].lower() == "source"), "CH1")
@@ -154,6 +154,13 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
     names, units, used = _by_keys(above, width, names, units, used)
     said = (*above[: len(above) - used], *_beyond(above[len(above) - used :], width))
     return Layout(separator, lines[first].start, names, units, said, 0, is_split and separator == ",")
+
+
+def _cells_above(text: str, separator: str, width: int) -> Row:
+    """The cells of a line above the numbers; by another separator where that gives one for each column and theirs does not."""
+    bare = text.lstrip("\ufeff").lstrip("# ")
+    ways = [split(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
+    return next((row for row in ways if len(row) == width), ways[0])
 
 
 def _beyond(header: Sequence[Row], width: int) -> list[Row]:

@@ -19,6 +19,7 @@ LEAST_ROWS = 16
 _COUNTERS = {"x", "n", "no", "nr", "index", "point", "points", "row", "sample", "samples", "sequence"}
 TIME_MADE = "time_made"
 """Code of the note that the rows were counted by the interval which the file gives."""
+DAY_S = 86400.0
 SAME_INTERVAL = 0.02
 MOST_REPEATED = 50
 """Rows that may bear one printed stamp: beyond it nothing is left of the time."""
@@ -76,6 +77,20 @@ def without_untimed_rows(columns: Mapping[str, Signal]) -> tuple[dict[str, Signa
     keep = np.isfinite(time)
     note = ReadingNote("no_time", f"{int((~keep).sum())} rows hold no time: they were left out")
     return {name: v[keep] if v.size == time.size else v for name, v in columns.items()}, [note]
+
+
+def through_midnight(columns: Mapping[str, Signal]) -> tuple[dict[str, Signal], list[ReadingNote]]:
+    """A time of day that passes midnight, running on: a step back by more than half a day among stamps of one day is that."""
+    time = columns.get("time_s")
+    if time is None or time.size < LEAST_ROWS or not (time.min() >= 0.0 and time.max() < DAY_S):
+        return dict(columns), []
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(time) < -0.5 * DAY_S)])
+    if passed[-1] == 0.0:
+        return dict(columns), []
+    note = ReadingNote(
+        "midnight", f"the time of day passes midnight in {int(passed[-1])} places: 24 h were added behind each"
+    )
+    return {**columns, "time_s": time + DAY_S * passed}, [note]
 
 
 def with_running_time(

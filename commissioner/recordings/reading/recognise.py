@@ -12,6 +12,7 @@ import numpy as np
 from commissioner.errors import DataRefused
 from commissioner.recordings.names import (
     counted_from_zero,
+    in_rst,
     is_per_minute,
     is_remark,
     is_sheet,
@@ -21,6 +22,7 @@ from commissioner.recordings.names import (
     turned,
     unit_of,
     uses_rst,
+    uses_ryb,
 )
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
@@ -51,7 +53,8 @@ def recognise(
     names: Sequence[str], units: Sequence[str], values: Sequence[Signal], targets: Mapping[str, Target], source: str
 ) -> Recognised:
     """The columns by the contract's names where they mean one, else by their own; see the module."""
-    with_s = uses_rst([n for n in names if n])
+    meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
+    with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
@@ -59,12 +62,12 @@ def recognise(
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
         name = names[k]
-        unit = units[k] if units[k] not in ("", unit_in(name)) else unit_of(name, with_s)
+        unit = units[k] if units[k] not in ("", unit_in(name)) else unit_of(meant[name], with_s)
         if not name:
             continue
         target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
         is_asked = name in from_zero and target is None
-        meaning, factor = (None, 1.0) if is_asked else _meaning(name, unit, target, with_s, source)
+        meaning, factor = (None, 1.0) if is_asked else _meaning(meant[name], unit, target, with_s, source)
         if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_meaning(name)):
             unit = unit or _power_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)

@@ -56,6 +56,13 @@ CHANNELS = [np.cos(2 * np.pi * 50 * TIME - k * 2 * np.pi / 3) for k in range(3)]
         ("speed_rpm", "speed_rad_per_s"),
         ("is", None),
         ("motor temperature", None),
+        ("Vn (V)", None),
+        ("In (A)", None),
+        ("U_N [V]", None),
+        ("Vneutral (V)", None),
+        ("Vbn (V)", "voltage_v_v"),
+        ("VSN", "voltage_v_v"),
+        ("Zeitstempel", "time_s"),
         ("voltage", None),
     ],
 )

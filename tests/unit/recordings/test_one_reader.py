@@ -77,6 +77,15 @@ FILES = {
     "japanese": lines("時間(s)," + ",".join(f"{p}相{q}" for q in ("電流(A)", "電圧(V)") for p in "UVW")) + rows(TIME, NAMED),
     "turkish": lines("Zaman (s);" + ";".join(f"{q} L{k} ({u})" for q, u in (("Akım", "A"), ("Gerilim", "V")) for k in (1, 2, 3)))
     + rows(TIME, NAMED, separator=";", comma=True),
+    "colours": lines("Time,IR,IY,IB,VRN,VYN,VBN", "s,A,A,A,V,V,V") + rows(TIME, NAMED),
+    "colours of phases": lines("Time (s),Current Phase R (A),Current Phase Y (A),Current Phase B (A),V_R (V),V_Y (V),V_B (V)")
+    + rows(TIME, NAMED),
+    "a neutral before the phases": lines("Time (s),Vn (V),In (A),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)")
+    + rows(TIME, [0.001 * V[0], 0.001 * V[1], *NAMED]),
+    "names between semicolons": lines("Time (s);" + ABC.replace(",", ";")) + rows(TIME, NAMED),
+    "across midnight": lines("Zeitstempel," + ABC)
+    + "".join(f"{'23:59:59' if k < 300 else '00:00:00'}.{(8500 + round(t * 1e4)) % 10000:04d}," + ",".join(f"{x[k]:.4f}" for x in NAMED)
+              + "\n" for k, t in enumerate(TIME)),
     "minus signs": lines("Time (s)," + ABC) + rows(TIME, NAMED).replace("-", "\u2212"),
     "swiss": lines("Zeit [us];" + ";".join(f"I{k} [mA]" for k in (1, 2, 3)) + ";" + ";".join(f"U{k} [V]" for k in (1, 2, 3)))
     + "".join(";".join([f"{t:,.0f}".replace(",", "'"), *(f"{1e3 * x[k]:,.1f}".replace(",", "\u2019") for x in CURRENTS),
@@ -108,6 +117,20 @@ def test_the_same_recording_comes_from_every_header(tmp_path: Path, name: str) -
     for k in range(3):
         np.testing.assert_allclose(recording.currents_a[k], CURRENTS[k], atol=1e-4)
         np.testing.assert_allclose(recording.voltages_v[k], V[k], atol=1e-3)
+
+
+def test_colours_of_line_voltages_and_what_midnight_is_said_to_be(tmp_path: Path) -> None:
+    path = tmp_path / "file.csv"
+    path.write_text(lines("Time (s),IR,IY,IB,VRY,VYB,VRB") + rows(TIME, [*CURRENTS, UV, VW, -WU]))
+    recording = read_running(path)
+    assert recording.voltages_are_line_to_line
+    np.testing.assert_allclose(recording.voltages_v[2], WU, atol=1e-3)
+    path.write_text(FILES["across midnight"])
+    table = contract_table(path)
+    np.testing.assert_allclose(table.columns["time_s"], 86399.85 + TIME, atol=1e-6)
+    assert [note.what for note in table.notes] == [
+        "the time of day passes midnight in 1 places: 24 h were added behind each"
+    ]
 
 
 def test_two_wattmeters_give_the_third_voltage_with_its_sign(tmp_path: Path) -> None:
