@@ -35,7 +35,8 @@ class Marks:
 
 def plain(text: str) -> str:
     """The text with a hyphen for the minus sign, and without apostrophes between thousands: both can be read in one way only."""
-    return APOSTROPHE.sub("", text.replace("\u2212", "-"))
+    text = text.replace("\u2212", "-")
+    return APOSTROPHE.sub("", text) if "'" in text or "\u2019" in text else text
 
 
 def is_numeric(cell: str) -> bool:

@@ -41,8 +41,7 @@ def without_headers(table: pa.Table, wrong: list[WrongRow], layout: Layout) -> t
 
 def without_torn_row(wrong: list[WrongRow], body: str, width: int) -> list[ReadingNote]:
     """A note where the text ends inside its last row, which leaves `wrong`."""
-    ends_with = body.rstrip().rpartition("\n")[2].split()
-    if not wrong or wrong[-1].cells >= width or wrong[-1].text.split() != ends_with:
+    if not wrong or wrong[-1].cells >= width or wrong[-1].text.split() != body.rstrip().rpartition("\n")[2].split():
         return []
     torn = wrong.pop()
     return [

@@ -95,6 +95,7 @@ def test_stamps_of_every_fourth_sample_are_used_and_the_interval_said(tmp_path):
     table = contract_table(written(tmp_path / "x.csv", ["Sample Interval,0.00005", NAMED], TIME))
     (note,) = (n for n in table.notes if n.code == "interval")
     assert "step by 0.0002 s: the stamps are used" in note.what
+    assert "sample_period_s" not in table.metadata
     table = contract_table(written(tmp_path / "y.csv", ["Sample Interval,0.0002", NAMED], TIME))
     assert not any(n.code == "interval" for n in table.notes)
 
