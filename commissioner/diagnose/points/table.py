@@ -29,6 +29,17 @@ def is_points_table(columns: Sequence[str]) -> bool:
     return "time_s" not in columns and sum(name in columns for name in POINT_COLUMNS) >= 2
 
 
+def lacking(columns: Mapping[str, Array], needed: Sequence[str] = POINT_COLUMNS) -> DataRefused | None:
+    """What a table lacks of the columns that a test needs; None where it has them all."""
+    missing = [c for c in needed if c not in columns]
+    if not missing:
+        return None
+    return refused(
+        f"a table of test points needs the column {missing[0]}", ", ".join(columns), ", ".join(needed),
+        f"add or rename: {', '.join(missing)}; line values are sqrt(3) times phase ones, of three meters the mean",
+    )  # fmt: skip
+
+
 def read_points(
     columns: Mapping[str, Array], name: str, metadata: Mapping[str, float | str] | None = None
 ) -> Points | DataRefused:
@@ -37,13 +48,8 @@ def read_points(
     `metadata`: the plate as far as it is known, and `resistance_measured`.
     """
     said = metadata or {}
-    if missing := [c for c in POINT_COLUMNS if c not in columns]:
-        return refused(
-            f"a table of test points needs the column {missing[0]}",
-            ", ".join(columns),
-            ", ".join(POINT_COLUMNS),
-            f"add or rename: {', '.join(missing)}",
-        )
+    if (lacks := lacking(columns)) is not None:
+        return lacks
     resistance = column_of(columns, said)
     names = (*POINT_COLUMNS, *([resistance[0]] if resistance else []))
     everything = {**columns, resistance[0]: resistance[1]} if resistance else columns

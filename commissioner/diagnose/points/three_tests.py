@@ -17,7 +17,7 @@ from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
 from commissioner.diagnose.points.resistance import column_of, star_resistance
-from commissioner.diagnose.points.table import LEAST_POINTS
+from commissioner.diagnose.points.table import LEAST_POINTS, lacking
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.running import TCircuit
@@ -56,6 +56,8 @@ class ThreeTests:
     rows: Mapping[str, int]
 
 
+LEAST_COLUMNS = POINT_COLUMNS[1:3]
+"""Of every table: a test with direct current has no frequency, and needs no power."""
 COLUMNS = ("frequency_hz", "voltage_v", "current_a", "power_w", "said")
 
 
@@ -92,10 +94,9 @@ class _Rows:
 
 def are_three_tests(tables: Sequence[Mapping[str, Array]]) -> bool:
     """Whether the tables are tests of a motor together: a row of direct current, or two tests of which one has few points."""
-    pooled = [_pooled(t) for t in tables]
-    if any(rows is None for rows in pooled):
+    if any(lacking(t, LEAST_COLUMNS) for t in tables):
         return False
-    every = [rows for rows in pooled if rows is not None]
+    every = [_pooled(t) for t in tables]
     if any(np.any(_is_direct(rows)) for rows in every):
         return True
     ac = _join(every)
@@ -109,7 +110,9 @@ def solve(
     tables: Sequence[Mapping[str, Array]], metadata: Sequence[Mapping[str, float | str]]
 ) -> ThreeTests | DataRefused:
     """The circuit, or which test is missing or impossible."""
-    rows = _join([r for t in tables if (r := _pooled(t)) is not None])
+    if lacks := next((r for t in tables if (r := lacking(t, LEAST_COLUMNS)) is not None), None):
+        return lacks
+    rows = _join([_pooled(t) for t in tables])
     said = {k: v for one in reversed(metadata) for k, v in one.items()}
     direct = _is_direct(rows)
     ac = rows.at(~direct)
@@ -165,10 +168,9 @@ def _circuit(
     )  # fmt: skip
 
 
-def _pooled(table: Mapping[str, Array]) -> _Rows | None:
-    if any(c not in table for c in POINT_COLUMNS[1:3]):
-        return None
-    size = table[POINT_COLUMNS[1]].size
+def _pooled(table: Mapping[str, Array]) -> _Rows:
+    """The rows of a table that has `LEAST_COLUMNS`; what else it lacks is not a number."""
+    size = table[LEAST_COLUMNS[0]].size
     nothing = np.full(size, np.nan)
     return _Rows(*(np.asarray(table.get(c, nothing), dtype=float) for c in (*POINT_COLUMNS, "test")))
 

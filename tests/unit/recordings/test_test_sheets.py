@@ -90,3 +90,18 @@ def test_rows_whose_inductances_do_not_tell_them_apart_are_what_the_sheet_calls_
     done = identify_any(IdentifyRequest((path,)))
     assert isinstance(done, IdentifiedSheets)
     assert done.document["rows"] == {"direct current": 1, "no load": 1, "locked rotor": 1}
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "lacks"),
+    [
+        ("voltage_phase_v,current_line_a", "231,3", "voltage_line_v"),
+        ("V_ab,V_bc,V_ca,I_a,I_b,I_c", "400,401,399,3,3,3", "voltage_line_v"),
+    ],
+)
+def test_a_sheet_with_most_of_the_contracts_columns_is_told_which_it_lacks(tmp_path, head, row, lacks):
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"test,frequency_hz,{head},power_w\nno load,50,{row},400\nlocked rotor,12.5,{row},400\n")
+    with pytest.raises(DataRefused, match=f"needs the column {lacks}$") as refused:
+        identify_any(IdentifyRequest((path,)))
+    assert "sqrt(3) times phase ones" in refused.value.remedy
