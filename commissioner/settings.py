@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
@@ -18,6 +19,7 @@ from commissioner.validation import first_problem
 CONFIG_FOLDER = Path(__file__).resolve().parent.parent / "config"
 MAX_BYTES, MAX_DOTS = 250_000, 500
 """Of a TOML file, and in one line of it: the time that a dotted key takes grows with the square of its parts."""
+DECIMAL_COMMA = re.compile(r"([\w.-]{1,60}?)\s*=\s*([+-]?\d{1,15}),(\d{1,15})\s*(?:#.*)?")
 
 Percent = Annotated[float, Field(gt=0, le=100)]
 
@@ -129,22 +131,33 @@ def load_procedure(
 
 
 def read_toml(path: Path) -> JsonObject:
-    """The document in a TOML file of bounded size."""
+    """The document in a TOML file of bounded size; a byte order mark before it, as Windows writes one, is no part of it."""
     if not path.is_file():
         raise no_file(path, "read configuration", "an existing TOML file")
     if path.stat().st_size > MAX_BYTES:
         raise ConfigurationError(
             file=str(path), key="(file)", value=f"{path.stat().st_size} bytes", expected=f"at most {MAX_BYTES} bytes"
         )
+    text = ""
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
         if max(line.count(".") for line in text.split("\n")) > MAX_DOTS:
             raise ValueError(f"more than {MAX_DOTS} dots in a line")
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # syntax, encoding, digits without end, nesting without end
         raise ConfigurationError(
-            file=str(path), key="(syntax)", value=str(error), expected="valid TOML in UTF-8"
+            file=str(path), key="(syntax)", value=str(error), expected="valid TOML in UTF-8" + _decimal_comma(text)
         ) from error
+
+
+def _decimal_comma(text: str) -> str:
+    """The first line whose number has a comma for its decimal point, and how TOML writes it; nothing where there is none."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if found := DECIMAL_COMMA.fullmatch(line.strip()):
+            return (
+                f"; in line {number} a decimal comma stands where TOML has a point: {found[1]} = {found[2]}.{found[3]}"
+            )
+    return ""
 
 
 def _resolve(name_or_path: str, folder: str) -> Path:

@@ -181,6 +181,15 @@ def typical_efficiency(power_w: float) -> float:
 
 LEAST_OF_TYPICAL = 0.7
 """Of the typical efficiency: sqrt 3, the smallest factor between two readings of one plate, leaves 0.58 of it."""
+LEAST_LOSS_OF_TYPICAL, LAST_DIGITS = 0.3, 1.02
+"""Of the typical losses: IE5 motors of 0.12 to 200 kW have 0.43 to 0.66 of them, published plates down to 0.27; and what rounded
+volts, amperes and power factor may add to the efficiency of a plate."""
+
+
+def efficiency_range(power_w: float) -> tuple[float, float]:
+    """Least and most that the plate of a cage motor of this rated power can say."""
+    typical = typical_efficiency(power_w)
+    return LEAST_OF_TYPICAL * typical, min(LAST_DIGITS * (1.0 - LEAST_LOSS_OF_TYPICAL * (1.0 - typical)), 1.0)
 
 
 def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
@@ -195,20 +204,21 @@ def _contradictions(plate: Nameplate) -> Iterator[PlateProblem]:
         )
     input_w = math.sqrt(3.0) * plate.rated_voltage_v * plate.rated_current_a * plate.power_factor
     efficiency = plate.rated_power_w / input_w
-    least = LEAST_OF_TYPICAL * typical_efficiency(plate.rated_power_w)
-    if not least < efficiency < 1.0:
+    least, best = efficiency_range(plate.rated_power_w)
+    if not least < efficiency < best:
         yield PlateProblem(
             "rated_power_w",
             plate.rated_power_w,
-            f"{least:.2g} ... 1 times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate (it is "
-            f"{efficiency:.3g}){_of_two_lines(plate, efficiency)}; of a plate with two voltages, voltage and current of the "
-            "same connection",
+            f"{least:.2g} ... {best:.3g} times the electrical input sqrt(3) U I cos(phi) = {input_w:.4g} W of this plate, as "
+            f"motors of this power have (it is {efficiency:.3g}){_of_two_lines(plate, efficiency)}; of a plate with two "
+            "voltages, voltage and current of the same connection; of powers, the one at the shaft",
         )
 
 
 def _of_two_lines(plate: Nameplate, efficiency: float) -> str:
     """The two readings that would fit where voltage and current are of different connections."""
-    up = math.sqrt(3.0) if efficiency < 1.0 else 1.0 / math.sqrt(3.0)
+    is_low = efficiency < typical_efficiency(plate.rated_power_w)
+    up = math.sqrt(3.0) if is_low else 1.0 / math.sqrt(3.0)
     if not LEAST_OF_TYPICAL < up * efficiency / typical_efficiency(plate.rated_power_w) < 1.25:
         return ""
     return (

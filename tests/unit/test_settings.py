@@ -7,6 +7,7 @@ import pytest
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.identify.intake.plate import nameplate_from
 from commissioner.recordings.plate import plate_of
+from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.settings import CONFIG_FOLDER, load_motor, load_procedure
 
 PLATE = (CONFIG_FOLDER / "motors" / "motor_2kw2.toml").read_text()
@@ -78,6 +79,23 @@ def test_a_ring_is_no_connection_in_a_recording_either():
     with pytest.raises(ConfigurationError) as caught:
         nameplate_from(numbers | {"connection": "ring"})
     assert "star (Y, wye) or delta" in str(caught.value.as_dict())
+
+
+def test_a_byte_order_mark_of_windows_is_no_part_of_a_file(tmp_path):
+    path = tmp_path / "motor.toml"
+    path.write_text(PLATE, "utf-8-sig")
+    assert load_motor(str(path)) == load_motor("motor_2kw2")
+    path.write_text('[columns]\nCH1 = "current_u_a"\n', "utf-8-sig")
+    assert read_mapping(path).columns["CH1"].column == "current_u_a"
+
+
+def test_a_decimal_comma_is_told_with_its_line_and_the_point(tmp_path):
+    current = next(line for line in PLATE.splitlines() if line.startswith("rated_current_a"))
+    number = PLATE.splitlines().index(current) + 1
+    with pytest.raises(ConfigurationError) as caught:
+        load_motor(_motor(tmp_path, PLATE.replace(current, "rated_current_a = 4,86  # A")))
+    assert f"in line {number} a decimal comma" in caught.value.remedy
+    assert "rated_current_a = 4.86" in caught.value.remedy
 
 
 def test_broken_toml_and_missing_files_are_named(tmp_path):

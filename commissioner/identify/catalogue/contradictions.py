@@ -12,8 +12,8 @@ from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS, Sheet, pole_pa
 from commissioner.motor.nameplate import (
     LARGEST_SLIP,
     LARGEST_SLIP_OF_MORE_W,
-    LEAST_OF_TYPICAL,
     Nameplate,
+    efficiency_range,
     typical_efficiency,
 )
 
@@ -170,11 +170,11 @@ def _of_power(sheet: Sheet) -> Iterator[Conflict]:
             f"efficiency {efficiency:.4g} printed, {text}", f"the same within {APART:.0%} and the last digits",
             {"efficiency": ("rated_current_a",), "current": ("efficiency",)},
         )  # fmt: skip
-    typical = typical_efficiency(power)
-    if efficiency is None and not LEAST_OF_TYPICAL * typical < implied < 1.0:
+    typical, (least, best) = typical_efficiency(power), efficiency_range(power)
+    if efficiency is None and not least < implied < best:
         yield Conflict(
             f"power, voltage, current and power factor contradict each other{_hint(implied / typical)}", text,
-            f"{LEAST_OF_TYPICAL * typical:.2g} ... 1, motors of this size have {typical:.2g}", {"power": ("rated_current_a",)},
+            f"{least:.2g} ... {best:.3g}, motors of this size have {typical:.2g}", {"power": ("rated_current_a",)},
         )  # fmt: skip
 
 

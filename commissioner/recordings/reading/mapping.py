@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP
+from commissioner.settings import read_toml
 
 MAX_MAP_BYTES = 100_000
 TARGET = re.compile(r"(-?)\s*([a-z][a-z0-9_]*)\s*(?:\*\s*([0-9.eE+-]+))?")
@@ -50,10 +50,7 @@ def read_mapping(path: Path) -> ChannelMap:
             f"there is no mapping {path}", step="read mapping", value=str(path), limit="a TOML file of columns",
             remedy="give --map MAP.toml; " + HOW_TO_MAP,
         )  # fmt: skip
-    try:
-        raw = tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ConfigurationError(file=str(path), key="the file", value=str(error), expected="TOML") from error
+    raw = read_toml(path)
     for section in raw:
         if section not in {"columns", "metadata"} or not isinstance(raw[section], dict):
             raise ConfigurationError(

@@ -26,7 +26,7 @@ from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
-from commissioner.settings import CONFIG_FOLDER, MotorFile
+from commissioner.settings import CONFIG_FOLDER, MotorFile, read_toml
 
 router = APIRouter(route_class=Typed)
 Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
@@ -105,10 +105,8 @@ async def put_motor(request: Request, motor: NewMotor, _who: Operator) -> MotorD
 @router.get("/api/procedures")
 async def procedures(_who: Viewer) -> ProceduresDocument:
     """The procedure that ships with the product, as its file says."""
-    import tomllib
-
-    with (CONFIG_FOLDER / "procedure.toml").open("rb") as file:
-        return {"procedures": [{"id": "standard", "origin": "packaged", "procedure": tomllib.load(file)}]}
+    procedure = read_toml(CONFIG_FOLDER / "procedure.toml")
+    return {"procedures": [{"id": "standard", "origin": "packaged", "procedure": procedure}]}
 
 
 @router.post("/api/nameplates/validate")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from commissioner.motor.circuit import InverseGamma
@@ -54,3 +55,29 @@ def test_an_impossible_plate_names_the_key(change, key):
     problems = check(dataclasses.replace(PLATE, **change))
     assert problems[0].key == key
     assert problems[0].expected
+
+
+IE5_4_POLES = {120: 0.743, 370: 0.843, 1100: 0.895, 4000: 0.928, 15000: 0.954, 75000: 0.970, 200000: 0.974}
+"""IEC TS 60034-30-2 at 1500 1/min."""
+
+
+@pytest.mark.parametrize(("power_w", "efficiency"), IE5_4_POLES.items())
+def test_the_best_motors_pass_with_a_plate_rounded_by_a_per_cent(power_w, efficiency):
+    current = power_w / (np.sqrt(3) * 400 * 0.8 * efficiency * 1.01)
+    assert (
+        check(dataclasses.replace(PLATE, rated_power_w=float(power_w), rated_current_a=current, power_factor=0.8)) == ()
+    )
+
+
+def test_a_small_motors_delta_voltage_beside_its_star_current_is_refused_with_the_sqrt_3():
+    small = dataclasses.replace(
+        PLATE, rated_power_w=120.0, rated_voltage_v=230.0, rated_current_a=0.42, power_factor=0.72
+    )
+    (problem,) = check(small)
+    assert "0.43 ... 0.901 times" in problem.expected
+    assert "(it is 0.996): 230 V with 0.727 A would fit, or 398.4 V with 0.42 A" in problem.expected
+
+
+def test_the_electrical_input_given_as_the_power_is_refused():
+    (problem,) = check(dataclasses.replace(PLATE, rated_power_w=2626.0, rated_current_a=4.86, power_factor=0.78))
+    assert "the one at the shaft" in problem.expected
