@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable
 
 from commissioner.recordings.units import IN_NAME, read_unit, unbracketed, unit_in
@@ -223,9 +224,15 @@ def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
     return frozenset(name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values())
 
 
+def folded(text: str) -> str:
+    """The text without marks above and below its letters: `Fréquence` as `Frequence`."""
+    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+
+
 def key_of(name: str) -> str:
-    """Letters and digits of a name, without its unit in brackets and its path."""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1]).lower())
+    """Letters and digits of a name, without accents, its unit in brackets and its path."""
+    bare = re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1])
+    return re.sub(r"[^a-z0-9]", "", folded(bare).lower())
 
 
 def sheet_meaning(name: str) -> str | None:
@@ -258,6 +265,7 @@ def is_per_minute(name: str) -> bool:
 
 
 def _meaning(bare: str, with_s: bool) -> str | None:
+    bare = folded(bare)
     words = [word.lower() for word in _WORD.findall(bare)]
     key = re.sub(r"[^a-z0-9]", "", bare.lower())
     if key in TIME or _TIME_OF_RATE.fullmatch(key):

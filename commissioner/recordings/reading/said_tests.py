@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from commissioner.recordings.names import folded
 from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, Signal
 
-TITLES = frozenset({"test", "testtype", "kind", "versuch", "prüfung", "pruefung", "versuchsart", "typeoftest", "essai"})
+TITLES = frozenset({"test", "testtype", "kind", "versuch", "prufung", "pruefung", "versuchsart", "typeoftest", "essai"})
 WORDS = {
-    DIRECT_TEST: r"dc(?:test)?|directcurrent|gleichstrom|winding(?:resistance)?|resistance|wicklungswiderstand|widerstand",
-    IDLE_TEST: r"noload(?:test)?|idle|idling|leerlauf(?:versuch)?|unloaded|àvide|avide",
-    LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?(?:test)?|lockedrotor|shortcircuit(?:test)?|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|standstill",
+    DIRECT_TEST: r"dc(?:test)?|directcurrent|gleichstrom|courantcontinu|winding(?:resistance)?|resistance|wicklungswiderstand|widerstand",
+    IDLE_TEST: r"noload(?:test)?|idle|idling|leerlauf(?:versuch)?|unloaded|(?:essai)?avide",
+    LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?(?:test)?|lockedrotor|shortcircuit(?:test)?|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|(?:essaia?)?rotorbloque|(?:essai)?encourtcircuit|standstill",
 }  # fmt: skip
 
 
@@ -29,4 +30,4 @@ def codes(cells: Sequence[str]) -> Signal | None:
 
 
 def _letters(text: str) -> str:
-    return re.sub(r"[\W_\d]", "", text.lower())
+    return re.sub(r"[\W_\d]", "", folded(text).lower())

@@ -17,6 +17,8 @@ SHEETS = {
     "units": "Test type,Line voltage (V),Line current (A),Input power (W),Frequency (Hz)\nBlocked rotor,25,27.9,920,15\n"
     "No load,208,8.17,420,60\nDC,13.6,28.0,,0\n",
     "german": "Versuch;f [Hz];U [V];I [A];P [kW]\nGleichstrom;;13,6;28,0;\nLeerlauf;60;208;8,17;0,42\nKurzschluss;15;25;27,9;0,92\n",
+    "french": "Essai;Fréquence (Hz);Tension (V);Courant (A);Puissance (W)\nCourant continu;0;13,6;28,0;380,8\n"
+    "À vide;60;208;8,17;420\nRotor bloqué;15;25;27,9;920\n",
     "short": "test,voltage_v,current_a,power_kw,frequency_hz,winding_resistance_uv_ohm\nno-load,208,8.17,0.42,60,0.4857\n"
     "locked,25,27.9,0.92,15,0.4857\n",
 }
