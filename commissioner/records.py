@@ -28,10 +28,12 @@ POINT_COLUMNS = ("frequency_hz", "voltage_line_v", "current_line_a", "power_w")
 """What a table of steady-state test points needs: line values rms, power of all three phases."""
 DIRECT_TEST, IDLE_TEST, LOCKED_TEST = 0.0, 1.0, 2.0
 """In the column `test` of a test sheet."""
+TERMINAL_PAIRS = ("winding_resistance_uv_ohm", "winding_resistance_vw_ohm", "winding_resistance_wu_ohm")
 POINT_RESISTANCES = (
-    "winding_resistance_uv_ohm",
+    *TERMINAL_PAIRS,
     "winding_resistance_line_ohm",
     "terminal_resistance_ohm",
+    "winding_resistance_phase_ohm",
     "winding_resistance_ohm",
     "phase_resistance_ohm",
     "stator_resistance_ohm",

@@ -18,6 +18,7 @@ from commissioner.errors import DataRefused
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
+from commissioner.recordings.names import is_sheet
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
@@ -35,7 +36,7 @@ from commissioner.recordings.reading.mend import (
     without_untimed_rows,
 )
 from commissioner.recordings.reading.preface import Clock, clock_in
-from commissioner.recordings.reading.recognise import Recognised, recognise
+from commissioner.recordings.reading.recognise import Recognised, recognise, resistances_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
@@ -222,6 +223,8 @@ def _table(
 ) -> Table:  # fmt: skip
     """What was recognised with a time, without doubled rows and rounded stamps."""
     metadata = {**metadata, **mapping.metadata}
+    if is_sheet(r.name for r in found.readings):
+        metadata = {**resistances_said(metadata, source), **metadata}
     columns = _of_one_length(found.columns)
     period = metadata.get("sample_period_s")
     if clock.interval_s is None and isinstance(period, float):

@@ -121,6 +121,23 @@ SHEET = {
     ),
 }
 """Columns of a test sheet: line values and the power of all phases; a name that says `phase` is none of them."""
+_OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
+SHEET_RESISTANCE = {
+    "winding_resistance_line_ohm": re.compile(
+        r"(?:terminal|line(?:toline)?|klemmen)(?:winding)?(?:resistance|widerstand)|rll"
+        rf"|{_OF_WINDING}(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)"
+    ),
+    "winding_resistance_phase_ohm": re.compile(
+        r"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand)(?:per|pro|je)?(?:phase|strang)"
+    ),
+    "winding_resistance_ohm": re.compile(r"windings?resistance|wicklungswiderstand"),
+    "phase_resistance_ohm": re.compile(r"phases?(?:resistance|nwiderstand)|rph(?:ase)?|resistanceperphase"),
+    "stator_resistance_ohm": re.compile(r"(?:stator|stander)(?:winding|wicklungs)?(?:resistance|widerstand)|rs|r1"),
+    "resistance_ohm": re.compile(r"resistance|widerstand"),
+}
+"""Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
+_TERMINALS = re.compile(rf"{_OF_WINDING}l?([abcuvwrst123])l?([abcuvwrst123])")
+_OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
@@ -240,6 +257,27 @@ def sheet_meaning(name: str) -> str | None:
     said = unit_in(name) if is_remark(unit_in(name)) else ""
     bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE) + said
     return next((column for column, names in SHEET.items() if names.fullmatch(key_of(bare))), None)
+
+
+def sheet_column(name: str) -> str | None:
+    """As `sheet_meaning`, with the windings' resistance beside."""
+    return sheet_meaning(name) or resistance_meaning(name)
+
+
+def resistance_meaning(name: str) -> str | None:
+    """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None."""
+    key = key_of(_OHM_ENDING.sub("", IN_NAME.sub("", name).strip()))
+    ends = _TERMINALS.fullmatch(key)
+    if ends and ends[1] != ends[2] and any(ends[1] in letters and ends[2] in letters for letters in ALPHABETS):
+        pair = {PHASES[ends[1]], PHASES[ends[2]]}
+        return f"winding_resistance_{next(p for p in ('uv', 'vw', 'wu') if set(p) == pair)}_ohm"
+    return next((column for column, names in SHEET_RESISTANCE.items() if names.fullmatch(key)), None)
+
+
+def sheet_unit(name: str) -> str:
+    """The unit at the end of a test sheet's `power_kw` or `winding_resistance_uv_mohm`, which no other column has; or nothing."""
+    found = _OHM_ENDING.search(name)
+    return found[1] if found else "kW" if name.lower().endswith("_kw") else ""
 
 
 def is_sheet(names: Iterable[str]) -> bool:

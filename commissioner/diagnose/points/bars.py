@@ -176,6 +176,11 @@ class _Fit:
 
 def remark_of(slow: SlowRotor | None, frequencies: Sequence[float]) -> str:
     """What the frequencies say of the rotor at running slip."""
+    if slow is None and len(frequencies) > 1:
+        return (
+            f"Locked-rotor points at {frequencies[0]:g} ... {frequencies[-1]:g} Hz tell the rotor at slip frequency only with the stator's "
+            "resistance, which is not known: give it, measured between two terminals, as winding_resistance_uv_ohm."
+        )
     if slow is None:
         return (
             f"Locked-rotor points of one frequency ({frequencies[0]:g} Hz) cannot tell the rotor at slip frequency: bars may have "

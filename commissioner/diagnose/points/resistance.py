@@ -7,7 +7,8 @@ ruled out; where more than one is left, nothing is assumed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
-from commissioner.records import POINT_RESISTANCES
+from commissioner.motor.nameplate import connection_of
+from commissioner.records import POINT_RESISTANCES, TERMINAL_PAIRS
 
 Array = NDArray[np.float64]
 KINDS: Mapping[str, str] = {
@@ -28,9 +30,10 @@ SYNONYMS = {
     "winding": "phase_winding", "phase": "phase_winding", "star": "star_equivalent",
 }  # fmt: skip
 SAID_BY_NAME: Mapping[str, str] = {
-    "winding_resistance_uv_ohm": "line_to_line",
+    **dict.fromkeys(TERMINAL_PAIRS, "line_to_line"),
     "winding_resistance_line_ohm": "line_to_line",
     "terminal_resistance_ohm": "line_to_line",
+    "winding_resistance_phase_ohm": "phase_winding",
 }
 """Columns whose names say what they hold."""
 ROTOR_OVER_STATOR = (0.25, 8.0)
@@ -38,6 +41,11 @@ ROTOR_OVER_STATOR = (0.25, 8.0)
 stator, upwards three times for bars in which the current is displaced at standstill."""
 ROTOR_OVER_SLIP = (0.35, 6.6)
 """R_R over rated slip and base impedance: the plate's box (`motor.nameplate`), three times its end for displacement."""
+
+
+PAIRS_APART = 0.1
+"""By which the resistances between three pairs of terminals may differ: sound windings by one or two per cent."""
+LIKE_RESISTANCE = re.compile(r"ohm|\u03a9|\u2126|r[eé]sist|widerstand|^r(?:[ _-]|$)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -48,15 +56,38 @@ class Resistance:
     remarks: tuple[str, ...] = ()
 
 
-def column_of(columns: Mapping[str, Array], metadata: Mapping[str, float | str]) -> tuple[str, Array] | None:
-    """Name and values `(n,)` of the resistance that a table gives, as a column or once for all rows."""
+def column_of(
+    columns: Mapping[str, Array], metadata: Mapping[str, float | str]
+) -> tuple[str, Array] | DataRefused | None:
+    """Name and values `(n,)` of the resistance that a table gives, as a column or once for all rows; of several pairs of
+    terminals their mean. DataRefused: the pairs are not of one winding."""
     rows = next(iter(columns.values())).size
-    for name in POINT_RESISTANCES:
-        if name in columns:
-            return name, np.asarray(columns[name], dtype=float)
-        if isinstance(said := metadata.get(name), float | int):
-            return name, np.full(rows, float(said))
-    return None
+    given = {n: ohm for n in POINT_RESISTANCES if (ohm := _given(n, columns, metadata, rows)) is not None}
+    pairs = {name: given[name] for name in TERMINAL_PAIRS if name in given}
+    return _of_pairs(pairs) if len(pairs) > 1 else next(iter(given.items()), None)
+
+
+def _given(name: str, columns: Mapping[str, Array], metadata: Mapping[str, float | str], rows: int) -> Array | None:
+    if name in columns:
+        return np.asarray(columns[name], dtype=float)
+    said = metadata.get(name)
+    return np.full(rows, float(said)) if isinstance(said, float | int) else None
+
+
+def _of_pairs(pairs: Mapping[str, Array]) -> tuple[str, Array] | DataRefused:
+    means = {name: float(np.mean(ohm)) for name, ohm in pairs.items()}
+    if max(means.values()) > (1.0 + PAIRS_APART) * min(means.values()):
+        return refused(
+            "the resistances between the terminals differ", ", ".join(f"{name} {ohm:.4g}" for name, ohm in means.items()),
+            f"{PAIRS_APART:.0%} between the largest and the least",
+            "check their units and the contacts; a winding of other resistance than its neighbours is a fault of the motor",
+        )  # fmt: skip
+    return next(iter(pairs)), np.asarray(np.mean(list(pairs.values()), axis=0))
+
+
+def unread_columns(columns: Iterable[str]) -> list[str]:
+    """Columns that look like the windings' resistance and are called by no name that is known."""
+    return [name for name in columns if name not in POINT_RESISTANCES and LIKE_RESISTANCE.search(name)]
 
 
 def star_resistance(
@@ -69,7 +100,7 @@ def star_resistance(
     told = _told(name, metadata)
     if isinstance(told, DataRefused):
         return told
-    readings = _readings(told, str(metadata.get("connection", "")))
+    readings = _readings(told, str(connection_of(metadata.get("connection", ""))))
     if not readings:
         return refused(
             f"{name} is of one winding, and whether the windings are in star or in delta is not told", float(ohm[0]),
@@ -104,7 +135,7 @@ def _told(name: str, metadata: Mapping[str, float | str]) -> str | DataRefused |
         )
     if SAID_BY_NAME.get(name, key) != key:
         return refused(
-            f"{name} says between two terminals, resistance_measured says {KINDS[key]}", key, "one of the two",
+            f"{name} says {KINDS[SAID_BY_NAME[name]]}, resistance_measured says {KINDS[key]}", key, "one of the two",
             "rename the column resistance_ohm, or correct resistance_measured",
         )  # fmt: skip
     return key
@@ -130,7 +161,7 @@ def rotor_ohm(star_ohm: Array, measured_ohm: Array) -> float:
 
 
 def _is_possible(star_ohm: Array, measured_ohm: Array, metadata: Mapping[str, float | str], *, is_locked: bool) -> bool:
-    if np.any(star_ohm >= measured_ohm):
+    if np.any(star_ohm <= 0.0) or np.any(star_ohm >= measured_ohm):
         return False
     if not is_locked:
         return True

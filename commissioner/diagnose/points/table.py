@@ -11,7 +11,7 @@ import numpy as np
 
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
-from commissioner.diagnose.points.resistance import column_of, star_resistance
+from commissioner.diagnose.points.resistance import column_of, star_resistance, unread_columns
 from commissioner.errors import DataRefused
 from commissioner.records import POINT_COLUMNS
 
@@ -51,6 +51,8 @@ def read_points(
     if (lacks := lacking(columns)) is not None:
         return lacks
     resistance = column_of(columns, said)
+    if isinstance(resistance, DataRefused):
+        return resistance
     names = (*POINT_COLUMNS, *([resistance[0]] if resistance else []))
     everything = {**columns, resistance[0]: resistance[1]} if resistance else columns
     for column in names:
@@ -72,15 +74,24 @@ def read_points(
         return refusal
     remarks = [f"{copies} rows are copies of others: each was taken once."] if copies else []
     if resistance is None:
-        remarks.append(
-            "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point): windings that "
-            "warm up or cool down during the test count as the rotor's resistance or as loss."
-        )
+        remarks.append(_without_resistance(columns))
         return Points(name, f, v, i, p, None, is_locked, tuple(remarks))
     ohm = star_resistance(resistance[0], rows[:, 4], p / (3.0 * i**2), said, is_locked=is_locked)
     if isinstance(ohm, DataRefused):
         return ohm
     return Points(name, f, v, i, p, ohm.star_ohm, is_locked, (*remarks, *ohm.remarks))
+
+
+def _without_resistance(columns: Mapping[str, Array]) -> str:
+    """Why none is known, and what follows from it."""
+    unread = unread_columns(columns)
+    why = (
+        f"What is in {', '.join(unread)} was not understood as a winding resistance and not used; name it winding_resistance_uv_ohm "
+        "(between two terminals) or winding_resistance_phase_ohm (of one winding)"
+        if unread
+        else "No winding resistance is given (column winding_resistance_uv_ohm, between two terminals, at every point)"
+    )
+    return f"{why}: windings that warm up or cool down during the test count as the rotor's resistance or as loss."
 
 
 def _not_usable(f: Array, v: Array, i: Array, p: Array, *, is_locked: bool) -> DataRefused | None:

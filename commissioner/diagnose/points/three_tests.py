@@ -272,6 +272,8 @@ def _stator(
         return 0.5 * ohm, "Direct current was taken as flowing between two terminals: R_s is half of U / I."
     for table in tables:
         found = column_of(table, said)
+        if isinstance(found, DataRefused):
+            return found
         if found is not None and np.isfinite(found[1]).any():
             ohms = np.full(1, float(np.nanmean(found[1])))
             given = star_resistance(found[0], ohms, locked.resistance_ohm[:1], said, is_locked=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from commissioner.errors import DataRefused
 from commissioner.recordings.bounds import MAX_COLUMNS
 from commissioner.recordings.reading.cells import is_number, is_numeric
+from commissioner.recordings.reading.preface import SIGNS
 from commissioner.recordings.units import is_unit, read_unit, unit_in
 
 MAX_PREFACE_LINES = 400
@@ -75,6 +76,18 @@ def split(line: str, separator: str) -> Row:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
     except csv.Error:
         return []
+
+
+def _said(line: str, separator: str) -> Row:
+    """The cells of a line above the numbers; of a comment a number whole that its comma would cut (`# rated_current_a: 4,86`)."""
+    cells = split(line.lstrip("# "), separator)
+    if separator != "," or not line.startswith("#"):
+        return cells
+    out = cells[:1]
+    for cell in cells[1:]:
+        is_cut = SIGNS.match(out[-1]) and out[-1][-1].isdigit() and cell[:1].isdigit() and not SIGNS.match(cell)
+        out = [*out[:-1], f"{out[-1]},{cell}"] if is_cut else [*out, cell]
+    return out
 
 
 def layout_of(text: str, source: str) -> Layout:
@@ -158,8 +171,8 @@ def _layout(lines: Sequence[_Line], first: int, separator: str, skip: int, rows:
 
 def _cells_above(text: str, separator: str, width: int) -> Row:
     """The cells of a line above the numbers; by another separator where that gives one for each column and theirs does not."""
-    bare = text.lstrip("\ufeff").lstrip("# ")
-    ways = [split(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
+    bare = text.lstrip("\ufeff")
+    ways = [_said(bare, mark) for mark in dict.fromkeys((separator, ";", "\t", ","))]
     return next((row for row in ways if len(row) == width), ways[0])
 
 

@@ -17,8 +17,10 @@ from commissioner.recordings.names import (
     is_remark,
     is_sheet,
     meaning_of,
+    resistance_meaning,
     reversed_pair,
-    sheet_meaning,
+    sheet_column,
+    sheet_unit,
     turned,
     unit_of,
     uses_rst,
@@ -38,6 +40,7 @@ SAME_TIME = 0.01
 """Of a sample period, by which two columns of one time may differ."""
 CHANNEL = re.compile(r"(?:ch|chan|channel|kanal|voie|c|trace|math|通道)[ ._]?\d*[a-h]?\d{0,2}", re.IGNORECASE)
 """What an instrument calls a channel that nobody has named."""
+_QUANTITY = re.compile(r"(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\D\S*)?")
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ def recognise(
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
+    meaning: str | None
     readings, notes, unnamed = [], [], []
     order = sorted(range(len(names)), key=lambda k: (names[k] not in targets, names[k] not in CONTRACT_COLUMNS, k))
     for k in order:
@@ -67,10 +71,11 @@ def recognise(
             continue
         target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
         is_asked = name in from_zero and target is None
-        meaning, factor = (None, 1.0) if is_asked else _meaning(meant[name], unit, target, with_s, source)
-        if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_meaning(name)):
-            unit = unit or _power_unit(name)
+        if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_column(name)):
+            unit = unit or sheet_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
+        else:
+            meaning, factor = (None, 1.0) if is_asked else _meaning(meant[name], unit, target, with_s, source)
         if meaning in columns:
             if meaning == "time_s":
                 _require_one_time(names, (place[meaning], k), (columns[meaning], factor * values[k]), source)
@@ -114,9 +119,16 @@ def _own_unit(name: str) -> str:
     return next((SHOWN[measures] for ending, measures in MEASURES.items() if name.endswith(ending)), "")
 
 
-def _power_unit(name: str) -> str:
-    """`kw` at the end of a test sheet's `power_kw`, which no other column has."""
-    return "kW" if name.lower().endswith("_kw") else ""
+def resistances_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float]:
+    """What lines above a test sheet say of the windings' resistance (`# R_uv (mOhm): 1520`), by the contract's names, in ohm."""
+    out: dict[str, float] = {}
+    for name, value in metadata.items():
+        meaning, said = resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
+        if meaning is None or said is None or name in CONTRACT_COLUMNS:
+            continue
+        unit = said[2] or unit_of(name) or sheet_unit(name)
+        out[meaning] = _factor(name, unit, meaning, source) * float(said[1].replace(",", "."))
+    return out
 
 
 def _bare(name: str) -> str:

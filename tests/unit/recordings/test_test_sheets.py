@@ -10,6 +10,7 @@ import pytest
 from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
+from commissioner.recordings.names import resistance_meaning
 
 SHEETS = {
     "contract": "test,frequency_hz,voltage_line_v,current_line_a,power_w\ndc,0,13.6,28.0,380.8\nno_load,60,208,8.17,420\n"
@@ -107,3 +108,89 @@ def test_a_sheet_with_most_of_the_contracts_columns_is_told_which_it_lacks(tmp_p
     with pytest.raises(DataRefused, match=f"needs the column {lacks}$") as refused:
         identify_any(IdentifyRequest((path,)))
     assert "sqrt(3) times phase ones" in refused.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("R_UV [Ohm]", "winding_resistance_uv_ohm"),
+        ("R 1-2", "winding_resistance_uv_ohm"),
+        ("Wicklungswiderstand V-W [Ω]", "winding_resistance_vw_ohm"),
+        ("winding_resistance_wu_mohm", "winding_resistance_wu_ohm"),
+        ("R_ac (mOhm)", "winding_resistance_wu_ohm"),
+        ("Terminal resistance", "winding_resistance_line_ohm"),
+        ("Klemmenwiderstand", "winding_resistance_line_ohm"),
+        ("Strangwiderstand [Ohm]", "winding_resistance_phase_ohm"),
+        ("Winding resistance per phase", "winding_resistance_phase_ohm"),
+        ("Wicklungswiderstand", "winding_resistance_ohm"),
+        ("Ständerwiderstand", "stator_resistance_ohm"),
+        ("R_s/Ohm", "stator_resistance_ohm"),
+        ("R_ph", "phase_resistance_ohm"),
+        ("Résistance (ohm)", "resistance_ohm"),
+        ("R_u1", None),
+        ("RPM", None),
+        ("R", None),
+    ],
+)
+def test_a_winding_resistance_is_known_by_anybodys_name(name: str, column: str | None) -> None:
+    assert resistance_meaning(name) == column
+
+
+HEAD = "# connection: delta\ntest,f (Hz),U (V),I (A),P (W)"
+
+
+@pytest.mark.parametrize(
+    ("above", "name", "cell"),
+    [
+        ("", ",R_UV [Ohm]", ",0.4858"),
+        ("", ",R_uv (mOhm)", ",485.8"),
+        ("", ",winding_resistance_uv_mohm", ",485.8"),
+        ("", ",Strangwiderstand [Ohm]", ",0.7287"),
+        ("", ",R_UV,R_VW,R_WU", ",0.4758,0.4858,0.4958"),
+        ("# R_uv (mOhm): 485.8\n", "", ""),
+        ("# Wicklungswiderstand U-V: 0,4858 Ohm\n", "", ""),
+        ("# winding_resistance_phase_ohm: 0.7287\n", "", ""),
+    ],
+)
+def test_it_is_read_in_ohm_per_star_phase(tmp_path: Path, above: str, name: str, cell: str) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"{above}{HEAD}{name}\nno load,60,208,8.17,420{cell}\nlocked rotor,15,25,27.9,920{cell}\n", "utf-8")
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    assert done.document["parameters"]["stator_resistance_ohm"]["value"] == pytest.approx(0.2429)
+
+
+@pytest.mark.parametrize("ohm", ["0", "0.9"])
+def test_a_resistance_that_leaves_no_rotor_is_refused(tmp_path: Path, ohm: str) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"{HEAD},R_UV\nno load,60,208,8.17,420,{ohm}\nlocked rotor,15,25,27.9,920,{ohm}\n")
+    with pytest.raises(DataRefused, match="winding_resistance_uv_ohm does not fit the points"):
+        identify_any(IdentifyRequest((path,)))
+
+
+def test_a_decimal_comma_in_a_comment_is_no_whole_number(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"# rated_current_a: 4,86\n{HEAD}\nno load,60,208,8.17,420\nlocked rotor,15,25,27.9,920\n")
+    with pytest.raises(DataRefused, match="rated_current_a is no positive number") as refused:
+        identify_any(IdentifyRequest((path,)))
+    assert refused.value.value == "4,86"
+
+
+def test_pairs_of_terminals_that_differ_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    row = "0.4858,0.4858,0.7"
+    path.write_text(f"{HEAD},R_UV,R_VW,R_WU\nno load,60,208,8.17,420,{row}\nlocked rotor,15,25,27.9,920,{row}\n")
+    with pytest.raises(DataRefused, match="between the terminals differ"):
+        identify_any(IdentifyRequest((path,)))
+
+
+def test_a_resistance_that_is_not_understood_is_said_and_two_frequencies_are_not_called_one(tmp_path: Path) -> None:
+    path = tmp_path / "locked.csv"
+    rows = "".join(
+        f"{f},{k * v},{k},{k * k * p},5\n" for f, v, p in ((50, 33.6, 38.5), (25, 26.0, 38.4)) for k in (1, 1.5, 2)
+    )
+    path.write_text(f"f (Hz),U (V),I (A),P (W),R_u1 (Ohm)\n{rows}")
+    said = " ".join(diagnose(DiagnoseRequest((path,))).document["remarks"])
+    assert "What is in R_u1 (Ohm) was not understood as a winding resistance" in said
+    assert "25 ... 50 Hz tell the rotor at slip frequency only with the stator's resistance" in said
+    assert "one frequency" not in said and "No winding resistance" not in said
