@@ -36,7 +36,8 @@ Vector = NDArray[np.complex128]
 @dataclass(frozen=True)
 class SlowRotor:
     """R_R at running slip and its error, at the lowest and highest frequency measured; L_sigma there; p value of constant
-    bars; `tied`: what the points do not fix."""
+    bars; `tied`: what the points do not fix; `left_out` and `fitted`: `(n, 2)` relative errors of current and power by the better of
+    deep bar and two cages, which has `numbers` of its own."""
 
     resistance_ohm: float
     std_ohm: float
@@ -44,6 +45,9 @@ class SlowRotor:
     rise_over_range: tuple[float, float]
     p_value: float
     tied: tuple[str, ...]
+    left_out: Array
+    fitted: Array
+    numbers: int
 
 
 def slow_rotor(points: Points) -> SlowRotor | None:
@@ -68,9 +72,10 @@ def slow_rotor(points: Points) -> SlowRotor | None:
     rises = [f.rise for f in all_three]
     rise = float(weight @ rises)
     value = float(np.exp(mean))
+    displaced = others[int(np.argmax(weight[1:]))]
     return SlowRotor(
         value, value * std, (at[0], at[1]), (rise, float(np.sqrt(weight @ (np.array(rises) - rise) ** 2)) + scatter),
-        p_value, others[int(np.argmax(weight[1:]))].tied,
+        p_value, displaced.tied, displaced.left_out, displaced.fitted, displaced.x.size,
     )  # fmt: skip
 
 
@@ -86,7 +91,7 @@ class _Fit:
     """One circuit fitted to the impedances with its priors; numbers are logarithms but for the saturation and the logit."""
 
     def __init__(self, points: Points, z: Vector, scatter: float, family: str) -> None:
-        self.points, self.family = points, family
+        self.points, self.z, self.family = points, z, family
         self.stator = points.resistance_ohm if points.resistance_ohm is not None else np.zeros(points.count)
         self.size = np.abs(z + self.stator) * scatter
         leak = float(np.median(z.imag / points.omega))
@@ -107,7 +112,7 @@ class _Fit:
 
         found = least_squares(errors, start, x_scale="jac", max_nfev=200)
         self.x, self.missed = found.x, found.fun[: 2 * z.size]
-        self.covariance = np.linalg.pinv(found.jac.T @ found.jac)
+        self.jacobian, self.covariance = found.jac, np.linalg.pinv(found.jac.T @ found.jac)
         sign, size = np.linalg.slogdet(found.jac.T @ found.jac)
         self.log_evidence = -0.5 * float(found.fun @ found.fun) - 0.5 * float(size if sign > 0 else 0.0)
 
@@ -158,6 +163,27 @@ class _Fit:
             step[k] = 1e-4
             gradient[k] = (self._log_slow(self.x + step) - self._log_slow(self.x - step)) / 2e-4
         return float(np.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0)))
+
+    @property
+    def left_out(self) -> Array:
+        """`(n, 2)` as `fitted`, of each point by the fit without it, to first order."""
+        n = self.points.count
+        reach = self.jacobian[: 2 * n] @ self.covariance @ self.jacobian[: 2 * n].T
+        own = np.moveaxis(reach.reshape(2, n, 2, n).diagonal(axis1=1, axis2=3), -1, 0)
+        errors = np.linalg.solve(np.eye(2) * (1.0 + 1e-9) - own, self.missed.reshape(2, n).T[..., None])[..., 0]
+        return self.relative(self.z + self.size * (errors[:, 0] + 1j * errors[:, 1]))
+
+    @property
+    def fitted(self) -> Array:
+        """`(n, 2)` relative errors of current and power at the measured voltage."""
+        return self.relative(self.predicted(self.x))
+
+    def relative(self, z: Vector) -> Array:
+        """Errors of current and power where the impedance beyond the stator is `z`."""
+        p, whole = self.points, z + self.stator
+        current = p.phase_voltage_v / np.abs(whole)
+        power = 3.0 * current**2 * whole.real
+        return np.column_stack([current / p.current_line_a - 1.0, power / p.power_w - 1.0])
 
     @property
     def rise(self) -> float:

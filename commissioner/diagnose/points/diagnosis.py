@@ -122,10 +122,8 @@ def _conclude(
     causes = []
     x, covariance, left = fit_points(points, accepted, scale)
     unit = np.array([scale["current_scatter"], scale["power_scatter"]])
-    freedom = max(1.0 - x.size / (2.0 * points.count), 0.25)
-    missed = dict(
-        zip(MOST_SCATTER, np.sqrt(np.mean((left.reshape(2, -1).T * unit) ** 2, axis=0) / freedom).tolist(), strict=True)
-    )
+    after = PointErrors(held_after * unit, left.reshape(2, -1).T * unit)
+    missed = _missed(after, x.size)
     at = 2
     for extension in accepted:
         others = [e for e in accepted if e.name != extension.name]
@@ -136,16 +134,15 @@ def _conclude(
         at += extension.does.numbers
     slow = slow_rotor(points)
     if slow is not None and slow.p_value < SIGNIFICANCE and slow.rise_over_range[0] > LEAST_RISE:
-        causes = _with_bars(causes, slow)
+        causes, bars = _with_bars(causes, slow), PointErrors(slow.left_out, slow.fitted)
+        if _beyond_instruments(of_bars := _missed(bars, slow.numbers)) < _beyond_instruments(missed):
+            after, missed = bars, of_bars
     if points.is_locked:
         remark = remark_of(slow, np.unique(points.frequency_hz).tolist())
         points = replace(points, remarks=(*points.remarks, remark))
     verdict, reason = _verdict(points, causes, tested, missed)
     plain = fit_points(points, [], scale)
-    before, after = (
-        PointErrors(held * unit, fitted.reshape(2, -1).T * unit)
-        for held, fitted in ((held_before, plain[2]), (held_after, left))
-    )
+    before = PointErrors(held_before * unit, plain[2].reshape(2, -1).T * unit)
     rms = [float(np.sqrt(np.mean((e.left_out[:, 0] * points.current_line_a) ** 2))) for e in (before, after)]
     relative = [float(np.sqrt(np.mean(e.left_out**2))) for e in (before, after)]
     gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0
@@ -181,11 +178,22 @@ def _with_bars(causes: Sequence[PointCause], slow: SlowRotor) -> list[PointCause
     return [*causes, PointCause(bars, sizes, slow.p_value, 0.0)]
 
 
+def _missed(errors: PointErrors, numbers: int) -> dict[str, float]:
+    """Rms of the fitted points' errors, by what they are of, for the numbers that were fitted."""
+    freedom = max(1.0 - numbers / (2.0 * errors.fitted.shape[0]), 0.25)
+    return dict(zip(MOST_SCATTER, np.sqrt(np.mean(errors.fitted**2, axis=0) / freedom).tolist(), strict=True))
+
+
+def _beyond_instruments(missed: Mapping[str, float]) -> float:
+    """The larger of both errors over what instruments may make."""
+    return max(missed[what] / most for what, most in MOST_SCATTER.items())
+
+
 def _verdict(
     points: Points, causes: Sequence[PointCause], tested: Mapping[str, float], missed: Mapping[str, float]
 ) -> tuple[str, str]:
     where = f"the {'locked-rotor' if points.is_locked else 'no-load'} points"
-    if any(missed[what] > most for what, most in MOST_SCATTER.items()):
+    if _beyond_instruments(missed) > 1.0:
         errors = " and ".join(
             f"{missed[what]:.1%} in {what} (instruments: up to {most:.0%})" for what, most in MOST_SCATTER.items()
         )
