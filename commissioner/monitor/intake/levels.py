@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from commissioner.monitor.intake.findings import Finding, Fundamental
+from commissioner.monitor.intake.sensors import OPEN_SUM
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import Signal
@@ -82,7 +83,7 @@ def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], fin
         Finding(
             "open_sum", "refused",
             f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
-            gain, "1, within a tenth",
+            gain, f"{(1 - 2 * OPEN_SUM) / (1 + OPEN_SUM):.2f} ... {(1 + 2 * OPEN_SUM) / (1 - OPEN_SUM):.2f}",
             f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
         )
     )  # fmt: skip
