@@ -4,13 +4,12 @@
     d psi_R/dt = R_R i - alpha psi_R
 
 Both eigenvalues are real, negative and distinct (a circuit of resistors and one kind of store), so a held voltage has
-a closed-form response and the four numbers can be read back from it without approximation.
+a closed-form response from which the four numbers could be read back without approximation.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +18,6 @@ from commissioner.compiled import njit
 from commissioner.motor.circuit import InverseGamma
 
 Matrix = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class PulseTransfer:
-    """Voltage (held over each period) to sampled current: (b1 z + b0) / (z^2 + a1 z + a0)."""
-
-    a1: float
-    a0: float
-    b1: float
-    b0: float
 
 
 def poles_per_s(machine: InverseGamma) -> tuple[float, float]:
@@ -61,14 +50,10 @@ def held_input(machine: InverseGamma, period_s: float) -> tuple[Matrix, Matrix]:
     return np.array([[d11, d12], [d21, d22]]), np.array([w11 / l_s, w21 / l_s])
 
 
-def to_pulse_transfer(machine: InverseGamma, period_s: float) -> PulseTransfer:
-    """The z-transform of the machine behind a zero-order hold."""
-    return PulseTransfer(*pulse_transfers(np.array([machine.as_tuple()]), period_s)[0].tolist())
-
-
 @njit()
 def pulse_transfers(machines: Matrix, period_s: float) -> Matrix:
-    """(n, 4): (a1, a0, b1, b0) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M)."""
+    """(n, 4): (a1, a0, b1, b0) of `machines` (n, 4), rows of (R_s, R_R, L_sigma, L_M), behind a zero-order hold: voltage (held
+    over each period) to sampled current is (b1 z + b0) / (z^2 + a1 z + a0)."""
     out = np.empty_like(machines)
     for k in range(machines.shape[0]):
         r_s, r_r, l_s, l_m = machines[k]
@@ -83,36 +68,6 @@ def pulse_transfers(machines: Matrix, period_s: float) -> Matrix:
         out[k, 0], out[k, 1] = -(slow_z + fast_z), slow_z * fast_z
         out[k, 2], out[k, 3] = residue_slow + residue_fast, -(residue_slow * fast_z + residue_fast * slow_z)
     return out
-
-
-def from_pulse_transfer(transfer: PulseTransfer, period_s: float) -> InverseGamma | None:
-    """The machine with exactly this pulse transfer; None where no passive machine has it."""
-    half = -0.5 * transfer.a1
-    root = half * half - transfer.a0
-    if not (root > 0.0 and transfer.a0 > 0.0):
-        return None
-    slow_z = half + math.sqrt(root)
-    fast_z = transfer.a0 / slow_z
-    if not 0.0 < fast_z < slow_z < 1.0:
-        return None
-    slow, fast = math.log(slow_z) / period_s, math.log(fast_z) / period_s
-    residue_slow = (transfer.b1 * slow_z + transfer.b0) / (slow_z - fast_z) * slow / (slow_z - 1.0)
-    residue_fast = (transfer.b1 * fast_z + transfer.b0) / (fast_z - slow_z) * fast / (fast_z - 1.0)
-    return from_poles_and_residues(slow, fast, residue_slow, residue_fast)
-
-
-def from_poles_and_residues(slow: float, fast: float, residue_slow: float, residue_fast: float) -> InverseGamma | None:
-    """The machine whose admittance is r_s/(s - slow) + r_f/(s - fast); None where a parameter is not positive."""
-    total = residue_slow + residue_fast
-    if not (residue_slow > 0.0 and residue_fast > 0.0):
-        return None
-    leakage_h = 1.0 / total
-    alpha = -(residue_slow * fast + residue_fast * slow) / total
-    stator_ohm = slow * fast * leakage_h / alpha
-    rotor_ohm = (-(slow + fast) - alpha) * leakage_h - stator_ohm
-    if not (alpha > 0.0 and stator_ohm > 0.0 and rotor_ohm > 0.0):
-        return None
-    return InverseGamma(stator_ohm, rotor_ohm, leakage_h, rotor_ohm / alpha)
 
 
 def admittance_s(machine: InverseGamma, frequency_hz: Matrix) -> NDArray[np.complex128]:

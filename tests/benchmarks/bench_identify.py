@@ -14,13 +14,13 @@ from scipy.linalg import expm
 from scipy.optimize import fmin, least_squares
 from scipy.signal import lfilter
 
-from commissioner.identify.batch.bound import cramer_rao
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.segments import Segment
 from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior
 from tests.benchmarks.pairs import Pair, timed
+from tests.support.exact.cramer_rao import cramer_rao
 from tests.support.standstill import linear_current, multitone, usable_motors
 
 PERIOD_S = 3e-4

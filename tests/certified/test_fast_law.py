@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from commissioner.identify.batch.bound import cramer_rao
 from commissioner.identify.excite.tones import ExcitationLimits, design
 from commissioner.identify.observer.observer import ParallelObserver
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import prior, rated_flux
+from tests.support.exact.cramer_rao import cramer_rao
 from tests.support.standstill import linear_current, usable_motors
 
 PERIOD_S = 2e-4

@@ -12,8 +12,6 @@ RULES, rule = rules_of("The commissioning map: command and state")
 
 DISABLED, READY, SWITCHED_ON = DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON
 OFF_ITEMS = ("current_magnitude_a", "present_scale", "present_bias_v", "test_time_left_s")
-SEEN_AT_ONCE = 40
-"""Polls of 5 ms."""
 
 
 @rule

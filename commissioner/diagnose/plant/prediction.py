@@ -37,7 +37,6 @@ class Prediction:
     rotor_current_a: Array
     iron_flux_wb: Array
     leakage_flux_wb: Array
-    slope_before: Array
     last_rotor_flux_wb: tuple[float, float]
 
 
@@ -84,9 +83,7 @@ def predict(
     iron = (1.0 - nu) * path.states[:-1, 2:4].T + nu * path.states[:-1, 0:2].T
     leakage = (path.states[:-1, 0:2] - path.machine.base[12] * path.states[:-1, 2:4]).T
     last = path.states[-1, 2:4]
-    return Prediction(
-        measured, jacobian, path.rotor_current, iron, leakage, path.before, (float(last[0]), float(last[1]))
-    )
+    return Prediction(measured, jacobian, path.rotor_current, iron, leakage, (float(last[0]), float(last[1])))
 
 
 def _to_phases(tangent: Array, scale: Array, jacobian: Array, rows: list[int]) -> None:

@@ -1,1 +1,1 @@
-"""The joint least-squares fit of segments, its bound and the whiteness of what is left."""
+"""The joint least-squares fit of segments and the whiteness of what is left."""

@@ -66,10 +66,9 @@ def fit_segments(
             "the model cannot be simulated from this start", step="identify", value=start, limit="finite currents",
             remedy="check that the nameplate belongs to the motor",
         )  # fmt: skip
-    damping, converged, iterations, last_size = FIRST_DAMPING, False, 0, 0.0
+    damping, converged, last_size = FIRST_DAMPING, False, 0.0
     spare: Evaluation | None = None
     for _ in range(max_iterations):
-        iterations += 1
         step = _step(problem, present, theta, damping)
         new_theta, new_own = _apply(problem, theta, own, step)
         near = present if _largest_share(problem, step, theta) < NEAR else None
@@ -101,7 +100,7 @@ def fit_segments(
                 break
     if present.is_near and not is_coarse:
         present = problem.evaluate(theta, own, over=spare)
-    return _result(problem, theta, own, present, iterations, converged)
+    return _result(problem, theta, own, present, converged)
 
 
 def _step(problem: Problem, at: Evaluation, theta: Matrix, damping: float) -> Matrix:
@@ -157,7 +156,7 @@ def _size_in_std(problem: Problem, step: Matrix, at: Evaluation, theta: Matrix) 
     return float(np.max(in_std[steps >= 1e-10 * np.abs(theta[shared])], initial=0.0))
 
 
-def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterations: int, converged: bool) -> BatchFit:
+def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, converged: bool) -> BatchFit:
     free = np.flatnonzero(problem.free)
     information = at.information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -187,11 +186,8 @@ def _result(problem: Problem, theta: Matrix, own: Matrix, at: Evaluation, iterat
         residuals=tuple(s.measured(r) for s, r in zip(problem.segments, at.residuals, strict=True)),
         stator_flux_wb=tuple(at.flux),
         own=own,
-        iterations=iterations,
         has_converged=converged,
-        condition=float(np.linalg.cond(normal)),
         sample_period_s=problem.period_s,
-        sandwich_ratio=float(np.max(ratio[:CIRCUIT])),
     )
     fit.covariance[0, 0] += fit.leg_doubt_ohm**2
     return fit

@@ -50,11 +50,8 @@ class BatchFit:
     stator_flux_wb: tuple[Signal, ...]
     own: Matrix
     """(segments, 3): each segment's sensor offset in A and initial fluxes in Wb."""
-    iterations: int
     has_converged: bool
-    condition: float
     sample_period_s: float
-    sandwich_ratio: float
 
     @property
     def noise_a(self) -> float:

@@ -47,7 +47,6 @@ class AxisResult:
     covariance: Matrix
     law_error: Matrix
     batch: BatchFit
-    observer_parameters: InverseGamma
     disagreement_sigmas: float
     whiteness: Whiteness
     residual_rms_a: float
@@ -196,7 +195,6 @@ def judge_axis(fit: AxisFit, plate: Nameplate, period_s: float, estimator: Estim
         covariance=covariance + np.diag(np.square(law_error * least_squares)),
         law_error=law_error,
         batch=batch,
-        observer_parameters=pao,
         disagreement_sigmas=disagreement,
         whiteness=batch.whiteness() if estimator == "nls" else whiteness(observer.residuals),
         residual_rms_a=batch.noise_a if estimator == "nls" else observer.residual_rms_a,

@@ -49,14 +49,12 @@ class FluxAdvice(enum.Enum):
 
 @dataclass(frozen=True)
 class FluxReading:
-    """Peaks of the stator flux since the last reading (observer, model-free), its predicted peak, `fraction` of the
-    limit reached by the largest, and what to do. `current_fraction`: the largest current seen or predicted, of what the
+    """Peaks of the stator flux since the last reading (observer, model-free), `fraction` of the limit reached by the largest
+    of them and the predicted one, and what to do. `current_fraction`: the largest current seen or predicted, of what the
     guard acts at."""
 
     observer_wb: float
     model_free_wb: float
-    predicted_wb: float
-    rotor_wb: float
     fraction: float
     current_fraction: float
     advice: FluxAdvice
@@ -148,10 +146,7 @@ class FluxGuard:
         permitted = self._permit(estimate, present_scale, time_s, current_a)
         agreed_wb = min(observer_wb, model_free_wb)
         advice, permitted = self._advise(fraction, current_fraction, agreed_wb, present_scale, permitted, time_s)
-        rotor_wb = peak(estimate.rotor_flux_wb)
-        return FluxReading(
-            observer_wb, model_free_wb, predicted_wb, rotor_wb, fraction, current_fraction, advice, permitted
-        )
+        return FluxReading(observer_wb, model_free_wb, fraction, current_fraction, advice, permitted)
 
     # -- estimates ------------------------------------------------------------------------------------------------
 

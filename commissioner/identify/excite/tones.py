@@ -80,8 +80,7 @@ class ExcitationLimits:
 class DesignedExcitation:
     """The excitation, what it will drive through the machine it was designed for, and what it should yield.
 
-    `relative_std` is (R_s, R_R, L_sigma, L_M) for a sensor noise of `noise_a`; it falls with the square root of the time:
-    `seconds_for_half` says what halving it costs.
+    `relative_std` is (R_s, R_R, L_sigma, L_M) for a sensor noise of `noise_a`; it falls with the square root of the time.
     """
 
     excitation: Excitation
@@ -90,10 +89,6 @@ class DesignedExcitation:
     relative_std: tuple[float, float, float, float]
     seconds: float
     noise_a: float
-
-    @property
-    def seconds_for_half(self) -> float:
-        return 4.0 * self.seconds
 
 
 def design(

@@ -70,15 +70,11 @@ IDEAL_INVERTER = InverterError((0.0, 1.0), (0.0, 0.0), (0.0, 0.0))
 
 @dataclass(frozen=True)
 class DcLevel:
-    """Mean voltage and current of a stretch of nearly constant voltage; `std_a` is that of the mean current.
-
-    `rise_a_per_s` is the current's slope there: zero at a settled level, not while the voltage climbs.
-    """
+    """Mean voltage and current of a stretch of nearly constant voltage; `std_a` is that of the mean current."""
 
     voltage_v: float
     current_a: float
     std_a: float
-    rise_a_per_s: float = 0.0
 
 
 def dc_levels(voltage_v: Signal, current_a: Signal, tail: float = 0.4) -> list[DcLevel]:
@@ -146,13 +142,12 @@ def staircase(nameplate: Nameplate, limits: StaircaseLimits, seen_inductance_h: 
 
 @dataclass(frozen=True)
 class Staircase:
-    """What the levels say. `error_voltage` is one leg's plateau; `residual_v` the rms misfit of the levels."""
+    """What the levels say. `error_voltage` is one leg's plateau."""
 
     stator_resistance: Quantity
     error_voltage: Quantity
     offset_a: float
     inverter: InverterError
-    residual_v: float
     levels: tuple[DcLevel, ...]
 
 
@@ -200,7 +195,6 @@ def fit_staircase(levels: Sequence[DcLevel], axis_deg: float) -> Staircase:
         error_voltage=Quantity(float(best.values[1]), float(spread[1] + abs(mean[1] - best.values[1]))),
         offset_a=float(best.values[3]),
         inverter=InverterError(shape.current_a, shape.voltage_v, (float(spread[1]),) * len(shape.current_a)),
-        residual_v=math.sqrt(best.misfit),
         levels=tuple(levels),
     )
 

@@ -78,8 +78,6 @@ class Fitted:
     log_covariance: NDArray[np.float64]
     open_direction: NDArray[np.float64]
     open_share: float
-    chi_square_per_line: float
-    imaginary_share: float
     held_covariance: NDArray[np.float64]
     log_per_s: NDArray[np.float64]
     delay_s: float = 0.0
@@ -144,15 +142,11 @@ def fit(problem: Problem, start: Start, first: TCircuit | None = None) -> Fitted
     full = np.linalg.inv(jacobian.T @ jacobian)
     covariance, per_unit = full[:4, :4], full[:4, 4] / full[4, 4]
     direction, share = _open(covariance, prior)
-    _, upper, lower = complex_speed(circuit, problem.pole_pairs, found.lines, problem.on)
-    imaginary, total = np.sum(np.abs(upper - lower) ** 2), np.sum(np.abs(upper + lower) ** 2)
     return Fitted(
         circuit,
         covariance,
         direction,
         share,
-        float(np.mean(np.abs(data) ** 2)),
-        float(np.sqrt(imaginary / total)) if total else 0.0,
         covariance - np.outer(per_unit, per_unit) * full[4, 4],
         per_unit / unit,
         delay,

@@ -120,9 +120,7 @@ class UnderTest:
         self._lost += block.lost_before
         self.peak_fraction = max(self.peak_fraction, reached_wb / self.limit_wb)
         self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self.peak_fraction)
-        return FluxReading(
-            reached_wb, reached_wb, predicted_wb, 0.0, predicted_wb / self.limit_wb, 0.0, FluxAdvice.HOLD, self.scale
-        )
+        return FluxReading(reached_wb, reached_wb, predicted_wb / self.limit_wb, 0.0, FluxAdvice.HOLD, self.scale)
 
     def answer(self, reading: FluxReading) -> float | None:
         """The amplitude to ask for now, or None to leave it. Raises Aborted where the guard says so."""

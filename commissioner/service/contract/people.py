@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, NotRequired
+from typing import NotRequired
 
 from typing_extensions import TypedDict
-
-RoleName = Literal["viewer", "operator", "administrator"]
 
 
 class LoggedIn(TypedDict):

@@ -34,11 +34,6 @@ def live_document(state: RunState, current_now_a: float) -> LiveDocument:
     }
 
 
-def history_document(state: RunState) -> list[list[float]]:
-    """Every estimate of the running test so far."""
-    return state.history
-
-
 def _tuning(tuning: OwnTuning | None) -> LiveTuning | None:
     if tuning is None:
         return None

