@@ -18,7 +18,7 @@ from commissioner.identify.batch import modal, output_error
 from commissioner.identify.batch.model import CIRCUIT, DELAY, OWN, SHARED, Matrix, ModelChoice
 from commissioner.identify.batch.output_error import ROWS
 from commissioner.identify.batch.segments import TABLE_ROWS, Segment
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 SCORE_BLOCK_S = 0.25
 CURRENT_MARGIN = 1.5
@@ -63,7 +63,7 @@ class Problem:
         self.plateau_v = 1.0
         shared, count = model.size, len(segments)
         self.free = np.concatenate([model.free_shared, *[self._own_free(s) for s in segments]])
-        self.current_span_a = CURRENT_MARGIN * max(float(np.max(np.abs(s.current_a))) for s in segments)
+        self.current_span_a = CURRENT_MARGIN * max(peak(s.current_a) for s in segments)
         self.bases = [self._basis(s.axis_deg) for s in segments]
         self.integrals = [_from_zero(b) for b in self.bases]
         near = NEAR_ZERO_WHEN_LATE if model.with_delay and not is_coarse else NEAR_ZERO

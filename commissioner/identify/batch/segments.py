@@ -12,7 +12,7 @@ from commissioner.identify.batch.whiteness import Whiteness, whiteness
 from commissioner.identify.inverter.compensation import Compensation
 from commissioner.identify.inverter.staircase import InverterError
 from commissioner.motor.circuit import Gamma, InverseGamma, Quantity
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 TABLE_ROWS = 2049
 PRICE = 4.0
@@ -68,7 +68,7 @@ class BatchFit:
 
     @property
     def peak_flux_wb(self) -> float:
-        return max(float(np.max(np.abs(f))) for f in self.stator_flux_wb)
+        return max(peak(f) for f in self.stator_flux_wb)
 
     @property
     def gamma(self) -> Gamma:
@@ -108,7 +108,7 @@ class BatchFit:
         if self.model.leg is None:
             return 0.0
         leg, values = self.model.leg, self.theta[self.model.leg_slice]
-        return leg.doubt_share(values) * float(np.max(np.abs(values))) / leg.largest_a
+        return leg.doubt_share(values) * peak(values) / leg.largest_a
 
     def inverter_covariance_at(self, flux_wb: float) -> Matrix:
         """(4, 4): the part of the secant machine's covariance that comes from the inverter and is common to all axes."""

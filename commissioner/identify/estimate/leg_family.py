@@ -32,7 +32,7 @@ from commissioner.identify.inverter.leg_pair import (
     law_of_knee,
 )
 from commissioner.identify.inverter.mixture import chances_of, mixture
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 Matrix = NDArray[np.float64]
 WORST_CHANCE = 1e-4
@@ -88,7 +88,7 @@ def pairs_of(fits: Sequence[BatchFit]) -> list[Pair]:
 def _fit_pair(names: tuple[str, str], current: Signal, largest_a: float, mean: Signal, root: Matrix) -> Pair:
     """Plateau, threshold's share and both knees (logarithms) by weighted least squares."""
     dead, drop = DEAD_TIME[names[0]], THRESHOLD[names[1]]
-    plateau = max(float(np.max(np.abs(mean))), 1e-6)
+    plateau = max(peak(mean), 1e-6)
     typical = math.log(TYPICAL_KNEE * largest_a)
 
     def curve(p: Signal) -> Signal:

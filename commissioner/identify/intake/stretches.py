@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused
 from commissioner.identify.intake.averaged import between_rows, measured, running_mean_v
 from commissioner.motor.space_vector import axis_current_a, orthogonal_current_a
-from commissioner.records import Signal, StandstillRecording
+from commissioner.records import Signal, StandstillRecording, peak
 
 OWN_LINK_SAMPLE = 0.2
 """Part of the samples at which the link must differ from the one before, or it was not read sample by sample."""
@@ -123,7 +123,7 @@ def _link_ratio(dc_link_v: Signal | None, a: int, b: int) -> Signal | None:
 def _is_still(current: Signal) -> bool:
     """Current near zero where a segment begins: its first samples are small beside the stretch."""
     head = np.abs(current[:2])
-    return bool(head.size and np.max(head) < 0.1 * max(float(np.max(np.abs(current))), 1e-12))
+    return bool(head.size and np.max(head) < 0.1 * max(peak(current), 1e-12))
 
 
 def _kind(voltage: Signal, everything: Signal) -> str:
@@ -157,16 +157,16 @@ def _lines(spectrum: Signal, height: float, apart: int, prominence: float) -> li
     inner = spectrum[1:-1]
     tops = np.flatnonzero((inner > spectrum[:-2]) & (inner > spectrum[2:]) & (inner >= height)) + 1
     chosen: list[int] = []
-    for peak in tops[np.argsort(-spectrum[tops], kind="stable")].tolist():
-        if all(abs(peak - other) >= apart for other in chosen):
-            chosen.append(peak)
+    for top in tops[np.argsort(-spectrum[tops], kind="stable")].tolist():
+        if all(abs(top - other) >= apart for other in chosen):
+            chosen.append(top)
     return [p for p in sorted(chosen) if _stands_out_by(spectrum, p) >= prominence]
 
 
-def _stands_out_by(spectrum: Signal, peak: int) -> float:
+def _stands_out_by(spectrum: Signal, top: int) -> float:
     """The peak over the higher of the lowest values on its sides, each up to where something higher begins."""
-    higher = np.flatnonzero(spectrum > spectrum[peak])
-    place = int(np.searchsorted(higher, peak))
+    higher = np.flatnonzero(spectrum > spectrum[top])
+    place = int(np.searchsorted(higher, top))
     first = int(higher[place - 1]) + 1 if place else 0
     last = int(higher[place]) if place < higher.size else spectrum.size
-    return float(spectrum[peak] - max(np.min(spectrum[first : peak + 1]), np.min(spectrum[peak:last])))
+    return float(spectrum[top] - max(np.min(spectrum[first : top + 1]), np.min(spectrum[top:last])))

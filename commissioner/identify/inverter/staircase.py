@@ -22,7 +22,7 @@ from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.motor.standstill import poles_per_s
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class DcLevel:
 
 def dc_levels(voltage_v: Signal, current_a: Signal, tail: float = 0.4) -> list[DcLevel]:
     """Means over the last `tail` of every stretch of constant voltage that is long enough to settle."""
-    top = float(np.max(np.abs(voltage_v)))
+    top = peak(voltage_v)
     edges = np.flatnonzero(np.abs(np.diff(voltage_v)) > 1e-6 * top) + 1
     bounds = [0, *edges.tolist(), voltage_v.size]
     longest = max(b - a for a, b in itertools.pairwise(bounds))
@@ -216,7 +216,7 @@ def _fit_shape(
     voltage = np.array([level.voltage_v for level in levels])
     current = np.array([level.current_a for level in levels])
     start, scale, lower = _staircase_start(voltage, current, largest)
-    top_v = float(np.max(np.abs(voltage)))
+    top_v = peak(voltage)
     noise = 0.002 * top_v
 
     def misfit(p: Signal) -> Signal:
@@ -269,7 +269,7 @@ def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[
         upper = np.abs(current) > 0.1 * largest
     design = np.column_stack([current[upper], np.sign(current[upper])])
     (resistance, loss), *_ = np.linalg.lstsq(design, voltage[upper], rcond=None)
-    top_v = float(np.max(np.abs(voltage)))
+    top_v = peak(voltage)
     resistance = max(float(resistance), 0.05 * top_v / largest)
     start = np.array([resistance, max(0.75 * float(loss), 1e-3 * top_v), 0.02 * largest, 0.0])
     scale = np.array([resistance, top_v, 0.02 * largest, 0.01 * largest])

@@ -17,7 +17,7 @@ from commissioner.identify.observer.observer import BlockEstimate, ParallelObser
 from commissioner.motor.circuit import InverseGamma
 from commissioner.motor.nameplate import Nameplate, ParameterBox
 from commissioner.motor.standstill import poles_per_s
-from commissioner.records import Signal
+from commissioner.records import Signal, peak
 
 Matrix = NDArray[np.float64]
 FINAL_REVIEWS = 6
@@ -71,7 +71,7 @@ def observe(
     shortest = min(s.voltage_v.size for s in stretches)
     settle = min(round(4.0 / -poles_per_s(observer.parameters)[0] / period_s), shortest // 3)
     residuals = tuple(_settled_residuals(observer.history, [current for current, _, _ in signals], settle))
-    rotor = max(float(np.max(np.abs(flux))) for _, flux, _ in signals)
+    rotor = max(peak(flux) for _, flux, _ in signals)
     rms = math.sqrt(sum(float(r @ r) for r in residuals) / sum(r.size for r in residuals))
     parameters = observer.parameters if law == "fast" else average.parameters
     std = np.array(observer.std()) if law == "fast" else np.zeros(4)
@@ -87,7 +87,7 @@ def excited_part(stretch: Stretch, period_s: float) -> Stretch:
     size = np.abs(stretch.current_a)
     window = max(1, round(EXCITED_WINDOW_S / period_s))
     peaks = [float(np.max(size[a : a + window])) for a in range(0, size.size, window)]
-    first = window * next(k for k, peak in enumerate(peaks) if peak >= EXCITED * max(peaks))
+    first = window * next(k for k, top in enumerate(peaks) if top >= EXCITED * max(peaks))
     if first == 0:
         return stretch
     return replace(
