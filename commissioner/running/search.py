@@ -202,21 +202,20 @@ def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit,
     """The cause that gains most and holds on what was kept aside; None where none does."""
     rules = seeking.rules
     screened = _screen(seeking, fit, seeking.candidates(c.cause for c in accepted))
-    tried: list[tuple[float, Named, Fit]] = []
+    tried: list[tuple[float, Named, Fit, str]] = []
     for gain, one, own in screened[: rules.tried]:
         seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
         if gain / fit.scale < 0.6 * rules.least_gain:
             continue
         first = np.concatenate([fit.jacobian, own])
         other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
-        tried.append((fit.chi2 - other.chi2, one, other))
-        if other.chi2 < rules.nothing_left * other.count and not _refusal(
-            seeking, fit, other, (*accepted, one), tried[-1][0]
-        ):
+        won = fit.chi2 - other.chi2
+        why = _refusal(seeking, fit, other, (*accepted, one), won)
+        tried.append((won, one, other, why))
+        if other.chi2 < rules.nothing_left * other.count and not why:
             break  # whoever explains as much is told apart as its rival
     tried.sort(key=lambda item: -item[0])
-    for gain, one, other in tried:
-        why = _refusal(seeking, fit, other, (*accepted, one), gain)
+    for gain, one, other, why in tried:
         if not why:
             seeking.say(Step("accepted", one.cause, one.form.name, gain / other.scale))
             return refreshed(seeking.problem, other), (*accepted, one)
