@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
+from typing import cast
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from commissioner.monitor.contract import (
     State,
     TModel,
     TrendDocument,
+    WatchedRow,
 )
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
@@ -231,18 +234,7 @@ def verdict_document(verdict: Verdict) -> TrendDocument:
         "false_alarm_per_indicator": verdict.false_alarm,
         "healthy_recordings_that_alarm_against_the_others": verdict.left_out_alarms,
         "healthy_recordings_at_other_operating_points": verdict.other_operating_points,
-        "watched": [
-            {
-                "name": w.name,
-                "value": w.value,
-                "healthy_mean": w.healthy_mean,
-                "healthy_std": w.healthy_std,
-                "distance": w.distance,
-                "threshold": w.threshold,
-                "alarms": w.alarms,
-            }
-            for w in verdict.watched
-        ],
+        "watched": [cast("WatchedRow", {**asdict(w), "alarms": w.alarms}) for w in verdict.watched],
     }
 
 
