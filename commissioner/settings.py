@@ -99,7 +99,7 @@ Model = TypeVar("Model", bound=BaseModel)
 def load_motor(name_or_path: str) -> Nameplate:
     """The nameplate in `config/motors/NAME.toml` or in a file. ConfigurationError: the plate is impossible."""
     path = _resolve(name_or_path, "motors")
-    model = _load(path, MotorFile)
+    model = load(path, MotorFile)
     nameplate = Nameplate(**model.model_dump(exclude={"name"}))
     for problem in check(nameplate):
         raise ConfigurationError(file=str(path), key=problem.key, value=problem.value, expected=problem.expected)
@@ -112,7 +112,7 @@ def load_procedure(
     """The procedure's plan from `path` or from the file that ships with the product; `axes_deg` overrides its axes, `strict` its
     leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
-    model = _load(source, ProcedureFile)
+    model = load(source, ProcedureFile)
     if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
         raise ConfigurationError(
             file=str(source),
@@ -177,7 +177,8 @@ def _resolve(name_or_path: str, folder: str) -> Path:
     return shipped
 
 
-def _load(path: Path, model: type[Model]) -> Model:
+def load(path: Path, model: type[Model]) -> Model:
+    """ConfigurationError with file, key, value and what would be right."""
     try:
         return model.model_validate(read_toml(path))
     except ValidationError as error:

@@ -19,20 +19,7 @@ if TYPE_CHECKING:
 WORDS_PER_ELEMENT = MappingProxyType({"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1})
 """Registers one element of a type takes; an ascii element is a register with two characters."""
 
-COMMISSIONING_ITEMS = (
-    "magic",
-    "map_version",
-    "firmware_version",
-    "serial_number",
-    "drive_type",
-    "rated_drive_current_a",
-    "control_period_s",
-    "switching_frequency_hz",
-    "echo",
-    "control_word",
-    "mode",
-    "heartbeat",
-    "window_index",
+STATUS_ITEMS = (
     "status_word",
     "fault_code",
     "trip_cause",
@@ -51,6 +38,23 @@ COMMISSIONING_ITEMS = (
     "overruns",
     "test_time_left_s",
     "present_bias_v",
+)
+"""What a status is read from."""
+COMMISSIONING_ITEMS = (
+    "magic",
+    "map_version",
+    "firmware_version",
+    "serial_number",
+    "drive_type",
+    "rated_drive_current_a",
+    "control_period_s",
+    "switching_frequency_hz",
+    "echo",
+    "control_word",
+    "mode",
+    "heartbeat",
+    "window_index",
+    *STATUS_ITEMS,
     "current_limit_a",
     "test_time_limit_s",
     "voltage_limit_v",

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.errors import ConfigurationError, UsageError
-from commissioner.settings import read_toml
-from commissioner.validation import first_problem
+from commissioner.settings import load
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,39}$")]
 Name = Annotated[str, Field(min_length=1, max_length=80)]
@@ -91,7 +90,7 @@ class Settings:
 
 def load_settings(config: Path | None, *, host: str, port: int, runs: Path) -> Settings:
     """The service's settings. ConfigurationError names file and key."""
-    file = ServiceFile() if config is None else _read(config)
+    file = ServiceFile() if config is None else load(config, ServiceFile)
     beside = config.parent if config is not None else Path()
     archive = beside / file.service.runs if file.service.runs else runs
     data = beside / file.service.data if file.service.data else archive / ".service"
@@ -130,13 +129,3 @@ def is_loopback(host: str) -> bool:
 def bracketed(host: str) -> str:
     """As it stands in a URL."""
     return f"[{host}]" if ":" in host and not host.startswith("[") else host
-
-
-def _read(config: Path) -> ServiceFile:
-    try:
-        return ServiceFile.model_validate(read_toml(config))
-    except ValidationError as error:
-        problem = first_problem(error, ServiceFile)
-        raise ConfigurationError(
-            file=str(config), key=problem.key, value=problem.value, expected=problem.expected
-        ) from error

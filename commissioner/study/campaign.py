@@ -10,10 +10,11 @@ from pathlib import Path
 
 from commissioner.encoding import HIDDEN
 from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.settings import load
 from commissioner.study.rows import Rows
 from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
-from commissioner.study.specification import cases_of, load_study
+from commissioner.study.specification import Specification, cases_of
 from commissioner.study.summary import Summary, summarise
 from commissioner.study.workers import here, on_cluster
 
@@ -56,7 +57,7 @@ def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lamb
     """ConfigurationError: the file; UsageError: the folder, or no simulator. A worker's death is made good; Ctrl-C leaves rows
     that `resume` goes on from."""
     began = time.monotonic()
-    study = load_study(request.file)
+    study = load(request.file, Specification)
     motors = simulator().motors() if study.kind == "commission" else ()
     cases = cases_of(study, request.file, motors)
     rows = Rows(folder_to_write(request.out), study.model_dump(), resume=request.resume)

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.errors import ConfigurationError
-from commissioner.settings import read_toml
-from commissioner.validation import first_problem
 
 MOST_CASES = 1_000_000
 
@@ -52,17 +50,6 @@ class Case:
     faults: tuple[str, ...]
     axes_deg: tuple[float, ...]
     file: str = ""
-
-
-def load_study(path: Path) -> Specification:
-    """ConfigurationError with file, key, value and what would be right."""
-    try:
-        return Specification.model_validate(read_toml(path))
-    except ValidationError as error:
-        problem = first_problem(error, Specification)
-        raise ConfigurationError(
-            file=str(path), key=problem.key, value=problem.value, expected=problem.expected
-        ) from error
 
 
 def cases_of(study: Specification, path: Path, motors: Sequence[str]) -> list[Case]:

@@ -9,7 +9,7 @@ from commissioner.errors import IdentityMismatch, RequestRefused
 from commissioner.link.drive.items import Items, number
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.codec import Value
-from commissioner.registers.profile import DriveProfile
+from commissioner.registers.profile import STATUS_ITEMS, DriveProfile
 from commissioner.registers.status import DriveState, decode_bits, decode_state
 
 IDENTITY_ITEMS = (
@@ -23,27 +23,6 @@ IDENTITY_ITEMS = (
     "switching_frequency_hz",
 )
 BUS_CONTROL = "bus_control"
-STATUS_ITEMS = (
-    "status_word",
-    "fault_code",
-    "trip_cause",
-    "trip_value",
-    "trip_limit",
-    "heartbeat_echo",
-    "session_id",
-    "interlocks",
-    "dc_link_v",
-    "heatsink_degc",
-    "winding_degc",
-    "shaft_speed_rad_per_s",
-    "current_magnitude_a",
-    "present_scale",
-    "samples_produced",
-    "overruns",
-    "test_time_left_s",
-    "present_bias_v",
-    "settings_count",
-)
 NAMEPLATE_ITEMS = (
     "rated_power_w",
     "rated_voltage_v",
@@ -73,7 +52,7 @@ def read_identity(items: Items) -> DriveIdentity:
 
 def read_status(items: Items) -> DriveStatus:
     """One reading of everything the drive says about its state."""
-    profile, seen = items.profile, items.read(STATUS_ITEMS)
+    profile, seen = items.profile, items.read((*STATUS_ITEMS, "settings_count"))
     state = _state(profile, seen)
     fault, trip = _known(seen, "fault_code"), _whole(seen, "trip_cause")
     return DriveStatus(
@@ -106,7 +85,7 @@ def read_others(items: Items) -> dict[str, Value | RequestRefused]:
     """What the drive file describes beside identity, status, plate and motor parameters, one item at a time; for an item that
     the drive refuses its refusal."""
     order = items.profile.parameters.order if items.profile.parameters else ()
-    asked = {*IDENTITY_ITEMS, *STATUS_ITEMS, *NAMEPLATE_ITEMS, *order}
+    asked = {*IDENTITY_ITEMS, *STATUS_ITEMS, "settings_count", *NAMEPLATE_ITEMS, *order}
     out: dict[str, Value | RequestRefused] = {}
     for name in (n for n, item in items.profile.items.items() if "r" in item.access and n not in asked):
         try:

@@ -17,12 +17,12 @@ from commissioner.procedure.course import Findings, course
 from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
-from commissioner.settings import load_procedure
+from commissioner.settings import load, load_procedure
 from commissioner.study.commissioning import NoArchive
 from commissioner.study.rows import ENDED, TABLE, Rows
 from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
-from commissioner.study.specification import cases_of, load_study
+from commissioner.study.specification import Specification, cases_of
 from commissioner.study.summary import summarise
 from commissioner.study.workers import carried_out, here
 from tests.support.service.described import judge
@@ -38,8 +38,8 @@ def study_file(tmp_path, text):
 
 def test_the_same_file_gives_the_same_cases_and_every_motor_its_turn(tmp_path):
     path = study_file(tmp_path, 'kind = "commission"\nruns = 6\nmotors = "all"\nseed = 5\n')
-    cases = cases_of(load_study(path), path, MOTORS)
-    assert cases == cases_of(load_study(path), path, MOTORS)
+    cases = cases_of(load(path, Specification), path, MOTORS)
+    assert cases == cases_of(load(path, Specification), path, MOTORS)
     assert [case.motor for case in cases] == MOTORS + MOTORS
     assert len({case.seed for case in cases}) == 6
 
@@ -60,7 +60,7 @@ def test_the_same_file_gives_the_same_cases_and_every_motor_its_turn(tmp_path):
 def test_a_file_that_cannot_be_carried_out_names_its_key(tmp_path, text, key):
     path = study_file(tmp_path, text + "\n")
     with pytest.raises(ConfigurationError) as refused:
-        cases_of(load_study(path), path, MOTORS)
+        cases_of(load(path, Specification), path, MOTORS)
     assert key in str(refused.value)
 
 
@@ -147,7 +147,7 @@ def test_spread_moves_the_truth_and_not_the_plate():
 
 def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
     path = study_file(tmp_path, 'kind = "commission"\nmotors = ["haumer_132m04"]\neffects = ["no_such_effect"]\n')
-    (case,) = cases_of(load_study(path), path, simulator().motors())
+    (case,) = cases_of(load(path, Specification), path, simulator().motors())
     told = carried_out(case)
     judge("study_row", told)
     assert told["outcome"] == "impossible"
@@ -157,7 +157,7 @@ def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
 def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):
     text = 'kind = "commission"\nruns = 2\nmotors = ["haumer_132m04", "abb_2k2"]\nspread = 0.1\naxes_deg = [0.0]\nseed = 4\n'
     path = study_file(tmp_path, text)
-    cases = cases_of(load_study(path), path, simulator().motors())
+    cases = cases_of(load(path, Specification), path, simulator().motors())
     alone = {told["case"]: told for told in map(carried_out, cases)}
     shared = {told["case"]: told for told in here(cases, 2)}
     for case, told in alone.items():
