@@ -184,7 +184,7 @@ def _of_binary(path: Path, mapping: ChannelMap) -> Table:
     period = metadata.get("sample_period_s")
     clock = replace(said, interval_s=float(period)) if isinstance(period, float) else said
     several = {name: v for name, v in columns.items() if v.size > 1}
-    names = {name: _own_name(name, several) for name in several}
+    names = {name: _own_name(name) for name in several}
     found = recognise(
         list(names.values()), [unit_in(n) for n in several], list(several.values()),
         {**mapping_in({}, tuple(names.values())), **mapping.columns}, str(path),
@@ -192,7 +192,7 @@ def _of_binary(path: Path, mapping: ChannelMap) -> Table:
     return _table(found, metadata, clock, mapping, str(path), notes)
 
 
-def _own_name(name: str, others: Mapping[str, Signal]) -> str:
+def _own_name(name: str) -> str:
     """A channel's name without its group where that leaves the contract's name."""
     bare = name.rpartition(".")[2]
     return bare if bare.split(" [")[0] in CONTRACT_COLUMNS else name

@@ -73,7 +73,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
     return Identified(
         _parameters(four, covariance), _bounds(four, covariance / fit.scale), covariance, inertia, load, to_t_model(four, absolute), left,
-        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left, fit),
+        fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left),
     )  # fmt: skip
 
 
@@ -187,7 +187,7 @@ def _flux(record: Record) -> float:
     return float(np.median(np.abs(tail)) / max(turn, 1e-9))
 
 
-def _remarks(record: Record, left: Lack, fit: Fit) -> tuple[str, ...]:
+def _remarks(record: Record, left: Lack) -> tuple[str, ...]:
     out = list(record.remarks)
     worst = max(left.sigma, left.burst_sigma)
     if worst > LEAST_OVER_NOISE:

@@ -84,7 +84,7 @@ def pair(
     explained = _explained_deg(currents, star, start, frequency_hz)
     _spacing("current", i, min(SPACING_TOLERANCE_DEG + explained, LARGEST_SPACING_DEG), findings)
     options = _options(currents, i, reference)
-    expected = _expected_lag_deg(currents, star, plate, start, frequency_hz)
+    expected = _expected_lag_deg(currents, star, start, frequency_hz)
     if lag_deg is None:
         current_order, current_sign, lag = _choose(options, expected, v.sequence < 0, findings)
     else:
@@ -207,9 +207,7 @@ def _options(currents: list[complex], read: Triple, reference: complex) -> list[
     return found
 
 
-def _expected_lag_deg(
-    currents: list[complex], star: list[complex], plate: Nameplate, start: TCircuit, frequency_hz: float
-) -> float:
+def _expected_lag_deg(currents: list[complex], star: list[complex], start: TCircuit, frequency_hz: float) -> float:
     """The lag at which the nameplate's circuit draws a current of this size; 80 degrees below its no-load current."""
     voltage = float(np.mean(np.abs(star)))
     current = float(np.mean(np.abs(currents)))

@@ -95,7 +95,7 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
         return "skip"
 
     width = len(layout.names) + layout.skip
-    table = _parsed(_even(body, layout, width), layout, width, keep, source)
+    table = _parsed(_even(body, layout), layout, width, keep, source)
     rows = table.num_rows
     table, notes = without_headers(table.select(range(layout.skip, width)), wrong_rows, layout)
     notes += without_torn_row(wrong_rows, body, width)
@@ -115,7 +115,7 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     return [c[:last] for c in columns], notes
 
 
-def _even(body: str, layout: Layout, width: int) -> str:
+def _even(body: str, layout: Layout) -> str:
     """Rows with as many cells as the widest: trailing separators come and go."""
     if layout.separator == " ":
         return "\n".join(" ".join(line.split()) for line in body.splitlines() if line.strip())

@@ -47,7 +47,7 @@ def page_of(
             _proof(seen, document),
             _spectrum(seen),
             *([_pulses(pulses)] if pulses else []),
-            *([_trend(verdict, history, seen, indicators)] if verdict and history else []),
+            *([_trend(verdict, history, indicators)] if verdict and history else []),
             _motor(seen, document),
             _audit(seen),
         ],
@@ -190,7 +190,7 @@ def _pulses(pulses: Pulses) -> Section:
     )
 
 
-def _trend(verdict: Verdict, history: History, seen: Observation, indicators: Sequence[Indicator]) -> Section:
+def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) -> Section:
     rows = [
         (
             w.name,
