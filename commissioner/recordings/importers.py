@@ -18,7 +18,6 @@ from commissioner.errors import DataRefused
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
-from commissioner.recordings.names import is_sheet
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
@@ -38,6 +37,7 @@ from commissioner.recordings.reading.mend import (
 from commissioner.recordings.reading.preface import Clock, clock_in
 from commissioner.recordings.reading.recognise import Recognised, recognise, resistances_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
+from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,

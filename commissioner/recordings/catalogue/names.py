@@ -1,4 +1,4 @@
-"""What a sheet calls its values, in English and German: `P_N [kW]`, `Wirkungsgrad 3/4`, `I_A/I_N`, `cos phi`, `Kippmoment`."""
+"""What a sheet calls its values, in English and German, and in languages whose words `words` knows: `P_N [kW]`, `Wirkungsgrad 3/4`, `I_A/I_N`, `cos phi`, `Kippmoment`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import unicodedata
 
 from commissioner.identify.catalogue.sheet import KEYS
 from commissioner.recordings.units import unbracketed, unit_in
+from commissioner.recordings.words import readings, translated
 
 _RATED = r"(?:rated|nominal|full ?load|nenn|bemessungs)?"
 _OVER = (
@@ -58,8 +59,12 @@ def key_of(name: str) -> str | None:
         return found
     bare = _SUFFIX.sub("", _without_unit(_LOADS.sub("", name)))
     words, _, symbol = bare.strip().rpartition(" ")
-    whole, first = _matched(bare), _matched(words)
+    whole, first = _in_any_order(bare), _in_any_order(words)
     return whole or (first if first is not None and first == _matched(symbol) else None)
+
+
+def _in_any_order(name: str) -> str | None:
+    return next((key for reading in readings(name) if (key := _matched(reading))), None)
 
 
 def _matched(name: str) -> str | None:
@@ -92,7 +97,7 @@ def is_ratio(name: str) -> bool:
 
 def is_between_terminals(name: str) -> bool | None:
     """Of a winding's resistance: between two terminals, of one phase, or unsaid."""
-    lower = name.lower()
+    lower = translated(name).lower()
     if re.search(r"uv|u-v|terminal|line|klemme|phase[- ]?(?:to[- ]?)?phase|zwischen", lower):
         return True
     return False if re.search(r"phase|strang|per ph|_ph", lower) else None

@@ -17,9 +17,10 @@ from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
 from commissioner.recordings.catalogue.cells import refused, split_unit, unit_key, value_of
 from commissioner.recordings.formats.foreign_csv import read_text
-from commissioner.recordings.names import is_sheet, meaning_of
+from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
+from commissioner.recordings.sheet_names import is_sheet
 
 ENDINGS = (".csv", ".txt", ".tsv")
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3

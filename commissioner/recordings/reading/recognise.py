@@ -15,12 +15,8 @@ from commissioner.recordings.names import (
     in_rst,
     is_per_minute,
     is_remark,
-    is_sheet,
     meaning_of,
-    resistance_meaning,
     reversed_pair,
-    sheet_column,
-    sheet_unit,
     turned,
     unit_of,
     uses_rst,
@@ -28,8 +24,9 @@ from commissioner.recordings.names import (
 )
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
+from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
-from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in
+from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in, without_brackets
 from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
@@ -59,6 +56,7 @@ def recognise(
     meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
     with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
+    of_points = sheet_columns(names) if of_sheet else {}
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
@@ -71,7 +69,7 @@ def recognise(
             continue
         target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
         is_asked = name in from_zero and target is None
-        if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_column(name)):
+        if name not in targets and name not in CONTRACT_COLUMNS and (found := of_points.get(name)):
             unit = unit or sheet_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
         else:
@@ -131,10 +129,6 @@ def resistances_said(metadata: Mapping[str, float | str], source: str) -> dict[s
     return out
 
 
-def _bare(name: str) -> str:
-    return re.sub(r"[\[(][^\])]*[\])]\s*$", "", name).strip()
-
-
 def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: str) -> tuple[str | None, float]:
     if target is not None:
         if target.column == "ignore":
@@ -143,7 +137,7 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
         return target.column, sign * (
             target.factor if target.factor is not None else _factor(name, unit, target.column, source)
         )
-    bare = _bare(name)
+    bare = without_brackets(name)
     if bare in CONTRACT_COLUMNS:
         return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
     if of := turned(name):

@@ -33,6 +33,15 @@ Schaltung;Dreieck
 """
 FORMS = {
     "german": GERMAN,
+    "spanish": "Potencia nominal;11;kW\nTensión nominal;400;V\nFrecuencia;50;Hz\nVelocidad nominal;1465;r/min\nCorriente nominal;21,5;A\n"
+    "Factor de potencia;0,81\nRendimiento;91,4;%\nPar de arranque M_A/M_N;2,3\nCorriente de arranque I_A/I_N;7,4\nPar máximo M_K/M_N;2,9\n"
+    "Momento de inercia J;0,044;kgm²\nConexión;triángulo\n",
+    "italian": "Potenza nominale (kW): 11\nTensione nominale (V): 400\nFrequenza: 50 Hz\nVelocità nominale: 1465 giri/min\n"
+    "Corrente nominale: 21,5 A\ncosfi: 0,81\nRendimento (%): 91,4\nCoppia di spunto (%): 230\nCorrente di spunto I_A/I_N: 7,4\n"
+    "Coppia massima (%): 290\nMomento d'inerzia: 0,044 kg m2\nCollegamento: triangolo\n",
+    "french": "Puissance nominale;11 kW\nTension nominale;400 V\nFréquence;50 Hz\nVitesse nominale;1465 tr/min\nCourant nominal;21,5 A\n"
+    "Facteur de puissance;0,81\nRendement;91,4 %\nCouple de démarrage;230 %\nCourant de démarrage I_A/I_N;7,4\nCouple maximal;290 %\n"
+    "Moment d'inertie;0,044 kgm²\nCouplage;triangle\n",
     "one row": "P_N [kW];U [V];f [Hz];n [1/min];I_N [A];cos phi;eta [%];M_A/M_N;I_A/I_N;M_K/M_N;J [kgm2];Schaltung\n"
     "11;400;50;1465;21,5;0,81;91,4;2,3;7,4;2,9;0,044;D\n",
     "units below": "P_N,U_N,f,n_N,I_N,cos phi,eta,M_A/M_N,I_A/I_N,M_K/M_N,J,connection\nkW,V,Hz,1/min,A,,%,,,,kgm2,\n"
