@@ -94,7 +94,7 @@ def kind_of(table: Table) -> str:
     names = set(table.columns)
     if "voltage_axis_v" in names:
         return "standstill"
-    if "time_s" not in names and (is_sheet(names) or {"frequency_hz", "voltage_line_v"} <= names):
+    if "time_s" not in names and (is_sheet(names & CONTRACT_COLUMNS) or {"frequency_hz", "voltage_line_v"} <= names):
         return "points"
     return "running" if any(n.startswith("voltage_") for n in names & CONTRACT_COLUMNS) else "unknown"
 

@@ -51,6 +51,8 @@ FILLING = frozenset(
         "abc",
         "uvw",
         "rst",
+        "star",
+        "between",
     }
 )
 REMARKS = FILLING | {
@@ -105,22 +107,16 @@ _CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?",
 _PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
 """Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
 _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
-_RYB_AS_RST = str.maketrans("ybYB", "stST")
+_RYB_AS_RST = str.maketrans("yb", "st")
 _STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
 """`isa`, `usb`; `ias`, `vbs`: stator quantities."""
 _NEUTRAL = re.compile(r"(?:[iuv]|current|voltage|strom|spannung|courant|tension)(?:n|neutral)")
 """Of the neutral: no phase, whatever letters its unit adds."""
 _KIND = rf"(?:{CURRENT}|{VOLTAGE})"
-_RYB = re.compile(
-    rf"(?:(?P<before>{_KIND}[\s_]*(?:ph(?:ase)?)?[\s_]*)(?P<behind>[ryb][\s_-]*[ryb]?)(?![a-mo-z])"
-    rf"|(?P<first>(?:phase[\s_]*)?[ryb][\s_-]*[ryb]?)(?P<after>[\s_-]*(?:ph(?:ase)?)?[\s_-]*{_KIND})(?![a-z]))",
-    re.IGNORECASE,
-)
-"""Phases by their colours, red, yellow and blue: `I_Y`, `V_RY`, `B phase current`."""
-_LETTERS = re.compile(r"(?<![a-z])[ryb]{1,2}(?![a-z])", re.IGNORECASE)
-_OTHER_LETTERS = re.compile(
-    rf"(?:{_KIND}[\s_]*[acst]|[acst][\s_]*(?:ph(?:ase)?)?[\s_]*{_KIND})(?![a-z])", re.IGNORECASE
-)
+_COLOURED = re.compile(rf"(?<![a-z])({_KIND}?)([ryb]{{1,2}}|red|yellow|blue)(?=n?(?![a-z]))", re.IGNORECASE)
+"""Phases by their colours, red, yellow and blue: `I_Y`, `VRY`, `B phase current`, `R-N voltage`."""
+_OTHERS = re.compile(rf"(?<![a-z]){_KIND}?[acst](?![a-z])", re.IGNORECASE)
+_OF_A_PHASE = re.compile(rf"(?<![a-z]){_KIND}(?=[ryb]{{0,2}}n?(?![a-z]))", re.IGNORECASE)
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -177,24 +173,19 @@ def uses_rst(names: Iterable[str]) -> bool:
 
 def uses_ryb(names: Iterable[str]) -> bool:
     """True where the phases are called R, Y, B: two of them, and with Y missing none of A, C, S, T."""
-    names = list(names)
-    said = " ".join(_colours(found) for name in names if (found := _RYB.match(name)))
-    letters = set("".join(_LETTERS.findall(said)).lower())
-    return len(letters) > 1 and ("y" in letters or not any(map(_OTHER_LETTERS.match, names)))
+    bare = [without_brackets(name) for name in names]
+    coloured = [_COLOURED.findall(name) for name in bare if _OF_A_PHASE.search(name)]
+    letters = {letter for found in coloured for _, said in found for letter in _letters(said)}
+    return len(letters) > 1 and ("y" in letters or not any(map(_OTHERS.search, bare)))
 
 
 def in_rst(name: str) -> str:
     """A name whose phases are R, Y, B, with R, S, T in their place."""
-    return _RYB.sub(_in_rst, name, count=1)
+    return _COLOURED.sub(lambda found: found[1] + _letters(found[2]).translate(_RYB_AS_RST), name)
 
 
-def _colours(found: re.Match[str]) -> str:
-    return found["behind"] or found["first"]
-
-
-def _in_rst(found: re.Match[str]) -> str:
-    letters = _LETTERS.sub(lambda one: one[0].translate(_RYB_AS_RST), _colours(found))
-    return f"{found['before']}{letters}" if found["behind"] else f"{letters}{found['after']}"
+def _letters(said: str) -> str:
+    return said.lower()[:1] if len(said) > 2 else said.lower()
 
 
 def counted_from_zero(names: Iterable[str]) -> frozenset[str]:

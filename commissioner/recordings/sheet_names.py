@@ -19,16 +19,16 @@ SHEET = {
         r"|(?:mean|average)(?:line)?voltage|meanspannung"
     ),
     "voltage_neutral_v": re.compile(
-        rf"{_VOLTS}(?:ln|phn|linetoneutral|phaseneutral|phasetoneutral|star)|(?:phase|line)(?:to)?neutral(?:voltage)?|starvoltage|sternspannung"
+        rf"{_VOLTS}(?:ln|phn|linetoneutral|phaseneutral|phasetoneutral|star)|(?:phase|line)(?:to)?neutral(?:voltage)?|star(?:voltage|spannung)"
     ),
     "voltage_phase_v": re.compile(
-        rf"{_VOLTS}(?:ph|phase|perphase)(?:rms|eff)?|phase(?:rms)?(?:voltage|volts|spannung|tension)|strangspannung"
+        rf"{_VOLTS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:voltage|volts|spannung|tension)|strangspannung"
     ),
     "current_line_a": re.compile(
         rf"{_AMPS}(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current|meanstrom"
     ),
     "current_phase_a": re.compile(
-        rf"{_AMPS}(?:ph|phase|perphase)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
+        rf"{_AMPS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
     ),
     "power_w": re.compile(
         r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)power|powerinput|inputwatts"
@@ -45,7 +45,7 @@ _OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|stande
 SHEET_RESISTANCE = {
     "winding_resistance_line_ohm": re.compile(
         r"(?:terminals?|line(?:toline)?|klemmen)(?:winding)?(?:resistance|widerstand)|rll"
-        rf"|{_OF_WINDING}(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)"
+        rf"|{_OF_WINDING}(?:(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)|betweenphases?)"
     ),
     "winding_resistance_phase_ohm": re.compile(
         r"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand)(?:per|pro|je)?(?:phase|strang)"

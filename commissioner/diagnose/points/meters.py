@@ -98,6 +98,15 @@ def _of_meters(columns: Mapping[str, Array], names: tuple[str, ...], apart: floa
     shown = np.stack([np.asarray(columns[name], dtype=float) for name in there])
     direct = _direct(columns)
     shown[:, direct] = np.where(shown[:, direct] == 0.0, np.nan, np.abs(shown[:, direct]))
+    if np.any(lost := ~np.isfinite(shown) & ~direct):
+        meter, row = np.argwhere(lost)[0]
+        yield refused(
+            f"{there[meter]} holds no number in row {row + 1}",
+            None,
+            "a number in every row",
+            "fill the cell, or leave the row out",
+        )
+        return
     counts = np.where(direct, np.isfinite(shown).sum(axis=0), len(there))
     mean = np.where(direct, np.nansum(shown, axis=0), shown.sum(axis=0)) / np.maximum(counts, 1)
     off = np.nan_to_num(np.abs(shown - mean) / np.abs(mean))

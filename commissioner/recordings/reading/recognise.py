@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import DataRefused
+from commissioner.recordings.catalogue.names import key_of as key_of_plate
 from commissioner.recordings.names import (
     counted_from_zero,
     in_rst,
@@ -117,10 +118,12 @@ def _own_unit(name: str) -> str:
     return next((SHOWN[measures] for ending, measures in MEASURES.items() if name.endswith(ending)), "")
 
 
-def resistances_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float]:
-    """What lines above a test sheet say of the windings' resistance (`# R_uv (mOhm): 1520`), by the contract's names, in ohm."""
-    out: dict[str, float] = {}
+def windings_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float | str]:
+    """What lines above a test sheet say of the windings (`# R_uv (mOhm): 1520`, `# Schaltung: Dreieck`), by the contract's names, in ohm."""
+    out: dict[str, float | str] = {}
     for name, value in metadata.items():
+        if key_of_plate(name) == "connection":
+            out["connection"] = value
         meaning, said = resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
         if meaning is None or said is None or name in CONTRACT_COLUMNS:
             continue

@@ -10,6 +10,8 @@ import pytest
 from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
+from commissioner.recordings.imported import kind_of
+from commissioner.recordings.importers import contract_table
 from commissioner.recordings.names import meanings_of
 from commissioner.recordings.sheet_names import sheet_columns
 
@@ -44,7 +46,7 @@ def is_true(done: IdentifiedSheets) -> bool:
 
 @pytest.mark.parametrize(
     "volts",
-    ["voltage_phase_v", "phase voltage", "U phase", "U (phase)", "Strangspannung [V]", "tension simple", "V_ph (V)", "voltage_neutral_v",
+    ["voltage_phase_v", "phase voltage", "U phase", "U (phase)", "Strangspannung [V]", "U_Str/V", "tension simple", "V_ph (V)", "voltage_neutral_v",
      "tensión de fase (V)", "tensione di fase [V]", "Sternspannung", "phase-to-neutral voltage", "U_LN", "V_an"],
 )  # fmt: skip
 def test_phase_volts_are_read_as_line_volts_and_it_is_said(tmp_path: Path, volts: str) -> None:
@@ -72,6 +74,7 @@ def test_of_three_meters_the_mean_is_taken(tmp_path: Path, volts: str, amps: str
         ("no load,60,208,208,208,8.17,4.71,8.17,420", r"current_v_a is 4\.71 in row 1 and its neighbours are not"),
         ("no load,60,208,208,120,8.17,8.17,8.17,420", r"voltage_wu_v is 120 in row 1"),
         ("no load,60,208,208,208,8.17,8.17,0,420", r"current_w_a is 0 in row 1"),
+        ("no load,60,208,208,208,8.17,8.17,,420", r"current_w_a holds no number in row 1"),
     ],
 )
 @pytest.mark.parametrize("verb", [identify_any, diagnose])
@@ -80,12 +83,17 @@ def test_a_meter_that_its_neighbours_contradict_is_named(tmp_path, row, says, ve
     request = IdentifyRequest((path,)) if verb is identify_any else DiagnoseRequest((path,))
     with pytest.raises(DataRefused, match=says) as refused:
         verb(request)
-    assert refused.value.value and refused.value.limit and refused.value.remedy
+    assert refused.value.limit and refused.value.remedy
 
 
 @pytest.mark.parametrize(
     ("head", "above"),
-    [("voltage_phase_v,I", "# connection: delta\n"), ("U,I phase", ""), ("U,I phase", "# connection: delta\n")],
+    [
+        ("voltage_phase_v,I", "# connection: delta\n"),
+        ("U_Str,I", "# Conexión: triángulo\n"),
+        ("U,I phase", ""),
+        ("U,I phase", "# connection: delta\n"),
+    ],
 )
 def test_what_phase_means_in_a_delta_is_asked(tmp_path: Path, head: str, above: str) -> None:
     path = sheet(tmp_path, f"test,f,{head},P", *of_phase(), above=f"# R_uv (ohm): 0.4857\n{above}")
@@ -138,6 +146,8 @@ ABROAD = {
                 "En vacío", "Rotor bloqueado"),
     "italian": ("Prova;Frequenza [Hz];Tensione concatenata [V];Corrente [A];Potenza assorbita [W];R_uv [ohm]", "Prova a vuoto", "Rotore bloccato"),
     "french": ("Essai;Fréquence (Hz);Tension composée (V);Intensité (A);Puissance absorbée (W);R_uv (ohm)", "Essai à vide", "Rotor bloqué"),
+    "portuguese": ("Ensaio;Frequência (Hz);Tensão (V);Corrente (A);Potência (W);R_uv (ohm)", "Em vazio", "Rotor bloqueado"),
+    "dutch": ("Proef;Frequentie (Hz);Spanning (V);Stroom (A);Vermogen (W);R_uv (ohm)", "Nullast", "Kortsluiting"),
     "german": ("Versuch;Frequenz in Hz;Leiterspannung in V;Leiterstrom in A;Leistung in W;R_uv in ohm", "Leerlaufversuch", "Kurzschlussversuch"),
 }  # fmt: skip
 
@@ -175,6 +185,11 @@ def test_a_sheets_names_abroad(name: str, column: str | None) -> None:
         (("R phase current", "Y phase current", "B phase current"), "uvw"),
         (("Phase R current (A)", "Phase Y current (A)", "Phase B current (A)"), "uvw"),
         (("I_R", "I_B"), "uw"),
+        (("R-N voltage", "Y-N voltage", "B-N voltage"), "uvw"),
+        (("Line voltage RY", "Line voltage YB", "Line voltage BR"), "uvw"),
+        (("Red phase current", "Yellow phase current", "Blue phase current"), "uvw"),
+        (("Sternspannung L1", "Sternspannung L2", "Tensione stellata L3"), "uvw"),
+        (("Corriente en la fase U", "Corrente nella fase V"), "uv"),
         (("Ia", "Ib", "Ir"), "uvu"),
         (("i_x", "i_y"), ""),
         (("Corriente fase R", "Corriente fase S", "Corriente fase T"), "uvw"),
@@ -183,3 +198,18 @@ def test_a_sheets_names_abroad(name: str, column: str | None) -> None:
 )
 def test_what_a_letter_is_follows_from_its_company(names: tuple[str, ...], meant: str) -> None:
     assert [column[8] for column in meanings_of(names).values()] == list(meant)
+
+
+@pytest.mark.parametrize(("head", "kind"), [("f,U phase,I1,I2,I3,P", "points"), ("f,U1,U2,U3,I1,I2,I3,P", "running")])
+def test_import_says_what_a_sheet_is(tmp_path: Path, head: str, kind: str) -> None:
+    row = ",".join(["60", *["120"] * (head.count("U")), "8", "8", "8", "420"])
+    path = sheet(tmp_path, head, row, row.replace("60", "15", 1), above="")
+    assert kind_of(contract_table(path)) == kind
+
+
+def test_a_nameplate_in_place_of_a_recording_is_told_where_it_belongs(tmp_path: Path) -> None:
+    path = tmp_path / "motor.toml"
+    path.write_text("rated_power_w = 2200.0\nrated_voltage_v = 400.0\n")
+    with pytest.raises(DataRefused, match="TOML files are not read") as refused:
+        identify_any(IdentifyRequest((path,)))
+    assert "--motor" in refused.value.remedy
