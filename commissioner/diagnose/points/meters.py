@@ -1,6 +1,6 @@
 """Line values of a test sheet from what its meters showed: between lines, to the neutral, in one phase, in all three.
 
-A symmetric motor on a symmetric supply: V_line = sqrt(3) V_neutral, and of three meters the mean (IEEE 112-2017, 5.2).
+A symmetric motor on a symmetric supply: V_line = sqrt(3) V_neutral, and of three meters the mean (IEEE 112).
 """
 
 from __future__ import annotations
