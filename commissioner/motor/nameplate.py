@@ -58,8 +58,8 @@ RATED_VALUES = (
 
 
 CONNECTIONS = {
-    "star": ("star", "y", "wye", "stern", "\N{GREEK CAPITAL LETTER LAMDA}"),
-    "delta": ("delta", "d", "triangle", "mesh", "dreieck", "\N{GREEK CAPITAL LETTER DELTA}", "\N{WHITE UP-POINTING TRIANGLE}",
+    "star": ("star", "y", "wye", "stern", "estrella", "stella", "étoile", "etoile", "\N{GREEK CAPITAL LETTER LAMDA}"),
+    "delta": ("delta", "d", "triangle", "mesh", "dreieck", "triángulo", "triangulo", "triangolo", "\N{GREEK CAPITAL LETTER DELTA}", "\N{WHITE UP-POINTING TRIANGLE}",
               "\N{BLACK UP-POINTING TRIANGLE}", "\N{INCREMENT}"),
 }  # fmt: skip
 """How plates, drives and recordings write the two connections, in any case."""

@@ -14,6 +14,7 @@ from commissioner.monitor.intake.states.stretches import states
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.mapping import ChannelMap
+from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     ColumnReading,
@@ -93,7 +94,7 @@ def kind_of(table: Table) -> str:
     names = set(table.columns)
     if "voltage_axis_v" in names:
         return "standstill"
-    if {"frequency_hz", "voltage_line_v"} <= names and "time_s" not in names:
+    if "time_s" not in names and (is_sheet(names & CONTRACT_COLUMNS) or {"frequency_hz", "voltage_line_v"} <= names):
         return "points"
     return "running" if any(n.startswith("voltage_") for n in names & CONTRACT_COLUMNS) else "unknown"
 

@@ -18,7 +18,6 @@ from commissioner.errors import DataRefused
 from commissioner.paths import no_file
 from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
-from commissioner.recordings.names import is_sheet
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import head_lines, split
@@ -36,8 +35,9 @@ from commissioner.recordings.reading.mend import (
     without_untimed_rows,
 )
 from commissioner.recordings.reading.preface import Clock, clock_in
-from commissioner.recordings.reading.recognise import Recognised, recognise, resistances_said
+from commissioner.recordings.reading.recognise import Recognised, recognise, windings_said
 from commissioner.recordings.reading.unnamed import UNNAMED, told_by_signals
+from commissioner.recordings.sheet_names import is_sheet
 from commissioner.recordings.table import (
     CONTRACT_COLUMNS,
     HOW_TO_MAP,
@@ -59,7 +59,12 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
     ".dat": comtrade.channels,
     ".cff": comtrade.channels,
 }
-NOT_READ = {".mdf": "MDF 3", ".xlsx": "Excel", ".xls": "Excel"}
+_EXPORT = "export the recording as CSV or Parquet"
+NOT_READ = {
+    ".mdf": ("MDF 3", _EXPORT), ".xlsx": ("Excel", _EXPORT), ".xls": ("Excel", _EXPORT), ".ods": ("OpenDocument", _EXPORT),
+    ".toml": ("TOML", "give a nameplate by --motor, a mapping by --map, and the recording or the sheet as CSV"),
+}  # fmt: skip
+"""What the files are, and what to do."""
 HEAD_BYTES = 65536
 
 
@@ -105,9 +110,9 @@ def _read(path: Path, mapping: ChannelMap) -> Table:
         raise no_file(path, "read recording")
     suffix = path.suffix.lower()
     if suffix in NOT_READ:
+        kind, remedy = NOT_READ[suffix]
         raise DataRefused(
-            f"{path}: {NOT_READ[suffix]} files are not read", step="read recording", value=suffix, limit=READ,
-            remedy="export the recording as CSV or Parquet",
+            f"{path}: {kind} files are not read", step="read recording", value=suffix, limit=READ, remedy=remedy,
         )  # fmt: skip
     if suffix in _BINARY:
         return _of_binary(path, mapping)
@@ -224,7 +229,7 @@ def _table(
     """What was recognised with a time, without doubled rows and rounded stamps."""
     metadata = {**metadata, **mapping.metadata}
     if is_sheet(r.name for r in found.readings):
-        metadata = {**resistances_said(metadata, source), **metadata}
+        metadata = {**windings_said(metadata, source), **metadata}
     columns = _of_one_length(found.columns)
     period = metadata.get("sample_period_s")
     if clock.interval_s is None and isinstance(period, float):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from commissioner.recordings.units import IN_NAME, read_unit, unbracketed, unit_in
+from commissioner.recordings.units import IN_NAME, read_unit, unbracketed, unit_in, without_brackets
+from commissioner.recordings.words import folded, translated
 
 PHASES = {
     "a": "u",
@@ -23,18 +23,6 @@ PHASES = {
     "t": "w",
 }
 ALPHABETS = ("abc", "uvw", "rst", "123")
-TRANSLATED = {
-    "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
-    "电流": "current", "電流": "current", "corriente": "current", "corrente": "current", "stroom": "current",
-    "ток": "current", "strom": "strom", "ström": "current", "prad": "current", "prąd": "current",
-    "电压": "voltage", "電圧": "voltage", "電壓": "voltage", "tensión": "voltage", "tensão": "voltage",
-    "tensione": "voltage", "voltaje": "voltage", "spanning": "voltage", "напряжение": "voltage", "spänning": "voltage",
-    "napiecie": "voltage", "napięcie": "voltage", "转速": "speed", "速度": "speed", "vitesse": "speed", "velocidad": "speed",
-    "leiterstrom": "strom", "außenleiterstrom": "strom", "netzstrom": "strom", "motorstrom": "strom", "leiterspannung": "spannung",
-    "außenleiterspannung": "spannung", "netzspannung": "spannung", "motorspannung": "spannung", "intensité": "current",
-    "zaman": "time", "akım": "current", "gerilim": "voltage", "composée": " ", "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
-}  # fmt: skip
-"""Words of other languages, as the words below; what only joins names in Chinese as a space."""
 SAME_KIND = {"tension": "uv", "spannung": "u", "voltage": "uv", "strom": "i", "courant": "i", "current": "i"}
 """Symbols that say the same again: `Tension U12`, `Strom I1`."""
 FILLING = frozenset(
@@ -63,6 +51,8 @@ FILLING = frozenset(
         "abc",
         "uvw",
         "rst",
+        "star",
+        "between",
     }
 )
 REMARKS = FILLING | {
@@ -106,38 +96,6 @@ TIME = frozenset(
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 """Without a unit of its own such a column is in 1/min."""
-SHEET = {
-    "frequency_hz": re.compile(r"f|freq(?:uency)?|frequenz|frequence|supplyfrequency|frequencia|fs"),
-    "voltage_line_v": re.compile(
-        r"(?:v|u|e|voltage|volts?|spannung|tension)(?:l|ll|line|linetoline|linevoltage|rms|eff)?|line(?:toline)?voltage|lltvoltage|terminalvoltage"
-        r"|appliedvoltage|vline|uline"
-    ),
-    "current_line_a": re.compile(
-        r"(?:i|current|amps?|strom|courant)(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current"
-    ),
-    "power_w": re.compile(
-        r"(?:p|w|power|watts?|leistung|puissance)(?:in|tot|total|input|3ph|el)?|(?:input|total|three(?:phase)?|3ph(?:ase)?)power|powerinput"
-        r"|inputwatts"
-    ),
-}
-"""Columns of a test sheet: line values and the power of all phases; a name that says `phase` is none of them."""
-_OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
-SHEET_RESISTANCE = {
-    "winding_resistance_line_ohm": re.compile(
-        r"(?:terminal|line(?:toline)?|klemmen)(?:winding)?(?:resistance|widerstand)|rll"
-        rf"|{_OF_WINDING}(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)"
-    ),
-    "winding_resistance_phase_ohm": re.compile(
-        r"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand)(?:per|pro|je)?(?:phase|strang)"
-    ),
-    "winding_resistance_ohm": re.compile(r"windings?resistance|wicklungswiderstand"),
-    "phase_resistance_ohm": re.compile(r"phases?(?:resistance|nwiderstand)|rph(?:ase)?|resistanceperphase"),
-    "stator_resistance_ohm": re.compile(r"(?:stator|stander)(?:winding|wicklungs)?(?:resistance|widerstand)|rs|r1"),
-    "resistance_ohm": re.compile(r"resistance|widerstand"),
-}
-"""Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
-_TERMINALS = re.compile(rf"{_OF_WINDING}l?([abcuvwrst123])l?([abcuvwrst123])")
-_OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
@@ -149,13 +107,16 @@ _CLOCK_FORM = re.compile(r"[hmsdy]+(?:[:.,/ -]+[hmsdyf]+)*:[hmsf]+(?:[.,]\w+)?",
 _PARAMETER = re.compile(r"^[rp]\d{2,5}(?:\[\d+\])?[:\s]+")
 """Of a drive's trace: `r0069[0] Phase current actual value, Phase U`."""
 _TIME_OF_RATE = re.compile(r"time\d*(?:default|slow|fast)?samplerate")
-_RYB_AS_RST = str.maketrans("ybYB", "stST")
+_RYB_AS_RST = str.maketrans("yb", "st")
 _STATOR = re.compile(r"([iuv])(?:s([abcuvw123])|([abc123])s)")
 """`isa`, `usb`; `ias`, `vbs`: stator quantities."""
 _NEUTRAL = re.compile(r"(?:[iuv]|current|voltage|strom|spannung|courant|tension)(?:n|neutral)")
 """Of the neutral: no phase, whatever letters its unit adds."""
-_RYB = re.compile(rf"^((?:{CURRENT}|{VOLTAGE})[\s_]*(?:ph(?:ase)?)?[\s_]*)([ryb]{{1,2}})(?![a-mo-z])", re.IGNORECASE)
-"""Phases by their colours, red, yellow and blue."""
+_KIND = rf"(?:{CURRENT}|{VOLTAGE})"
+_COLOURED = re.compile(rf"(?<![a-z])({_KIND}?)([ryb]{{1,2}}|red|yellow|blue)(?=n?(?![a-z]))", re.IGNORECASE)
+"""Phases by their colours, red, yellow and blue: `I_Y`, `VRY`, `B phase current`, `R-N voltage`."""
+_OTHERS = re.compile(rf"(?<![a-z]){_KIND}?[acst](?![a-z])", re.IGNORECASE)
+_OF_A_PHASE = re.compile(rf"(?<![a-z]){_KIND}(?=[ryb]{{0,2}}n?(?![a-z]))", re.IGNORECASE)
 _SHORT = re.compile(rf"({CURRENT}|{VOLTAGE})((?:l?[abcuvwrst123]){{1,2}})(?:n|0|a|v)?")
 
 
@@ -189,17 +150,6 @@ def is_remark(text: str) -> bool:
     return bool(is_description) or _CLOCK_FORM.fullmatch(unbracketed(text)) is not None
 
 
-def translated(name: str) -> str:
-    """The name with words of other languages replaced by those that are looked for."""
-    lower = name.lower()
-    if not any(word in lower for word in TRANSLATED):
-        return name
-    for word, ours in sorted(TRANSLATED.items(), key=lambda pair: -len(pair[0])):
-        pattern = re.escape(word) if not word.isascii() else rf"(?<![a-z]){word}(?![a-z])"
-        name = re.sub(pattern, f" {ours} ", name, flags=re.IGNORECASE)
-    return name.strip()
-
-
 def turned(name: str) -> str:
     """What a name with a minus before it (`-Ia`) is the negative of; nothing of any other name."""
     found = re.fullmatch(r"[-\u2212\u2013](?=[^\W\d])(.+)", name.strip())
@@ -222,14 +172,20 @@ def uses_rst(names: Iterable[str]) -> bool:
 
 
 def uses_ryb(names: Iterable[str]) -> bool:
-    """True where the phases are called R, Y, B."""
-    found = {letter for name in names if (colours := _RYB.match(name)) for letter in colours[2].lower()}
-    return found == set("ryb")
+    """True where the phases are called R, Y, B: two of them, and with Y missing none of A, C, S, T."""
+    bare = [without_brackets(name) for name in names]
+    coloured = [_COLOURED.findall(name) for name in bare if _OF_A_PHASE.search(name)]
+    letters = {letter for found in coloured for _, said in found for letter in _letters(said)}
+    return len(letters) > 1 and ("y" in letters or not any(map(_OTHERS.search, bare)))
 
 
 def in_rst(name: str) -> str:
     """A name whose phases are R, Y, B, with R, S, T in their place."""
-    return _RYB.sub(lambda found: found[1] + found[2].translate(_RYB_AS_RST), name, count=1)
+    return _COLOURED.sub(lambda found: found[1] + _letters(found[2]).translate(_RYB_AS_RST), name)
+
+
+def _letters(said: str) -> str:
+    return said.lower()[:1] if len(said) > 2 else said.lower()
 
 
 def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
@@ -241,60 +197,18 @@ def counted_from_zero(names: Iterable[str]) -> frozenset[str]:
     return frozenset(name for by in stems.values() if set(by) == {"0", "1", "2"} for name in by.values())
 
 
-def folded(text: str) -> str:
-    """The text without marks above and below its letters: `Fréquence` as `Frequence`."""
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
-
-
 def key_of(name: str) -> str:
     """Letters and digits of a name, without accents, its unit in brackets and its path."""
-    bare = re.sub(r"[\[(][^\])]*[\])]\s*$", "", name.rsplit(".", maxsplit=1)[-1])
+    bare = without_brackets(name.rsplit(".", maxsplit=1)[-1])
     return re.sub(r"[^a-z0-9]", "", folded(bare).lower())
 
 
-def sheet_meaning(name: str) -> str | None:
-    """The column of a test sheet (`Voltage (V)`, `I_line [A]`, `P_in/kW`) that a name means, or None."""
-    said = unit_in(name) if is_remark(unit_in(name)) else ""
-    bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE) + said
-    return next((column for column, names in SHEET.items() if names.fullmatch(key_of(bare))), None)
-
-
-def sheet_column(name: str) -> str | None:
-    """As `sheet_meaning`, with the windings' resistance beside."""
-    return sheet_meaning(name) or resistance_meaning(name)
-
-
-def resistance_meaning(name: str) -> str | None:
-    """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None."""
-    key = key_of(_OHM_ENDING.sub("", IN_NAME.sub("", name).strip()))
-    ends = _TERMINALS.fullmatch(key)
-    if ends and ends[1] != ends[2] and any(ends[1] in letters and ends[2] in letters for letters in ALPHABETS):
-        pair = {PHASES[ends[1]], PHASES[ends[2]]}
-        return f"winding_resistance_{next(p for p in ('uv', 'vw', 'wu') if set(p) == pair)}_ohm"
-    return next((column for column, names in SHEET_RESISTANCE.items() if names.fullmatch(key)), None)
-
-
-def sheet_unit(name: str) -> str:
-    """The unit at the end of a test sheet's `power_kw` or `winding_resistance_uv_mohm`, which no other column has; or nothing."""
-    found = _OHM_ENDING.search(name)
-    return found[1] if found else "kW" if name.lower().endswith("_kw") else ""
-
-
-def is_sheet(names: Iterable[str]) -> bool:
-    """Whether names are those of a test sheet: volts, amperes and watts once each, and no time."""
-    names = [n for n in names if n]
-    found = [m for n in names if (m := sheet_meaning(n))]
-    is_whole = all(found.count(c) == 1 for c in ("voltage_line_v", "current_line_a", "power_w"))
-    return is_whole and found.count("frequency_hz") < 2 and not any(meaning_of(n) == "time_s" for n in names)
-
-
-def missing_of_sheet(names: Iterable[str]) -> list[str]:
-    """What names of a test sheet lack of its columns: two of them at least are there, or the frequency; nothing of other names."""
-    names = [n for n in names if n]
-    found = {m for n in names if (m := sheet_meaning(n))}
-    if any(meaning_of(n) == "time_s" for n in names) or not ("frequency_hz" in found or len(found) > 1):
-        return []
-    return [column for column in SHEET if column not in found and column != "frequency_hz"]
+def meanings_of(names: Sequence[str]) -> dict[str, str]:
+    """Names that mean a column of the contract, by what their letters are in this company, with that column."""
+    meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
+    with_s = uses_rst(n for n in meant.values() if n)
+    found = {name: meaning_of(own, with_s) for name, own in meant.items() if name}
+    return {name: meaning for name, meaning in found.items() if meaning is not None}
 
 
 def is_per_minute(name: str) -> bool:

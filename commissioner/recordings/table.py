@@ -30,6 +30,7 @@ from commissioner.recordings.reading.said_tests import codes, is_title
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
+    POINT_FORMS,
     POINT_RESISTANCES,
     ReadingNote,
     RunningRecording,
@@ -395,7 +396,7 @@ CONTRACT_COLUMNS = frozenset(
         "time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a", "current_w_a", "dc_link_v",
         "averaged_periods",
         "voltage_u_v", "voltage_v_v", "voltage_w_v", "voltage_uv_v", "voltage_vw_v", "voltage_wu_v", "speed_rad_per_s",
-        *POINT_COLUMNS, *POINT_RESISTANCES,
+        *POINT_COLUMNS, *POINT_FORMS, *POINT_RESISTANCES,
     }
 )  # fmt: skip
 

@@ -19,7 +19,7 @@ BASE = {
 WHOLE = {
     "rad/s": ("speed", 1.0), "rads": ("speed", 1.0), "1/s": ("frequency", 1.0), "rpm": ("speed", math.pi / 30),
     "1/min": ("speed", math.pi / 30), "min-1": ("speed", math.pi / 30), "r/min": ("speed", math.pi / 30),
-    "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
+    "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "giri/min": ("speed", math.pi / 30), "min⁻¹": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
     "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
     "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
@@ -38,6 +38,8 @@ IN_NAME = re.compile(
 )
 """A unit at the end of a name: in brackets, after `in`, after a slash, an underscore, a comma or a colon."""
 
+_BRACKETS = re.compile(r"[\[(（【][^\])）】]*[\])）】]\s*$")
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -52,6 +54,11 @@ def unit_in(name: str) -> str:
     """The text of the unit at the end of a name, or nothing."""
     found = IN_NAME.search(name)
     return next((g for g in found.groups() if g), "") if found else ""
+
+
+def without_brackets(name: str) -> str:
+    """A name without what stands in brackets at its end."""
+    return _BRACKETS.sub("", name).strip()
 
 
 def unbracketed(text: str) -> str:

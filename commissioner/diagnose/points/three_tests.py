@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
+from commissioner.diagnose.points.meters import is_direct
 from commissioner.diagnose.points.resistance import column_of, star_resistance
 from commissioner.diagnose.points.table import LEAST_POINTS, lacking
 from commissioner.errors import DataRefused
@@ -181,8 +182,7 @@ def _join(every: Sequence[_Rows]) -> _Rows:
 
 def _is_direct(rows: _Rows) -> NDArray[np.bool_]:
     """A row without frequency is of direct current, unless it is called otherwise."""
-    no_frequency = ~(np.nan_to_num(rows.frequency_hz) > 0.0) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0)
-    return np.asarray(no_frequency & ~(rows.said > DIRECT_TEST))
+    return np.asarray(is_direct(rows.frequency_hz, rows.said) & (rows.voltage_v > 0.0) & (rows.current_a > 0.0))
 
 
 def _wrong_cell(ac: _Rows) -> DataRefused | None:

@@ -28,7 +28,13 @@ from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed
-from commissioner.operations.recordings.sheets import are_sheets, are_three, require_whole_sheets
+from commissioner.operations.recordings.sheets import (
+    are_sheets,
+    are_three,
+    notes_of,
+    require_whole_sheets,
+    with_line_values,
+)
 from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
 from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
 from commissioner.recordings.catalogue.reading import sheet_of
@@ -90,7 +96,8 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
         folder_to_write(request.out)
     if (sheet := sheet_of(request.files, said)) is not None:
         return Diagnosed(catalogue.diagnosed(sheet, request.motor, request.trust, request.out), request.out)
-    tables = [contract_table(Path(path), said, request.motor) for path in request.files]
+    read = [contract_table(Path(path), said, request.motor) for path in request.files]
+    tables = with_line_values(read, request.motor)
     if are_sheets(tables):
         return _points(tables, request)
     require_whole_sheets(tables)
@@ -183,6 +190,8 @@ def _points(tables: Sequence[Table], request: DiagnoseRequest) -> Diagnosed:
         else points_document(analyse_points(points, resistance_ohm))
         for points in read
     ]
+    for table, one in zip(tables, documents, strict=True):
+        one["remarks"] = [*notes_of([table]), *one.get("remarks", [])]
     names = _names(tables)
     document = documents[0] if len(documents) == 1 else _joined(documents, names)
     if out is not None:

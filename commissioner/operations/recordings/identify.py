@@ -99,7 +99,7 @@ def identify_any(
 ) -> Identified | IdentifiedRunning | IdentifiedSheets | IdentifiedCatalogue:
     """As `identify`; recordings of a running motor (a direct start, several loads) by a fit of the running machine, test sheets
     by their three tests, a manufacturer's sheet by its values."""
-    from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets
+    from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets, with_line_values
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
     said = read_mapping(request.mapping) if request.mapping else None
@@ -110,7 +110,7 @@ def identify_any(
 
         made = catalogue.identified(sheet, request.motor, request.trust, request.out)
         return IdentifiedCatalogue(made, request.files)
-    tables = [contract_table(path, said, request.motor) for path in request.files]
+    tables = with_line_values([contract_table(path, said, request.motor) for path in request.files], request.motor)
     if are_sheets(tables):
         return IdentifiedSheets(of_sheets(tables, request.motor, trust_from(request.trust)), request.files)
     require_whole_sheets(tables)

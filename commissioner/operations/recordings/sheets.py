@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
 
 from commissioner.diagnose.contract import CONVENTION, DiagnosisDocument
+from commissioner.diagnose.points.meters import line_values
 from commissioner.diagnose.points.table import is_points_table
 from commissioner.diagnose.points.three_tests import ThreeTests, are_three_tests, solve
 from commissioner.errors import DataRefused
@@ -17,13 +18,28 @@ from commissioner.motor.circuit import PARAMETERS
 from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
 from commissioner.operations.recordings.trust import Trust, refused, trusted_data
-from commissioner.recordings.names import missing_of_sheet
+from commissioner.recordings.sheet_names import missing_of_sheet
 from commissioner.recordings.table import Table
+from commissioner.records import ReadingNote
 
 NOTHING_LEFT = (
     "Three tests fix the circuit and leave nothing over: no cause can be seen or ruled out. The circuit is below; `identify` "
     "shows it with what was assumed."
 )
+
+
+def with_line_values(tables: Sequence[Table], motor: str | None) -> list[Table]:
+    """Tables of test points with line volts and amperes, noted from which meters; others as they are. DataRefused: the meters
+    contradict each other, or it is not told what `phase` means."""
+    return [_with_line_values(t, motor) if is_points_table([*t.columns]) else t for t in tables]
+
+
+def _with_line_values(table: Table, motor: str | None) -> Table:
+    found = line_values(table.columns, {**table.metadata, **plate_metadata(motor)})
+    if isinstance(found, DataRefused):
+        raise found
+    notes = tuple(ReadingNote("line_values", remark.rstrip(".")) for remark in found.remarks)
+    return replace(table, columns=found.columns, notes=(*table.notes, *notes))
 
 
 def are_sheets(tables: Sequence[Table]) -> bool:
@@ -40,8 +56,8 @@ def require_whole_sheets(tables: Sequence[Table]) -> None:
                 f"{table.source}: this looks like a test sheet and lacks {', '.join(missing)}", step="recognise columns",
                 value=", ".join(r.name for r in table.readings)[:200],
                 limit="one column each of line-to-line volts, line amperes and the watts of all three phases (rms)",
-                remedy="name the columns frequency_hz, voltage_line_v, current_line_a, power_w; take means of the three meters, the sum of "
-                "two wattmeters, and line values of phase ones (sqrt 3)",
+                remedy="name the columns frequency_hz, voltage_line_v (or voltage_neutral_v, voltage_uv_v ...), current_line_a (or current_u_a ...), power_w; "
+                "take the sum of two wattmeters",
             )  # fmt: skip
 
 
@@ -78,7 +94,7 @@ def identified(tables: Sequence[Table], motor: str | None, trust: Trust | None) 
         },
         "losses": asdict(found.losses),
         "rows": dict(found.rows),
-        "remarks": [*decided, *found.assumed, *_notes(tables)],
+        "remarks": [*decided, *found.assumed, *notes_of(tables)],
     }
 
 
@@ -110,5 +126,5 @@ def _against_plate(found: ThreeTests, plate: Mapping[str, float | str], trust: T
     return [trusted_data(against)]
 
 
-def _notes(tables: Sequence[Table]) -> list[str]:
+def notes_of(tables: Sequence[Table]) -> list[str]:
     return [f"{Path(t.source).name}: {note.what}." for t in tables for note in t.notes]

@@ -1,12 +1,13 @@
-"""What a sheet calls its values, in English and German: `P_N [kW]`, `Wirkungsgrad 3/4`, `I_A/I_N`, `cos phi`, `Kippmoment`."""
+"""What a sheet calls its values, in English and German, and in languages whose words `words` knows: `P_N [kW]`, `Wirkungsgrad 3/4`, `I_A/I_N`, `cos phi`, `Kippmoment`."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 
-from commissioner.identify.catalogue.sheet import KEYS
+from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS
 from commissioner.recordings.units import unbracketed, unit_in
+from commissioner.recordings.words import readings, translated
 
 _RATED = r"(?:rated|nominal|full ?load|nenn|bemessungs)?"
 _OVER = (
@@ -24,10 +25,10 @@ NAMES = {
     "power_factor": rf"{_RATED}(?:powerfactor|leistungsfaktor|pf|cos(?:phi)?[nr]?){_LOAD}",
     "efficiency": rf"{_RATED}(?:efficiency|wirkungsgrad|eff|eta[nr]?){_LOAD}",
     "rated_torque_nm": rf"{_RATED}(?:torque|moment|drehmoment)|[mtc][nr]?",
-    "starting_current": rf"(?:{_START}(?:current|strom)|i(?:a|st|s|lr|l|anl)|lra|lrc){_OVER}",
-    "starting_torque": rf"(?:{_START}(?:torque|moment|drehmoment)|[mtc](?:a|st|lr|l|d)|lrt){_OVER}",
+    "starting_current": rf"(?:{_START}(?:current|strom)|i(?:a|st|s|lr|l|anl)|lra|lrc){_OVER}|i[dp]/(?:in|ir|i)",
+    "starting_torque": rf"(?:{_START}(?:torque|moment|drehmoment)|[mtc](?:a|st|lr|l|d)|cs|lrt){_OVER}|[mtc]p/[mtc](?:n|r)?",
     "breakdown_torque": rf"(?:(?:breakdown|pullout|maximum|max|kipp)(?:torque|moment|drehmoment)|[mtc](?:k|max|b|m)|bdt){_OVER}",
-    "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mtc](?:s|u|pu)){_OVER}",
+    "pull_up_torque": rf"(?:(?:pullup|sattel|hochlauf)(?:torque|moment|drehmoment)|[mt](?:s|u|pu)|c(?:u|pu)){_OVER}",
     "no_load_current_a": r"(?:noload|idle|leerlauf)(?:current|strom)|i0",
     "inertia_kg_m2": r"(?:rotor|mass|massen)?(?:inertia|momentofinertia|tragheitsmoment|tragheit)|momentofinertiaj|j|jm|jmot|jrotor",
     "winding_resistance": r"(?:winding|stator|phase|wicklungs|strang|klemmen|terminal)?(?:resistance|widerstand)\w*|r(?:uv|1|s|ph)\w*",
@@ -41,6 +42,7 @@ NAMES = {
 _PATTERNS = {key: re.compile(pattern.replace(" ", "")) for key, pattern in NAMES.items()}
 _GREEK = {"η": "eta", "φ": "phi", "ϕ": "phi", "ϑ": "temperature", "₀": "0", "µ": "u", "½": "1/2", "¾": "3/4"}
 _SUFFIX = re.compile(r"(?<=[a-z])_(kw|w|hp|v|kv|hz|a|nm|rpm|ohm|c|pct|percent|kg_m2|kgm2)$", re.IGNORECASE)
+_OF_RATED = re.compile(r"[imtc]_?[a-z]{1,3}/[imtc]_?[nr]?", re.IGNORECASE)
 HALF_LOADS = {"3/4": "_75", "75": "_75", "2/4": "_50", "1/2": "_50", "50": "_50"}
 _LOADS = re.compile(
     r"[\[(]?\s*(?:4/4|100|1/1)\s*%?\s*[/|,; -]+\s*(?:3/4|75)\s*%?\s*[/|,; -]+\s*(?:1/2|2/4|50)\s*%?\s*(?:load|last)?\s*[\])]?",
@@ -57,9 +59,27 @@ def key_of(name: str) -> str | None:
     if (found := SAID_WHOLE.get(name.strip().lower())) is not None:
         return found
     bare = _SUFFIX.sub("", _without_unit(_LOADS.sub("", name)))
-    words, _, symbol = bare.strip().rpartition(" ")
-    whole, first = _matched(bare), _matched(words)
-    return whole or (first if first is not None and first == _matched(symbol) else None)
+    return _in_any_order(bare) or _before_symbol(bare) or _over_rated(bare)
+
+
+def _before_symbol(name: str) -> str | None:
+    """The key of words that a symbol of the same follows (`Kippmoment M_K/M_N`). A symbol's letters abbreviate the sheet's own language
+    (`Coppia di spunto Cs/Cn`): of another than English and German the words decide."""
+    words, _, symbol = name.strip().rpartition(" ")
+    key = _in_any_order(words)
+    is_abroad = key in ABSOLUTE and words != translated(words) and _OF_RATED.fullmatch(symbol) is not None
+    return key if is_abroad or key == _matched(symbol) else None
+
+
+def _over_rated(name: str) -> str | None:
+    """The key of a ratio to its rated value that is written out (`Par de arranque / par nominal`)."""
+    over, _, rated = name.partition("/")
+    key = _in_any_order(over)
+    return key if key in ABSOLUTE and _in_any_order(rated) == ABSOLUTE[key] else None
+
+
+def _in_any_order(name: str) -> str | None:
+    return next((key for reading in readings(name) if (key := _matched(reading))), None)
 
 
 def _matched(name: str) -> str | None:
@@ -75,6 +95,7 @@ SAID_WHOLE = {f"{kind}_{load}": f"{kind}_{load}" for kind in ("efficiency", "pow
 
 def unit_of(name: str) -> str:
     """The unit in a name: in brackets, after a slash that divides by none of the rated values, or as its last letters (`_kw`)."""
+    name = _LOADS.sub("", name)
     if (ending := _SUFFIX.search(name.strip())) is not None:
         return {"pct": "%", "percent": "%", "kg_m2": "kgm2"}.get(ending[1].lower(), ending[1])
     if (bare := re.search(r"[\[(]\s*([^\])]*)[\])]\s*$", name)) is not None:
@@ -87,12 +108,13 @@ def unit_of(name: str) -> str:
 
 def is_ratio(name: str) -> bool:
     """Whether the name says that it is one: `I_A/I_N`, `starting current ratio`."""
-    return re.search(r"/[imtc][_ ]?[nr]?|/rated|/nenn|ratio|verh|multiple|_pu\b", name.lower()) is not None
+    is_said = re.search(r"/[imtc][_ ]?[nr]?|/rated|/nenn|ratio|verh|multiple|_pu\b", name.lower()) is not None
+    return is_said or _over_rated(_without_unit(name)) is not None
 
 
 def is_between_terminals(name: str) -> bool | None:
     """Of a winding's resistance: between two terminals, of one phase, or unsaid."""
-    lower = name.lower()
+    lower = translated(name).lower()
     if re.search(r"uv|u-v|terminal|line|klemme|phase[- ]?(?:to[- ]?)?phase|zwischen", lower):
         return True
     return False if re.search(r"phase|strang|per ph|_ph", lower) else None

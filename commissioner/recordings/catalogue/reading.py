@@ -17,9 +17,10 @@ from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
 from commissioner.recordings.catalogue.cells import refused, split_unit, unit_key, value_of
 from commissioner.recordings.formats.foreign_csv import read_text
-from commissioner.recordings.names import is_sheet, meaning_of
+from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
+from commissioner.recordings.sheet_names import is_sheet
 
 ENDINGS = (".csv", ".txt", ".tsv")
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3
@@ -34,7 +35,7 @@ TELLING = (
 )
 """Two of them at least are on a sheet of a manufacturer."""
 PAIR = re.compile(
-    r"^\s*(\d+(?:[.,]\d+)?)(?:\s*[A-Za-zΔ△]+)*\s*/\s*(\d+(?:[.,]\d+)?)\s*([A-Za-z]{0,3}?)\s*(?:[DYΔ△](?:\s*/\s*[DYΔ△])?)?\s*$"
+    r"^\s*(\d+(?:[.,]\d+)?)(?:\s*[A-Za-zΔ△]+)*\s*/\s*(\d+(?:[.,]\d+)?)[\s;]*([A-Za-z]{0,3}?)\s*(?:[DYΔ△](?:\s*/\s*[DYΔ△])?)?\s*$"
 )
 """`230/400 V`, `400/690 V D/Y`, `400 V D / 690 V Y`."""
 TRIPLE = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*[/;|]\s*(\d+(?:[.,]\d+)?)\s*(%?)[\s;]*$")
@@ -87,7 +88,15 @@ def _is_table_of_samples(lines: Sequence[str]) -> bool:
     alike = len({len(row) for row in numbers}) == 1
     if len(numbers) > 2 and alike and not any(sum(names.key_of(c) is not None for c in row) >= FEWEST for row in rows):
         return True
-    return any(is_sheet(row) or any(meaning_of(c) == "time_s" for c in row if len(row) > 2) for row in rows)
+    return any(
+        (is_sheet(row) and not _is_of_a_type(row)) or any(meaning_of(c) == "time_s" for c in row if len(row) > 2)
+        for row in rows
+    )
+
+
+def _is_of_a_type(cells: Sequence[str]) -> bool:
+    """Whether names tell what no test sheet does: two of how the motor starts, breaks down, and uses its power."""
+    return len({key for key in _keys(cells) if key.startswith(("starting_", "breakdown_", "efficiency"))}) > 1
 
 
 def _table(lines: Sequence[str], source: str) -> list[Entry]:

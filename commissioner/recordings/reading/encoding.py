@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from commissioner.recordings.names import TRANSLATED
 from commissioner.recordings.reading.preface import INTERVAL, RATE
 from commissioner.recordings.units import WHOLE
+from commissioner.recordings.words import TRANSLATED
 
 SAMPLE = 1 << 16
 CODE_PAGES = {"cp1252": "Windows-1252", "gb18030": "GBK", "cp932": "Shift-JIS", "cp1251": "Windows-1251", "cp1250": "Windows-1250",

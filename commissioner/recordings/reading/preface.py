@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from commissioner.recordings.units import read_unit
+from commissioner.recordings.units import read_unit, without_brackets
+from commissioner.recordings.words import translated
 
 INTERVAL = frozenset(
     {"sampleinterval", "samplinginterval", "samplingperiod", "sampleperiod", "sampleperiods", "dt", "deltat", "deltatime",
@@ -36,7 +37,7 @@ class Clock:
 
 def key(text: str) -> str:
     """Letters (of any script) and digits, in lower case, without a unit in brackets."""
-    return re.sub(r"[\W_]", "", re.sub(r"[\[(][^\])]*[\])]\s*$", "", text).lower())
+    return re.sub(r"[\W_]", "", translated(without_brackets(text)).lower())
 
 
 def pairs(rows: Iterable[Sequence[str]]) -> list[tuple[str, str, str]]:

@@ -10,17 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import DataRefused
+from commissioner.recordings.catalogue.names import key_of as key_of_plate
 from commissioner.recordings.names import (
     counted_from_zero,
     in_rst,
     is_per_minute,
     is_remark,
-    is_sheet,
     meaning_of,
-    resistance_meaning,
     reversed_pair,
-    sheet_column,
-    sheet_unit,
     turned,
     unit_of,
     uses_rst,
@@ -28,8 +25,9 @@ from commissioner.recordings.names import (
 )
 from commissioner.recordings.reading.mapping import Target
 from commissioner.recordings.reading.said_tests import is_title
+from commissioner.recordings.sheet_names import is_sheet, resistance_meaning, sheet_columns, sheet_unit
 from commissioner.recordings.table import CONTRACT_COLUMNS, HOW_TO_MAP, ColumnReading
-from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in
+from commissioner.recordings.units import FOREIGN, IN_NAME, NO_UNIT, read_unit, unbracketed, unit_in, without_brackets
 from commissioner.records import ReadingNote, Signal
 
 MEASURES = {"_s": "time", "_a": "current", "_v": "voltage", "_w": "power", "_hz": "frequency", "_ohm": "resistance",
@@ -59,6 +57,7 @@ def recognise(
     meant = {name: in_rst(name) for name in names} if uses_ryb(names) else {name: name for name in names}
     with_s = uses_rst([n for n in meant.values() if n])
     of_sheet, from_zero = is_sheet(names), counted_from_zero(names)
+    of_points = sheet_columns(names) if of_sheet else {}
     columns: dict[str, Signal] = {}
     place: dict[str, int] = {}
     meaning: str | None
@@ -71,7 +70,7 @@ def recognise(
             continue
         target = targets.get(name) or targets.get(IN_NAME.sub("", name).strip())
         is_asked = name in from_zero and target is None
-        if of_sheet and name not in targets and name not in CONTRACT_COLUMNS and (found := sheet_column(name)):
+        if name not in targets and name not in CONTRACT_COLUMNS and (found := of_points.get(name)):
             unit = unit or sheet_unit(name)
             meaning, factor = found, _factor(name, unit, found, source)
         else:
@@ -119,20 +118,18 @@ def _own_unit(name: str) -> str:
     return next((SHOWN[measures] for ending, measures in MEASURES.items() if name.endswith(ending)), "")
 
 
-def resistances_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float]:
-    """What lines above a test sheet say of the windings' resistance (`# R_uv (mOhm): 1520`), by the contract's names, in ohm."""
-    out: dict[str, float] = {}
+def windings_said(metadata: Mapping[str, float | str], source: str) -> dict[str, float | str]:
+    """What lines above a test sheet say of the windings (`# R_uv (mOhm): 1520`, `# Schaltung: Dreieck`), by the contract's names, in ohm."""
+    out: dict[str, float | str] = {}
     for name, value in metadata.items():
+        if key_of_plate(name) == "connection":
+            out["connection"] = value
         meaning, said = resistance_meaning(name), _QUANTITY.fullmatch(str(value).strip())
         if meaning is None or said is None or name in CONTRACT_COLUMNS:
             continue
         unit = said[2] or unit_of(name) or sheet_unit(name)
         out[meaning] = _factor(name, unit, meaning, source) * float(said[1].replace(",", "."))
     return out
-
-
-def _bare(name: str) -> str:
-    return re.sub(r"[\[(][^\])]*[\])]\s*$", "", name).strip()
 
 
 def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: str) -> tuple[str | None, float]:
@@ -143,7 +140,7 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
         return target.column, sign * (
             target.factor if target.factor is not None else _factor(name, unit, target.column, source)
         )
-    bare = _bare(name)
+    bare = without_brackets(name)
     if bare in CONTRACT_COLUMNS:
         return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
     if of := turned(name):

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from commissioner.recordings.names import folded
+from commissioner.recordings.words import folded, translated
 from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, Signal
 
-TITLES = frozenset({"test", "testtype", "kind", "versuch", "prufung", "pruefung", "versuchsart", "typeoftest", "essai"})
+TITLES = frozenset({"test", "testtype", "typetest", "kind", "pruefung", "versuchsart", "typeoftest"})
 WORDS = {
-    DIRECT_TEST: r"dc(?:test)?|directcurrent|gleichstrom|courantcontinu|winding(?:resistance)?|resistance|wicklungswiderstand|widerstand",
-    IDLE_TEST: r"noload(?:test)?|idle|idling|leerlauf(?:versuch)?|unloaded|(?:essai)?avide",
-    LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?(?:test)?|lockedrotor|shortcircuit(?:test)?|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|(?:essaia?)?rotorbloque|(?:essai)?encourtcircuit|standstill",
+    DIRECT_TEST: r"dc|cc|directcurrent|winding(?:resistance)?|resistance|resistancewinding|wicklungswiderstand",
+    IDLE_TEST: r"noload|idle|idling|leerlaufversuch|unloaded",
+    LOCKED_TEST: r"(?:locked|blocked)(?:rotor)?|(?:en|in|a)?shortcircuit|kurzschlu(?:ss|ß)(?:versuch)?|festgebremst|arotorlocked|a?lockedrotor|standstill",
 }  # fmt: skip
 
 
@@ -25,9 +25,10 @@ def is_title(name: str) -> bool:
 
 def codes(cells: Sequence[str]) -> Signal | None:
     """`(n,)` of `records.DIRECT_TEST` ...; not a number where a cell says nothing known, None where no cell does."""
-    out = np.array([next((c for c, w in WORDS.items() if re.fullmatch(w, _letters(cell))), np.nan) for cell in cells])
+    said = [re.sub("^test|test$", "", _letters(cell)) for cell in cells]
+    out = np.array([next((c for c, w in WORDS.items() if re.fullmatch(w, one)), np.nan) for one in said])
     return out if np.isfinite(out).any() else None
 
 
 def _letters(text: str) -> str:
-    return re.sub(r"[\W_\d]", "", folded(text).lower())
+    return re.sub(r"[\W_\d]", "", folded(translated(text)).lower())

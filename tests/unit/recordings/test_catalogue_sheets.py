@@ -33,6 +33,24 @@ Schaltung;Dreieck
 """
 FORMS = {
     "german": GERMAN,
+    "spanish": "Potencia nominal;11;kW\nTensión nominal;400;V\nFrecuencia;50;Hz\nVelocidad nominal;1465;r/min\nCorriente nominal;21,5;A\n"
+    "Factor de potencia;0,81\nRendimiento;91,4;%\nPar de arranque M_A/M_N;2,3\nCorriente de arranque I_A/I_N;7,4\nPar máximo M_K/M_N;2,9\n"
+    "Momento de inercia J;0,044;kgm²\nConexión;triángulo\n",
+    "spanish, in one row": "Potencia\tTensión\tFrecuencia\tVelocidad\tCorriente\tcos φ\tRendimiento\tIa/In\tMa/Mn\tMk/Mn\tInercia\tConexión\n"
+    "kW\tV\tHz\trpm\tA\t\t%\t\t\t\tkgm2\t\n11\t400\t50\t1465\t21,5\t0,81\t91,4\t7,4\t2,3\t2,9\t0,044\tD\n",
+    "over the rated one": "Potencia nominal;11;kW\nTensión nominal;400/690;V\nFrecuencia nominal;50;Hz\nVelocidad nominal;1465;min^-1\n"
+    "Corriente nominal;21,5;A\nFactor de potencia;0,81\nRendimiento;91,4;%\nCorriente de arranque / Corriente nominal;7,4\n"
+    "Par de arranque / Par nominal;2,3\nPar máximo / Par nominal;2,9\nMomento de inercia;0,044;kgm²\nConexión;triángulo\n",
+    "italian symbols": "Potenza resa;11 kW\nTensione;400 V\nFrequenza;50 Hz\nGiri;1465 giri/min\nCorrente;21,5 A\ncosφ;0,81\nRendimento;91,4 %\n"
+    "Corrente di spunto Is/In;7,4\nCoppia di spunto Cs/Cn;2,3\nCoppia massima Cm/Cn;2,9\nJ;0,044 kgm2\nCollegamento;D\n",
+    "french symbols": "Puissance utile;11 kW\nTension;400 V\nFréquence;50 Hz\nVitesse;1465 tr/min\nIntensité;21,5 A\ncos φ;0,81\nRendement;91,4 %\n"
+    "Id/In;7,4\nCd/Cn;2,3\nCm/Cn;2,9\nInertie;0,044 kgm2\nCouplage;D\n",
+    "italian": "Potenza nominale (kW): 11\nTensione nominale (V): 400\nFrequenza: 50 Hz\nVelocità nominale: 1465 giri/min\n"
+    "Corrente nominale: 21,5 A\ncosfi: 0,81\nRendimento (%): 91,4\nCoppia di spunto (%): 230\nCorrente di spunto I_A/I_N: 7,4\n"
+    "Coppia massima (%): 290\nMomento d'inerzia: 0,044 kg m2\nCollegamento: triangolo\n",
+    "french": "Puissance nominale;11 kW\nTension nominale;400 V\nFréquence;50 Hz\nVitesse nominale;1465 tr/min\nCourant nominal;21,5 A\n"
+    "Facteur de puissance;0,81\nRendement;91,4 %\nCouple de démarrage;230 %\nCourant de démarrage I_A/I_N;7,4\nCouple maximal;290 %\n"
+    "Moment d'inertie;0,044 kgm²\nCouplage;triangle\n",
     "one row": "P_N [kW];U [V];f [Hz];n [1/min];I_N [A];cos phi;eta [%];M_A/M_N;I_A/I_N;M_K/M_N;J [kgm2];Schaltung\n"
     "11;400;50;1465;21,5;0,81;91,4;2,3;7,4;2,9;0,044;D\n",
     "units below": "P_N,U_N,f,n_N,I_N,cos phi,eta,M_A/M_N,I_A/I_N,M_K/M_N,J,connection\nkW,V,Hz,1/min,A,,%,,,,kgm2,\n"
@@ -73,7 +91,9 @@ def test_a_page_is_the_same_sheet_in_anybodys_form(tmp_path, name):
     assert sheet.values["rated_current_a"].half_step == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize("name", ["Wirkungsgrad (4/4, 3/4, 1/2)", "Wirkungsgrad 4/4, 3/4, 1/2 [%]"])
+@pytest.mark.parametrize(
+    "name", ["Wirkungsgrad (4/4, 3/4, 1/2)", "Rendimiento (100/75/50 %)", "Wirkungsgrad 4/4, 3/4, 1/2 [%]"]
+)
 def test_three_loads_in_one_cell(tmp_path, name):
     sheet = read(tmp_path, GERMAN.replace("Wirkungsgrad 4/4;91,4;%", f"{name};91,4 / 91,5 / 90,6"))
     found = [sheet.values[f"efficiency{at}"].value for at in ("", "_75", "_50")]

@@ -1,0 +1,185 @@
+"""Line values of a test sheet from what its meters showed: between lines, to the neutral, in one phase, in all three.
+
+A symmetric motor on a symmetric supply: V_line = sqrt(3) V_neutral, and of three meters the mean (IEEE 112).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commissioner.diagnose.intake.points import Array
+from commissioner.diagnose.intake.refusal import refused
+from commissioner.errors import DataRefused
+from commissioner.motor.nameplate import connection_of
+from commissioner.records import DIRECT_TEST
+
+VOLTS_APART, AMPERES_APART = 0.05, 0.15
+"""By which one of three meters may differ from their mean. NEMA MG 1-14.36: no motor is to run on volts that differ by more than
+5 %, and currents differ by 6 to 10 times as much; with the 1 % beyond which it derates, and meters of class 2.5, 15 %."""
+ROOT_3 = float(np.sqrt(3.0))
+
+
+@dataclass(frozen=True)
+class _Form:
+    """One way in which a sheet gives volts or amperes: values `(n,)` as line values, what was done in words."""
+
+    columns: tuple[str, ...]
+    values: Array
+    said: str
+
+
+@dataclass(frozen=True)
+class LineValues:
+    """`columns` with `voltage_line_v` and `current_line_a` where they follow; `remarks`: from what."""
+
+    columns: Mapping[str, Array]
+    remarks: tuple[str, ...] = ()
+
+
+def is_direct(frequency_hz: Array, said: Array) -> NDArray[np.bool_]:
+    """`(n,)`: rows without a frequency, unless the sheet calls them another test."""
+    return np.asarray(~(np.nan_to_num(frequency_hz) > 0.0) & ~(said > DIRECT_TEST))
+
+
+def line_values(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> LineValues | DataRefused:
+    """The columns with line values. `said`: the plate as far as it is known, and `resistance_measured`.
+
+    DataRefused: meters of one quantity contradict each other, or it is not told what `phase` means.
+    """
+    out, remarks = dict(columns), []
+    for line, forms in (("voltage_line_v", _volts), ("current_line_a", _amperes)):
+        given = list(forms(columns, said))
+        for form in given:
+            if isinstance(form, DataRefused):
+                return form
+        found = [form for form in given if isinstance(form, _Form)]
+        if (against := _contradiction(found, columns)) is not None:
+            return against
+        if found and found[0].columns != (line,):
+            out[line] = found[0].values
+            remarks.append(f"{line} {found[0].said}")
+    return LineValues(out, tuple(remarks))
+
+
+def _volts(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> Iterator[_Form | DataRefused]:
+    yield from _as_given(columns, "voltage_line_v")
+    yield from _of_meters(columns, tuple(f"voltage_{pair}_v" for pair in ("uv", "vw", "wu")), VOLTS_APART)
+    for meters in (tuple(f"voltage_{p}_v" for p in "uvw"), ("voltage_neutral_v",), ("voltage_phase_v",)):
+        for form in _of_meters(columns, meters, VOLTS_APART):
+            yield _from_neutral(form, columns, said) if isinstance(form, _Form) else form
+
+
+def _amperes(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> Iterator[_Form | DataRefused]:
+    yield from _as_given(columns, "current_line_a")
+    yield from _of_meters(columns, tuple(f"current_{p}_a" for p in "uvw"), AMPERES_APART)
+    for form in _as_given(columns, "current_phase_a"):
+        is_star = _connection(said) == "star"
+        yield (
+            _Form(form.columns, form.values, "is current_phase_a: in star the same.")
+            if is_star
+            else _ask(columns, "current_phase_a")
+        )
+
+
+def _as_given(columns: Mapping[str, Array], name: str) -> Iterator[_Form]:
+    if name in columns:
+        yield _Form((name,), np.asarray(columns[name], dtype=float), f"is {name}.")
+
+
+def _of_meters(columns: Mapping[str, Array], names: tuple[str, ...], apart: float) -> Iterator[_Form | DataRefused]:
+    """The mean of the meters that are there; of direct current of those that show something, whichever way it flowed."""
+    there = tuple(name for name in names if name in columns)
+    if not there:
+        return
+    shown = np.stack([np.asarray(columns[name], dtype=float) for name in there])
+    direct = _direct(columns)
+    shown[:, direct] = np.where(shown[:, direct] == 0.0, np.nan, np.abs(shown[:, direct]))
+    if np.any(lost := ~np.isfinite(shown) & ~direct):
+        meter, row = np.argwhere(lost)[0]
+        yield refused(
+            f"{there[meter]} holds no number in row {row + 1}",
+            None,
+            "a number in every row",
+            "fill the cell, or leave the row out",
+        )
+        return
+    counts = np.where(direct, np.isfinite(shown).sum(axis=0), len(there))
+    mean = np.where(direct, np.nansum(shown, axis=0), shown.sum(axis=0)) / np.maximum(counts, 1)
+    off = np.nan_to_num(np.abs(shown - mean) / np.abs(mean))
+    if off.max(initial=0.0) > apart:
+        yield _odd_one(there, shown, off, apart)
+    else:
+        of = (
+            f"the mean of {', '.join(there)}, at most {off.max(initial=0.0):.2g} of it apart"
+            if len(there) > 1
+            else there[0]
+        )
+        yield _Form(there, np.where(counts > 0, mean, np.nan), f"is {of}.")
+
+
+def _odd_one(names: tuple[str, ...], shown: Array, off: Array, apart: float) -> DataRefused:
+    """The refusal names the meter furthest from the middle one, in the row where they differ most."""
+    row = int(np.argmax(off.max(axis=0)))
+    odd = int(np.nanargmax(np.abs(shown[:, row] - np.nanmedian(shown[:, row]))))
+    others = ", ".join(
+        f"{name} {value:g}" for k, (name, value) in enumerate(zip(names, shown[:, row], strict=True)) if k != odd
+    )
+    return refused(
+        f"{names[odd]} is {shown[odd, row]:g} in row {row + 1} and its neighbours are not: {others}", float(off[:, row].max()),
+        f"meters within {apart:.0%} of their mean", "correct the cell or its unit; where the motor or the supply is not symmetric, "
+        "no circuit of one phase describes it",
+    )  # fmt: skip
+
+
+def _from_neutral(form: _Form, columns: Mapping[str, Array], said: Mapping[str, float | str]) -> _Form | DataRefused:
+    """Line volts from those of a phase. DataRefused: of a delta, or of direct current, where `phase` may be two things."""
+    if form.columns == ("voltage_phase_v",) and _connection(said) == "delta":
+        return _ask(columns, "voltage_phase_v")
+    direct = _direct(columns)
+    if np.any(direct & np.isfinite(form.values)) and "resistance_measured" not in said:
+        return refused(
+            "the volts of direct current stand among phase voltages, and where they were measured is not told", ", ".join(form.columns),
+            "volts between two terminals, or of one winding", "add `# resistance_measured: line_to_line` (between two terminals), "
+            "phase_winding or star_equivalent",
+        )  # fmt: skip
+    words = (
+        ""
+        if form.columns != ("voltage_phase_v",)
+        else ", taken as from a terminal to the neutral (`# connection: delta` is asked)"
+    )
+    said_so = f"is sqrt(3) times {' and '.join(form.columns) if len(form.columns) < 2 else 'the mean of ' + ', '.join(form.columns)}{words}."
+    return _Form(form.columns, np.where(direct, form.values, ROOT_3 * form.values), said_so)
+
+
+def _ask(columns: Mapping[str, Array], name: str) -> DataRefused:
+    return refused(
+        f"{name} may be of a winding or of a line, and which is not told", float(np.asarray(columns[name])[0]),
+        "line values, or `connection: star`, in which both are one", "give voltage_line_v (between terminals; a delta winding's own), "
+        "voltage_neutral_v or current_line_a (in a delta sqrt(3) times the winding's)",
+    )  # fmt: skip
+
+
+def _contradiction(found: list[_Form], columns: Mapping[str, Array]) -> DataRefused | None:
+    """Where the sheet gives one quantity in two ways that disagree beyond three meters' own limit."""
+    ac = ~_direct(columns)
+    for other in found[1:]:
+        ratio = other.values[ac] / found[0].values[ac]
+        if ratio.size and np.nanmax(np.abs(ratio - 1.0), initial=0.0) > AMPERES_APART:
+            return refused(
+                f"{', '.join(found[0].columns)} and {', '.join(other.columns)} contradict each other", float(np.nanmedian(ratio)),
+                "a ratio of 1 when both are taken as line values", "leave out or rename the one that is not what it is called",
+            )  # fmt: skip
+    return None
+
+
+def _direct(columns: Mapping[str, Array]) -> NDArray[np.bool_]:
+    nothing = np.full(next(iter(columns.values())).size, np.nan)
+    return is_direct(np.asarray(columns.get("frequency_hz", nothing)), np.asarray(columns.get("test", nothing)))
+
+
+def _connection(said: Mapping[str, float | str]) -> object:
+    return connection_of(said.get("connection", ""))

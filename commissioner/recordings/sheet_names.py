@@ -1,0 +1,134 @@
+"""What a column of somebody else's test sheet is called: `Voltage (V)`, `I_line [A]`, `P_in/kW`, `Strangspannung`, `R_UV [Ohm]`."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+
+from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
+from commissioner.recordings.units import IN_NAME, unit_in
+from commissioner.recordings.words import readings
+
+_VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
+_AMPS = r"(?:i|current|amps?|strom|courant)"
+SHEET = {
+    "frequency_hz": re.compile(r"f|freq(?:uency)?|supplyfrequency|fs"),
+    "voltage_line_v": re.compile(
+        rf"{_VOLTS}(?:l|ll|line|linetoline|linevoltage|rms|eff|mean|avg)?|line(?:toline)?voltage|lltvoltage|terminalvoltage|appliedvoltage"
+        r"|(?:mean|average)(?:line)?voltage|meanspannung"
+    ),
+    "voltage_neutral_v": re.compile(
+        rf"{_VOLTS}(?:ln|phn|linetoneutral|phaseneutral|phasetoneutral|star)|(?:phase|line)(?:to)?neutral(?:voltage)?|star(?:voltage|spannung)"
+    ),
+    "voltage_phase_v": re.compile(
+        rf"{_VOLTS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:voltage|volts|spannung|tension)|strangspannung"
+    ),
+    "current_line_a": re.compile(
+        rf"{_AMPS}(?:l|line|avg|mean|rms|eff)?|line(?:current|amps)|(?:mean|average)(?:line)?current|meanstrom"
+    ),
+    "current_phase_a": re.compile(
+        rf"{_AMPS}(?:ph|phase|perphase|str)(?:rms|eff)?|phase(?:rms)?(?:current|amps|strom|courant)|strangstrom"
+    ),
+    "power_w": re.compile(
+        r"(?:p|w|power|watts?)(?:in|tot|total|input|3ph|el|active)?|(?:input|total|active|three(?:phase)?|3ph(?:ase)?)power|powerinput|inputwatts"
+    ),
+}  # fmt: skip
+"""Line values, values of one phase, and the power of all phases. Values of each phase (`I_u`, `U_12`) are a recording's columns."""
+FORMS = {
+    "voltage_line_v": ("voltage_line_v", "voltage_neutral_v", "voltage_phase_v"),
+    "current_line_a": ("current_line_a", "current_phase_a"),
+    "power_w": ("power_w",),
+}  # fmt: skip
+"""What a test sheet needs, in any of these columns or, of volts and amperes, in those of each phase."""
+_OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
+SHEET_RESISTANCE = {
+    "winding_resistance_line_ohm": re.compile(
+        r"(?:terminals?|line(?:toline)?|klemmen)(?:winding)?(?:resistance|widerstand)|rll"
+        rf"|{_OF_WINDING}(?:(?:between|zwischen)?(?:terminals?|line(?:toline)?|ll|klemmen)|betweenphases?)"
+    ),
+    "winding_resistance_phase_ohm": re.compile(
+        r"strangwiderstand|phasewindingresistance|(?:winding|wicklungs)+(?:resistance|widerstand)(?:per|pro|je)?(?:phase|strang)"
+    ),
+    "winding_resistance_ohm": re.compile(r"windings?resistance|wicklungswiderstand"),
+    "phase_resistance_ohm": re.compile(r"phases?(?:resistance|nwiderstand)|rph(?:ase)?|resistanceperphase"),
+    "stator_resistance_ohm": re.compile(r"(?:stator|stander)(?:winding|wicklungs)?(?:resistance|widerstand)|rs|r1"),
+    "resistance_ohm": re.compile(r"resistance|widerstand"),
+}
+"""Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
+_TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
+_OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
+_NUMBERED_VOLTS = re.compile(rf"(?:{_VOLTS}|voltmeter)l?[123]")
+"""A meter's number or a phase's, between lines or to the neutral: not said."""
+
+
+def sheet_meaning(name: str) -> str | None:
+    """The column of a test sheet (`Voltage (V)`, `I_line [A]`, `P_in/kW`) that a name means, or None."""
+    if name in SHEET:
+        return name
+    said = unit_in(name) if is_remark(unit_in(name)) else ""
+    bare = re.sub(r"_(?:hz|v|a|w|kw)$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE)
+    keys = [key_of(reading) + key_of(said) for reading in readings(bare)]
+    return next((column for key in keys for column, names in SHEET.items() if names.fullmatch(key)), None)
+
+
+def sheet_columns(names: Iterable[str]) -> dict[str, str]:
+    """Names of a test sheet that mean a column which no recording has, with it: volts, amperes, watts, hertz and ohms. Of three
+    meters (`I_a`, `I_b`, `I_c`) none is one with its unit behind it (`I_a`)."""
+    names = [n for n in names if n]
+    meters = meanings_of(names)
+    several = {m[:7] for m in meters.values() if len({other for other in meters.values() if other[:7] == m[:7]}) > 1}
+    own = {n: c for n in names if (c := sheet_meaning(n)) and (n in SHEET or meters.get(n, "")[:7] not in several)}
+    return own | {n: c for n in names if n not in own and (c := resistance_meaning(n))}
+
+
+def resistance_meaning(name: str) -> str | None:
+    """The column of the windings' resistance (`R_UV [Ohm]`, `Strangwiderstand`) that a name in a test sheet means, or None."""
+    bare = _OHM_ENDING.sub("", IN_NAME.sub("", name).strip())
+    return next((column for reading in readings(bare) if (column := _of_resistance(key_of(reading)))), None)
+
+
+def _of_resistance(key: str) -> str | None:
+    ends = _TERMINALS.fullmatch(key)
+    if ends and ends[1] != ends[2] and any(ends[1] in letters and ends[2] in letters for letters in ALPHABETS):
+        pair = {PHASES[ends[1]], PHASES[ends[2]]}
+        return f"winding_resistance_{next(p for p in ('uv', 'vw', 'wu') if set(p) == pair)}_ohm"
+    return next((column for column, names in SHEET_RESISTANCE.items() if names.fullmatch(key)), None)
+
+
+def sheet_unit(name: str) -> str:
+    """The unit at the end of a test sheet's `power_kw` or `winding_resistance_uv_mohm`, which no other column has; or nothing."""
+    found = _OHM_ENDING.search(name)
+    return found[1] if found else "kW" if name.lower().endswith("_kw") else ""
+
+
+def is_sheet(names: Iterable[str]) -> bool:
+    """Whether names are those of a test sheet: volts, amperes and watts in one of their `FORMS`, none twice, and no time."""
+    names = [n for n in names if n]
+    own, meters = _own(names), _meters(names)
+    has_all = all(own.keys() & set(forms) or form_of(need) & meters for need, forms in FORMS.items())
+    return has_all and own.total() == len(own) and "time_s" not in meters
+
+
+def missing_of_sheet(names: Iterable[str]) -> list[str]:
+    """What names of a test sheet lack of its columns: two of them at least are there, or the frequency; nothing of other names."""
+    names = [n for n in names if n]
+    own, meters = _own(names).keys(), _meters(names)
+    if "time_s" in meters or not ("frequency_hz" in own or len(own) > 1):
+        return []
+    return [need for need, forms in FORMS.items() if not own & set(forms) and not form_of(need) & meters]
+
+
+def form_of(need: str) -> frozenset[str]:
+    """The columns of each phase that volts or amperes may stand in; none of watts."""
+    phases = {"voltage_line_v": ("uv", "vw", "wu", "u", "v", "w"), "current_line_a": ("u", "v", "w")}
+    return frozenset(f"{need[:7]}_{phase}_{need[-1]}" for phase in phases.get(need, ()))
+
+
+def _own(names: list[str]) -> Counter[str]:
+    return Counter(column for column in sheet_columns(names).values() if column in SHEET)
+
+
+def _meters(names: list[str]) -> set[str]:
+    """What names mean in a recording, without voltmeters that are only numbered."""
+    return {m for name, m in meanings_of(names).items() if not _NUMBERED_VOLTS.fullmatch(key_of(IN_NAME.sub("", name)))}

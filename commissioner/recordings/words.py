@@ -1,0 +1,91 @@
+"""Words of other languages as those that names are looked for by: columns, test sheets, makers' sheets and prefaces alike."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+TRANSLATED = {
+    "时间": "time", "時間": "time", "tiempo": "time", "tempo": "time", "tijd": "time", "czas": "time", "время": "time",
+    "电流": "current", "電流": "current", "corriente": "current", "intensidad": "current", "corrente": "current", "stroom": "current",
+    "ток": "current", "strom": "strom", "ström": "current", "prad": "current", "prąd": "current",
+    "电压": "voltage", "電圧": "voltage", "電壓": "voltage", "tensión": "voltage", "tensão": "voltage",
+    "tensione": "voltage", "tensioni": "voltage", "correnti": "current", "voltaje": "voltage", "spanning": "voltage", "напряжение": "voltage",
+    "spänning": "voltage", "napiecie": "voltage", "napięcie": "voltage", "转速": "speed", "速度": "speed", "vitesse": "speed", "velocidad": "speed",
+    "velocità": "speed", "giri": "speed", "courant": "current", "tension": "voltage", "tensions": "voltage", "courants": "current", "salida": "output",
+    "leiterstrom": "strom", "außenleiterstrom": "strom", "netzstrom": "strom", "motorstrom": "strom", "leiterspannung": "spannung",
+    "außenleiterspannung": "spannung", "netzspannung": "spannung", "motorspannung": "spannung", "intensité": "current",
+    "zaman": "time", "akım": "current", "gerilim": "voltage", "composée": " ", "compuesta": " ", "concatenata": " ", "verkettete": " ",
+    "线": " ", "線": " ", "相": " ", "第": " ", "路": " ",
+    "frecuencia": "frequency", "frequenza": "frequency", "fréquence": "frequency", "frequenz": "frequency",
+    "potencia": "power", "potenza": "power", "puissance": "power", "leistung": "power",
+    "absorbida": "input", "assorbita": "input", "absorbée": "input", "aufgenommene": "input", "útil": "output", "utile": "output",
+    "resa": "output", "totale": "total", "activa": "active", "attiva": "active", "media": "mean", "medio": "mean", "moyenne": "mean",
+    "moyen": "mean", "mittlere": "mean", "mittlerer": "mean",
+    "par": "torque", "par phase": "per phase", "coppia": "torque", "couple": "torque", "rendimiento": "efficiency",
+    "rendimento": "efficiency", "rendement": "efficiency", "deslizamiento": "slip", "scorrimento": "slip", "glissement": "slip",
+    "factor de potencia": "power factor", "fattore di potenza": "power factor", "facteur de puissance": "power factor",
+    "coseno": "cos", "cosfi": "cos phi", "fi": "phi", "inercia": "inertia", "inerzia": "inertia", "inertie": "inertia",
+    "momento de inercia": "moment of inertia", "momento di inerzia": "moment of inertia", "momento d'inerzia": "moment of inertia",
+    "moment d'inertie": "moment of inertia", "polos": "poles", "poli": "poles", "pôles": "poles", "número de": "number of",
+    "numero di": "number of", "nombre de": "number of", "pares de polos": "pole pairs", "coppie di poli": "pole pairs",
+    "coppie polari": "pole pairs", "paires de pôles": "pole pairs", "conexión": "connection", "collegamento": "connection",
+    "couplage": "connection", "temperatura": "temperature", "température": "temperature",
+    "resistencia": "resistance", "resistenza": "resistance", "résistance": "resistance", "widerstand": "resistance",
+    "estator": "stator", "statore": "stator", "statorique": "stator", "estatórica": "stator", "statorica": "stator",
+    "devanado": "winding", "bobinado": "winding", "arrollamiento": "winding", "avvolgimento": "winding", "enroulement": "winding",
+    "bornes": "terminals", "bornas": "terminals", "terminales": "terminals", "terminali": "terminals", "morsetti": "terminals",
+    "entre": "between", "tra": "between", "fra": "between", "por": "per", "línea": "line", "linea": "line", "ligne": "line",
+    "fase": "phase", "fases": "phase", "fasi": "phase", "simple": "phase", "semplice": "phase", "stellata": "star", "sternspannung": "star spannung",
+    "neutro": "neutral", "neutre": "neutral", "neutra": "neutral",
+    "arranque": "starting", "avviamento": "starting", "spunto": "starting", "démarrage": "starting", "máximo": "maximum",
+    "máxima": "maximum", "massima": "maximum", "massimo": "maximum", "maximal": "maximum", "maximale": "maximum",
+    "nominale": "nominal", "nominales": "nominal", "asignada": "nominal", "asignado": "nominal", "assignée": "nominal", "assigné": "nominal",
+    "ensayo": "test", "prueba": "test", "prova": "test", "essai": "test", "versuch": "test", "prüfung": "test",
+    "vacío": "no load", "en vacío": "no load", "a vuoto": "no load", "in vuoto": "no load", "à vide": "no load", "leerlauf": "no load",
+    "em vazio": "no load", "ensaio": "test", "nullast": "no load", "proef": "test", "kortsluiting": "short circuit",
+    "frequência": "frequency", "frequentie": "frequency", "potência": "power", "vermogen": "power", "velocidade": "speed",
+    "toerental": "speed", "weerstand": "resistance",
+    "rotor bloqueado": "locked rotor", "a rotor bloqueado": "locked rotor", "a rotore bloccato": "locked rotor", "à rotor bloqué": "locked rotor", "rotor trabado": "locked rotor", "rotore bloccato": "locked rotor", "rotor bloqué": "locked rotor",
+    "rotor calé": "locked rotor", "cortocircuito": "short circuit", "corto circuito": "short circuit", "court-circuit": "short circuit",
+    "court circuit": "short circuit", "corriente continua": "direct current", "corrente continua": "direct current",
+    "courant continu": "direct current", "gleichstrom": "direct current",
+    "período de muestreo": "sample period", "periodo de muestreo": "sample period", "tiempo de muestreo": "sample period",
+    "intervalo de muestreo": "sample interval", "frecuencia de muestreo": "sample rate", "tasa de muestreo": "sample rate",
+    "periodo di campionamento": "sample period", "tempo di campionamento": "sample period", "intervallo di campionamento": "sample interval",
+    "frequenza di campionamento": "sample rate", "passo di campionamento": "sample interval",
+    "de": " ", "del": " ", "de la": " ", "di": " ", "dello": " ", "della": " ", "du": " ", "des": " ", "d'": " ", "dell'": " ",
+    "en la": " ", "nella": " ", "al": " ", "allo": " ", "alla": " ",
+}  # fmt: skip
+"""What only joins names is a space. With their accents, which name the code page of a text; looked for with or without them."""
+
+
+def folded(text: str) -> str:
+    """The text without marks above and below its letters: `Fréquence` as `Frequence`."""
+    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
+
+
+def translated(name: str) -> str:
+    """The name with words of other languages replaced by those that are looked for; any other name as it is."""
+    plain = folded(name).replace("\u2019", "'")
+    out = _ANY.sub(lambda found: f" {_BY_PLAIN[found[0].lower()]} ", plain)
+    return name if out == plain else " ".join(out.split())
+
+
+def readings(name: str) -> tuple[str, ...]:
+    """The name in the words that are looked for; of one that says its noun first (`Potencia nominal`), with it last as well."""
+    said = translated(name)
+    first, _, rest = said.partition(" ")
+    return (said, f"{rest} {first}") if rest and said != name else (said,)
+
+
+def _pattern(word: str) -> str:
+    return (
+        rf"(?<![a-z]){re.escape(word)}" + ("" if word.endswith("'") else "(?![a-z])")
+        if word.isascii()
+        else re.escape(word)
+    )
+
+
+_BY_PLAIN = {folded(word): ours for word, ours in TRANSLATED.items()}
+_ANY = re.compile("|".join(_pattern(word) for word in sorted(_BY_PLAIN, key=len, reverse=True)), re.IGNORECASE)
