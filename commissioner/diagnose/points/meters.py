@@ -136,8 +136,9 @@ def _odd_one(names: tuple[str, ...], shown: Array, off: Array, apart: float) -> 
 
 
 def _from_neutral(form: _Form, columns: Mapping[str, Array], said: Mapping[str, float | str]) -> _Form | DataRefused:
-    """Line volts from those of a phase. DataRefused: of a delta, or of direct current, where `phase` may be two things."""
-    if form.columns == ("voltage_phase_v",) and _connection(said) == "delta":
+    """Line volts from those of a phase. DataRefused: where `phase` may be a winding that is no star's, or of direct current."""
+    is_known = _connection(said) == "star" or (_connection(said) != "delta" and "voltage_line_v" in columns)
+    if form.columns == ("voltage_phase_v",) and not is_known:
         return _ask(columns, "voltage_phase_v")
     direct = _direct(columns)
     if np.any(direct & np.isfinite(form.values)) and "resistance_measured" not in said:
@@ -146,12 +147,7 @@ def _from_neutral(form: _Form, columns: Mapping[str, Array], said: Mapping[str, 
             "volts between two terminals, or of one winding", "add `# resistance_measured: line_to_line` (between two terminals), "
             "phase_winding or star_equivalent",
         )  # fmt: skip
-    words = (
-        ""
-        if form.columns != ("voltage_phase_v",)
-        else ", taken as from a terminal to the neutral (`# connection: delta` is asked)"
-    )
-    said_so = f"is sqrt(3) times {' and '.join(form.columns) if len(form.columns) < 2 else 'the mean of ' + ', '.join(form.columns)}{words}."
+    said_so = f"is sqrt(3) times {' and '.join(form.columns) if len(form.columns) < 2 else 'the mean of ' + ', '.join(form.columns)}."
     return _Form(form.columns, np.where(direct, form.values, ROOT_3 * form.values), said_so)
 
 

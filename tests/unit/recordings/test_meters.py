@@ -50,7 +50,7 @@ def is_true(done: IdentifiedSheets) -> bool:
      "tensión de fase (V)", "tensione di fase [V]", "Sternspannung", "phase-to-neutral voltage", "U_LN", "V_an"],
 )  # fmt: skip
 def test_phase_volts_are_read_as_line_volts_and_it_is_said(tmp_path: Path, volts: str) -> None:
-    done = identified(sheet(tmp_path, f"test,f (Hz),{volts},I (A),P (W)", *of_phase()))
+    done = identified(sheet(tmp_path, f"# connection: star\ntest,f (Hz),{volts},I (A),P (W)", *of_phase()))
     assert is_true(done)
     assert any("voltage_line_v is sqrt(3) times" in remark for remark in done.document["remarks"])
 
@@ -89,16 +89,21 @@ def test_a_meter_that_its_neighbours_contradict_is_named(tmp_path, row, says, ve
 @pytest.mark.parametrize(
     ("head", "above"),
     [
+        ("voltage_phase_v,I", ""),
         ("voltage_phase_v,I", "# connection: delta\n"),
         ("U_Str,I", "# Conexión: triángulo\n"),
         ("U,I phase", ""),
         ("U,I phase", "# connection: delta\n"),
     ],
 )
-def test_what_phase_means_in_a_delta_is_asked(tmp_path: Path, head: str, above: str) -> None:
+def test_what_phase_means_is_asked_where_no_star_is_said(tmp_path: Path, head: str, above: str) -> None:
     path = sheet(tmp_path, f"test,f,{head},P", *of_phase(), above=f"# R_uv (ohm): 0.4857\n{above}")
     with pytest.raises(DataRefused, match="may be of a winding or of a line"):
         identify_any(IdentifyRequest((path,)))
+
+
+def test_volts_to_the_neutral_need_no_connection(tmp_path: Path) -> None:
+    assert is_true(identified(sheet(tmp_path, "test,f,U_LN,I,P", *of_phase())))
 
 
 def test_in_a_star_amperes_of_a_phase_are_those_of_a_line(tmp_path: Path) -> None:
@@ -136,7 +141,7 @@ def test_points_of_a_locked_rotor_are_read_from_three_meters(tmp_path: Path) -> 
         for i in (10, 15, 20)
     ]
     head = "f (Hz),U phase (V),I_R,I_Y,I_B,P (W),R_uv"
-    document = diagnose(DiagnoseRequest((sheet(tmp_path, head, *rows, above=""),))).document
+    document = diagnose(DiagnoseRequest((sheet(tmp_path, head, *rows, above="# connection: star\n"),))).document
     assert document["parameters_after"]["rotor_resistance_ohm"]["value"] == pytest.approx(0.39 - 0.2429, rel=0.05)
     assert any("is the mean of current_u_a, current_v_a, current_w_a" in said for said in document["remarks"])
 
