@@ -13,6 +13,7 @@ from sim.physics.effects import CATALOGUE
 from sim.physics.inductance import inverse_gamma
 from sim.scenario import Scenario, ScenarioError, build, read_document, table_machine, table_rows
 from sim.truth import apparent_resistance_ohm, sensor_gain
+from sim.wire.faults import FaultError
 from sim.wire.in_process import Station
 
 LARGEST_KW, VOLTAGES = 75.0, (200.0, 500.0)
@@ -68,14 +69,14 @@ class Factory:
         noise_a: float | None,
         faults: Sequence[str],
     ) -> Drawn:
-        """ValueError where the motor or an effect is unknown, or the plant cannot be."""
+        """ValueError where the motor, an effect or a fault is unknown, or the plant cannot be."""
         random = np.random.default_rng([seed, 5])
         try:
             document = read_document(motor) if Path(motor).is_file() else _document(motor, random, spread, noise_a)
             plate = document.get("nameplate", {})
             document["effects"] = {**document.get("effects", {}), **_effects(effects, plate, random)}
             return Drawn(motor, build(document, motor), seed, faults)
-        except ScenarioError as error:
+        except (ScenarioError, FaultError) as error:
             raise ValueError(str(error)) from error
 
 

@@ -125,7 +125,7 @@ def demo(
         str, typer.Option(help="Scenario of the simulated inverter: a name or a .toml file.")
     ] = "default",
     speed: Annotated[str, typer.Option(help="Pace of the simulated inverter: 1, N or max.")] = "max",
-    seed: Annotated[int, typer.Option(help="Seed of the simulated noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated noise.")] = 1,
     axes: Annotated[str | None, typer.Option(help="Axis orientations in electrical degrees, as 0,60,120.")] = None,
     write_back: Annotated[bool, typer.Option(help="Write the accepted parameters into the simulated drive.")] = True,
     diagnosis: Diagnosed = True,

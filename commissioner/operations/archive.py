@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from commissioner.errors import CommissionerError, DataRefused
+from commissioner.errors import CommissionerError, DataRefused, UsageError
 from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive.blocks import read_blocks
@@ -79,7 +79,12 @@ def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exp
 
 
 def verify_runs(runs: Path, run: str | None, key: bytes | None = None) -> tuple[Verified, ...]:
-    """One run, or all of them where `run` is None."""
+    """One run, or all of them where `run` is None. UsageError: there is no such archive."""
+    if not runs.is_dir():
+        raise UsageError(
+            f"{runs} is no folder", step="archive", value=str(runs), limit="the folder of an archive",
+            remedy="give it with --runs",
+        )  # fmt: skip
     folders = run_folders(runs) if run is None else [find_folder(runs, run)]
     return tuple(verify_folder(folder, key) for folder in folders)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from commissioner.encoding import HIDDEN
 from commissioner.recordings.whole import folder_to_write, whole_file
 from commissioner.settings import load
+from commissioner.study.commissioning import require_drawable
 from commissioner.study.rows import Rows
 from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
@@ -60,6 +61,7 @@ def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lamb
     study = load(request.file, Specification)
     motors = simulator().motors() if study.kind == "commission" else ()
     cases = cases_of(study, request.file, motors)
+    require_drawable(cases, request.file)
     rows = Rows(folder_to_write(request.out), study.model_dump(), resume=request.resume)
     missing = [case for case in cases if case.number not in rows.ended]
     workers = request.workers or max(1, os.cpu_count() or 1)

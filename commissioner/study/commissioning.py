@@ -6,10 +6,11 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from commissioner.errors import CommissionerError
+from commissioner.errors import CommissionerError, ConfigurationError
 from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.in_process import InProcessPort
@@ -43,6 +44,25 @@ class NoArchive:
     def save(self, name: str, document: object) -> None: ...
 
 
+def require_drawable(cases: Sequence[Case], file: Path) -> None:
+    """ConfigurationError: what the study asks for can be drawn for none of its motors, as where an effect is misspelt."""
+    said = ""
+    for case in {one.motor: one for one in reversed(cases) if one.kind == "commission"}.values():
+        try:
+            _drawn(case)
+            return
+        except ValueError as error:
+            said = str(error)
+    if said:
+        raise ConfigurationError(file=str(file), key="effects, faults", value=said, expected="what the simulator knows")
+
+
+def _drawn(case: Case) -> Drawn:
+    return simulator().draw(
+        case.motor, case.seed, spread=case.spread, effects=case.effects, noise_a=case.noise_a, faults=case.faults
+    )
+
+
 def commissioned(case: Case) -> Row:
     """The row of one case. A case that cannot be drawn or carried out is a row that says so."""
     began = time.process_time()
@@ -52,9 +72,7 @@ def commissioned(case: Case) -> Row:
     }  # fmt: skip
     row |= {f"{name}_{what}": None for name in PARAMETERS for what in ("true", "value", "std")}
     try:
-        drawn = simulator().draw(
-            case.motor, case.seed, spread=case.spread, effects=case.effects, noise_a=case.noise_a, faults=case.faults
-        )
+        drawn = _drawn(case)
     except ValueError as error:
         return cast("Row", row | {"reason": str(error), "cpu_s": time.process_time() - began})
     row |= {

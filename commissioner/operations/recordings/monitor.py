@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from commissioner.errors import DataRefused
+from commissioner.errors import DataRefused, UsageError
 from commissioner.monitor.chain import Observation, Refused, Wishes
 from commissioner.monitor.contract import MonitoringDocument, PartialMonitoring, RefusedMonitoring, State
 from commissioner.monitor.intake.findings import Finding
@@ -24,6 +24,7 @@ from commissioner.monitor.trend.indicators import pulses, trendable
 from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.ranges import require_range
 from commissioner.operations.recordings.stretches import in_its_states, longest_steady, plain_state, said_by_terminals
 from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
@@ -32,6 +33,10 @@ from commissioner.recordings.plate import has_no_plate, plate_of, start_from
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table, to_currents, to_running
 from commissioner.records import RunningRecording
+
+LOWEST_LOAD_HZ = 0.01
+INERTIA_KG_M2 = (1e-7, 1e6)
+"""From a hard disk's to a turbine set's."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +81,28 @@ class PartlyMonitored:
     document: PartialMonitoring
 
 
+def _require_possible(request: MonitorRequest) -> None:
+    if request.inertia_kg_m2 is not None:
+        require_range("--inertia", request.inertia_kg_m2, *INERTIA_KG_M2)
+    if request.learn and request.baseline is None:
+        raise UsageError(
+            "--learn has no baseline to add to", step="command line", value="--learn", limit="--learn with --baseline FILE",
+            remedy="name the file with --baseline, or leave --learn out",
+        )  # fmt: skip
+
+
 def monitor(request: MonitorRequest, observe: Observe = nobody) -> Monitored | PartlyMonitored | NotMonitored:
-    """One recording, watched, compared and, where asked for, learned and written out. Partial data give a partial answer."""
+    """One recording, watched, compared and, where asked for, learned and written out. Partial data give a partial answer.
+
+    UsageError: a wish that cannot be."""
+    _require_possible(request)
     table = contract_table(request.file, read_mapping(request.mapping) if request.mapping else None, request.motor)
     if has_currents_only(table):
         return _of_currents(table, request, observe)
     require_running(table)
     recording = to_running(table)
+    for hz in request.load_hz:
+        require_range("--load-hz", hz, LOWEST_LOAD_HZ, 0.5 / recording.sample_period_s)
     if request.motor is None and has_no_plate(recording.metadata):
         return _without_plate(recording, request)
     plate = plate_of(recording.metadata, str(request.file), request.motor)

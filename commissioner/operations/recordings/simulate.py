@@ -17,9 +17,10 @@ from commissioner.diagnose.export.model_file import plain as without_effects
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.model import Layout, Model
-from commissioner.errors import ConfigurationError, UsageError
+from commissioner.errors import ConfigurationError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.ranges import require_range
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.running import is_running_model, played
 from commissioner.paths import no_file
@@ -71,7 +72,12 @@ class _Motor:
 def simulate(request: SimulateRequest, observe: Observe = nobody) -> Simulated:
     """Writes the recording. ConfigurationError where the model cannot be played or runs away."""
     check_ending(request.out)
-    _check_size(request.seconds, request.noise_a)
+    for option, value, low, high in (
+        ("--seconds", request.seconds, 0.1, 3600.0),
+        ("--noise-a", request.noise_a, 0.0, 1e4),
+        ("--seed", request.seed, 0, 2**63 - 1),
+    ):
+        require_range(option, value, low, high)
     running = _running_model(request.model)
     if running is not None:
         observe(Began("playing"))
@@ -128,18 +134,6 @@ def _played(name: str, play: Callable[[], dict[str, Any]]) -> dict[str, Any]:
             file=name, key="nominal and terms", value="currents that run away", expected="numbers of a motor"
         )
     return columns
-
-
-def _check_size(seconds: float, noise_a: float) -> None:
-    for name, value, low, high in (("--seconds", seconds, 0.1, 3600.0), ("--noise-a", noise_a, 0.0, 1e4)):
-        if not low <= value <= high:
-            raise UsageError(
-                f"{name} {value:g} is out of range",
-                step="command line",
-                value=value,
-                limit=f"{low:g} ... {high:g}",
-                remedy=f"give {name} a value in this range",
-            )
 
 
 def _motor(name: str, plain: bool) -> _Motor:

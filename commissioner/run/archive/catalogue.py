@@ -53,7 +53,7 @@ def find_run(root: Path, name: str) -> RunSummary:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """Every folder with a journal, newest first; none where there is no archive."""
+    """Every folder of a run, newest first, also one whose journal is gone; none where there is no archive."""
     return sorted((path for path in root.iterdir() if _is_run(path)), reverse=True) if root.is_dir() else []
 
 
@@ -83,6 +83,6 @@ def find_folder(root: Path, name: str) -> Path:
 
 def _is_run(path: Path) -> bool:
     try:
-        return (path / "journal.jsonl").is_file()
+        return (path / "journal.jsonl").is_file() or (path / "request.json").is_file()
     except OSError:
         return False

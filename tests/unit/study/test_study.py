@@ -18,6 +18,7 @@ from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load, load_procedure
+from commissioner.study.campaign import StudyRequest, carry_out
 from commissioner.study.commissioning import NoArchive
 from commissioner.study.rows import ENDED, TABLE, Rows
 from commissioner.study.sheet import page
@@ -152,6 +153,19 @@ def test_what_cannot_be_drawn_is_a_row_that_says_so(tmp_path):
     judge("study_row", told)
     assert told["outcome"] == "impossible"
     assert "no_such_effect" in told["reason"]
+
+
+@pytest.mark.parametrize(
+    ("key", "says"), [('effects = ["rust"]', "rust is unknown"), ('faults = ["nonsense:3"]', "nonsense:3")]
+)
+def test_a_name_that_the_simulator_does_not_know_ends_the_study_before_its_first_case(tmp_path, key, says):
+    file = study_file(
+        tmp_path,
+        f'kind = "commission"\nruns = 2\nmotors = ["motor_x"]\n{key}\n'.replace("motor_x", simulator().motors()[0]),
+    )
+    with pytest.raises(ConfigurationError, match=says):
+        carry_out(StudyRequest(file, tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
 def test_rows_are_the_same_for_one_worker_and_two_and_right(tmp_path):

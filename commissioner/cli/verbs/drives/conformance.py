@@ -10,6 +10,7 @@ from commissioner.conformance.kit import Conformance, chosen, run_conformance
 from commissioner.conformance.records import Exchange, Outcome, RuleResult
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.url import parse_url
+from commissioner.operations.ranges import require_range
 from commissioner.registers.codec import Value
 
 MARKS = {Outcome.PASS: "[green]✓[/]", Outcome.FAIL: "[red]✗[/]", Outcome.NOT_TESTED: "[yellow]–[/]"}
@@ -22,6 +23,7 @@ def conformance(
     """Prints every rule as it ends; exits with 3 where one failed."""
     drive_url, drive_profile = parse_url(url), load_profile(profile)
     chosen(rules)
+    require_range("--reply-timeout", reply_timeout_s, 0.01, 60.0)
     if energise:
         _ask(yes=yes, as_json=as_json)
     done = run_conformance(

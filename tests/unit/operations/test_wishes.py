@@ -1,0 +1,46 @@
+"""What an option asks for and cannot be is a refusal with its range, before any file is read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from commissioner.errors import UsageError
+from commissioner.operations.archive import verify_runs
+from commissioner.operations.recordings.monitor import MonitorRequest, monitor
+from commissioner.operations.recordings.simulate import SimulateRequest, simulate
+
+NOWHERE = Path("nowhere.csv")
+
+
+@pytest.mark.parametrize("inertia", [math.nan, -1.0, 0.0, 1e9])
+def test_an_inertia_that_no_machine_has_is_refused(inertia: float) -> None:
+    with pytest.raises(UsageError, match="--inertia") as refused:
+        monitor(MonitorRequest(NOWHERE, inertia_kg_m2=inertia))
+    assert refused.value.limit == "1e-07 ... 1e+06"
+
+
+def test_learning_without_a_baseline_is_refused() -> None:
+    with pytest.raises(UsageError, match="--learn has no baseline"):
+        monitor(MonitorRequest(NOWHERE, learn=True))
+
+
+def test_a_seed_below_zero_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--seed -4"):
+        simulate(SimulateRequest("motor_2kw2", tmp_path / "y.csv", None, 6.0, (0.0,), 0.0, -4, False))
+
+
+def test_an_archive_that_is_not_there_is_no_sound_one(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is no folder"):
+        verify_runs(tmp_path / "nirgends", None)
+
+
+def test_a_run_without_its_journal_is_damaged_and_not_passed_over(tmp_path: Path) -> None:
+    folder = tmp_path / "20260101T000000-motor"
+    folder.mkdir()
+    (folder / "request.json").write_text("{}", encoding="utf-8")
+    (verified,) = verify_runs(tmp_path, None)
+    assert not verified.is_whole
+    assert any("journal.jsonl" in str(loss) for loss in verified.losses)
