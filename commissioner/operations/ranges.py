@@ -1,6 +1,9 @@
-"""What an option that is a number may be."""
+"""What the numbers and files of a command line may be."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
 
 from commissioner.errors import UsageError
 
@@ -15,3 +18,15 @@ def require_range(option: str, value: float, low: float, high: float) -> None:
             limit=f"{low:g} ... {high:g}",
             remedy=f"give {option} a value in this range",
         )
+
+
+def require_distinct(files: Sequence[Path]) -> None:
+    """UsageError where a file is named twice: its data would count as two measurements and halve the squares of every error."""
+    seen: set[Path] = set()
+    for file in files:
+        if file.resolve() in seen:
+            raise UsageError(
+                f"{file} is given twice", step="command line", value=str(file), limit="every recording once",
+                remedy="name it once",
+            )  # fmt: skip
+        seen.add(file.resolve())

@@ -25,6 +25,7 @@ from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
 from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
+from commissioner.operations.ranges import require_distinct
 from commissioner.operations.recordings import catalogue
 from commissioner.operations.recordings.intake import plate_metadata, require_one_motor, standstill, without_copies
 from commissioner.operations.recordings.running import diagnosed
@@ -91,6 +92,7 @@ def diagnose(request: DiagnoseRequest, observe: Observe = nobody, go_on: GoOn = 
     Data that cannot carry an answer are a result, `refused`. DataRefused: the files are not of one motor, or not of one kind.
     A no of `go_on` ends the search; the document says so, and names nothing that was not weighed.
     """
+    require_distinct([Path(path) for path in request.files])
     said = read_mapping(request.mapping) if request.mapping else None
     if request.out is not None:
         folder_to_write(request.out)

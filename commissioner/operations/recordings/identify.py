@@ -27,6 +27,7 @@ from commissioner.identify.intake.plate import nameplate_from
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.plate_match import contradiction, doubt, rated_point, sure_mismatch
 from commissioner.operations.events import Began, Observe, nobody
+from commissioner.operations.ranges import require_distinct
 from commissioner.operations.recordings.trust import (
     Trust,
     refused,
@@ -102,6 +103,7 @@ def identify_any(
     from commissioner.operations.recordings.sheets import are_sheets, require_whole_sheets, with_line_values
     from commissioner.operations.recordings.sheets import identified as of_sheets
 
+    require_distinct(request.files)
     said = read_mapping(request.mapping) if request.mapping else None
     if request.out is not None:
         folder_to_write(request.out)

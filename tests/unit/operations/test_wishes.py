@@ -9,6 +9,8 @@ import pytest
 
 from commissioner.errors import UsageError
 from commissioner.operations.archive import verify_runs
+from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
+from commissioner.operations.recordings.identify import IdentifyRequest, identify_any
 from commissioner.operations.recordings.monitor import MonitorRequest, monitor
 from commissioner.operations.recordings.simulate import SimulateRequest, simulate
 
@@ -25,6 +27,12 @@ def test_an_inertia_that_no_machine_has_is_refused(inertia: float) -> None:
 def test_learning_without_a_baseline_is_refused() -> None:
     with pytest.raises(UsageError, match="--learn has no baseline"):
         monitor(MonitorRequest(NOWHERE, learn=True))
+
+
+@pytest.mark.parametrize(("verb", "wish"), [(identify_any, IdentifyRequest), (diagnose, DiagnoseRequest)])
+def test_the_same_file_does_not_count_twice(tmp_path: Path, verb, wish) -> None:
+    with pytest.raises(UsageError, match="is given twice"):
+        verb(wish((tmp_path / "a.csv", tmp_path / "b" / ".." / "a.csv")))
 
 
 def test_a_seed_below_zero_is_refused(tmp_path: Path) -> None:
