@@ -26,6 +26,7 @@ from commissioner.link.files.schema import (
     WorkedTable,
     explained,
 )
+from commissioner.registers.contradictions import check_contradictions
 from commissioner.registers.convention import CONVENTIONS, QUANTITIES, UNITS, unit_of
 from commissioner.registers.mailbox import address_of
 from commissioner.registers.profile import (
@@ -84,7 +85,7 @@ def build(document: Mapping[str, Any], file: str) -> DriveProfile:
         model = DriveFile.model_validate(dict(document))
     except ValidationError as error:
         raise explained(error, file) from error
-    profile = check_worked(check_consistency(_profile(model, file)))
+    profile = check_worked(check_contradictions(check_consistency(_profile(model, file))))
     if model.tune is None:
         return profile
     return replace(profile, tuning=check_tuning(profile, _tuning(model.tune, file)))

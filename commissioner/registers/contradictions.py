@@ -1,0 +1,150 @@
+"""What a drive file says against itself, each key being right alone: limits that cross, names that share a bit, a unit that its
+name denies, a register that has to be written and cannot be, a topic of [unknown] that nothing asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from types import MappingProxyType
+
+from commissioner.errors import ConfigurationError
+from commissioner.motor.nameplate import RATED_VALUES
+from commissioner.registers.convention import INDUCTANCES, QUANTITIES, RESISTANCES
+from commissioner.registers.profile import CLAIM_ITEMS, COMMISSIONING_ITEMS, DriveProfile, Item, LinkLimits
+
+SMALLEST_SCALE, LARGEST_SCALE = 1e-9, 1e9
+NO_UNIT = ("", "raw")
+"""Units that claim nothing: what the name says stands."""
+UNIT_OF_ENDING = MappingProxyType(
+    {
+        "_rad_per_s": "rad/s", "_v_per_s": "V/s", "_per_s": "1/s", "_degc": "degC", "_deg": "deg", "_rpm": "1/min", "_ohm": "ohm",
+        "_nm": "Nm", "_hz": "Hz", "_ms": "ms", "_wb": "Wb", "_v": "V", "_a": "A", "_w": "W", "_s": "s", "_h": "H",
+    }
+)  # fmt: skip
+"""How a name ends -> its unit; the first that fits."""
+UNIT_OF_WORD = MappingProxyType({"voltage": "V", "current": "A", "power": "W"})
+"""Words by which a last letter is a phase's, not a unit's: `motor_current_v` is a current."""
+TIMES = ("s", "ms")
+UNITS_OF_QUANTITY: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    dict.fromkeys(RESISTANCES, ("ohm", "%"))
+    | dict.fromkeys(INDUCTANCES, ("H", "ohm", "%"))
+    | {"rotor_time_constant": TIMES, "power_factor": ("%",), "pole_pairs": (), "pole_count": ()}
+)
+"""Units in which a quantity can stand that has none in its name."""
+TOPICS = frozenset(
+    {
+        "excite", "stream", "write_back", "restore", "tune", "identity", "watchdog", "parameters", "status_bits", "interlock_bits",
+        "faults", "exceptions", "limits", "commands", "window", "unlock", "mailbox", "watchdog_ms", "pole_pairs", "pole_count",
+        *(f.name for f in fields(LinkLimits)), *RATED_VALUES, *QUANTITIES, *COMMISSIONING_ITEMS, *CLAIM_ITEMS,
+    }
+)  # fmt: skip
+"""What of a drive file is asked for, and so can be unknown: what it can do, its tables, and the items with a meaning here."""
+
+Problem = tuple[str, object, str]
+
+
+def check_contradictions(profile: DriveProfile) -> DriveProfile:
+    """The profile itself. Raises ConfigurationError with the first thing that cannot be together with another."""
+    for check in (_limits, _bits, _units, _scales, _order, _supervision, _topics):
+        for key, value, expected in check(profile):
+            raise ConfigurationError(file=profile.file, key=key, value=value, expected=expected)
+    return profile
+
+
+def _limits(profile: DriveProfile) -> Iterator[Problem]:
+    """Every lower limit is at most its upper one."""
+    identity, limits, watchdog = profile.identity, profile.limits, profile.watchdog
+    pairs = [
+        ("identity.firmware_min", identity.firmware_min, "firmware_max", identity.firmware_max),
+        ("limits.dc_link_min_v", limits.dc_link_min_v, "dc_link_max_v", limits.dc_link_max_v),
+    ]
+    pairs += [(f"items.{i.name}.min", i.minimum, "max", i.maximum) for i in profile.items.values()]
+    if watchdog is not None:
+        pairs.append(("watchdog.min_ms", watchdog.min_ms, "max_ms", watchdog.max_ms))
+    for key, lower, other, upper in pairs:
+        if lower is not None and upper is not None and lower > upper:
+            yield key, lower, f"at most {other}, which is {upper:.10g}"
+
+
+def _bits(profile: DriveProfile) -> Iterator[Problem]:
+    """One bit has one name."""
+    flags = profile.window.flags if profile.window else {}
+    tables: tuple[tuple[str, Mapping[str, int]], ...] = (
+        ("status_bits.", profile.status_bits),
+        ("interlock_bits.", profile.interlock_bits),
+        ("window.flag_", flags),
+    )
+    for table, named in tables:
+        first: dict[int, str] = {}
+        for name, bit in named.items():
+            if bit in first:
+                yield f"{table}{name}", bit, f"a bit of its own: {table}{first[bit]} is {bit}"
+            first[bit] = name
+
+
+def _units(profile: DriveProfile) -> Iterator[Problem]:
+    for item in profile.items.values():
+        allowed = _units_by_name(item)
+        if allowed is not None and item.unit not in (*allowed, *NO_UNIT):
+            told = " or ".join(map(repr, allowed)) or "no unit"
+            yield f"items.{item.name}.unit", item.unit, f"{told}, as the name says, with the scale that makes it so"
+
+
+def _units_by_name(item: Item) -> tuple[str, ...] | None:
+    """The units that an item's name allows; None where it tells none."""
+    quantity = item.quantity or item.name.removeprefix("staged_").removeprefix("stored_")
+    if quantity in UNITS_OF_QUANTITY:
+        return UNITS_OF_QUANTITY[quantity]
+    unit = next((unit for ending, unit in UNIT_OF_ENDING.items() if item.name.endswith(ending)), None)
+    if unit is None:
+        return None
+    is_phase = item.name[-2:] in ("_a", "_v", "_w")
+    return (unit, *(UNIT_OF_WORD[w] for w in item.name.split("_") if is_phase and w in UNIT_OF_WORD))
+
+
+def _scales(profile: DriveProfile) -> Iterator[Problem]:
+    for item in profile.items.values():
+        if not (math.isfinite(item.scale) and SMALLEST_SCALE <= item.scale <= LARGEST_SCALE):
+            limits = f"{SMALLEST_SCALE:g} ... {LARGEST_SCALE:g}: value = raw number * scale"
+            yield f"items.{item.name}.scale", item.scale, limits
+
+
+def _order(profile: DriveProfile) -> Iterator[Problem]:
+    order = profile.parameters.order if profile.parameters else ()
+    for k, name in enumerate(order):
+        if name in order[:k]:
+            yield (
+                f"parameters.order[{k}]",
+                name,
+                f"each parameter once: parameters.order[{order.index(name)}] is it too",
+            )
+
+
+def _supervision(profile: DriveProfile) -> Iterator[Problem]:
+    """What arms the watchdog is a time and can be written; so can what feeds it while the drive is energised."""
+    watchdog = profile.watchdog
+    if watchdog is None:
+        return
+    register, is_map = profile.item(watchdog.register), profile.kind == "commissioning_map"
+    if register.unit not in ("", *TIMES):
+        yield f"items.{register.name}.unit", register.unit, "'s' or 'ms': it takes the watchdog's time"
+    if is_map and watchdog.fed_by not in profile.items:
+        yield "watchdog.fed_by", watchdog.fed_by, "the name of a table [items.NAME] in this file"
+    written = {register.name: "the watchdog is armed by writing it"}
+    if is_map or "excite" in profile.capabilities:
+        written |= dict.fromkeys(("heartbeat", watchdog.fed_by), "the watchdog is fed by writing it")
+    for name, why in written.items():
+        if name in profile.items and "w" not in profile.items[name].access:
+            yield f"items.{name}.access", profile.items[name].access, f"'rw' or 'w': {why}"
+
+
+def _topics(profile: DriveProfile) -> Iterator[Problem]:
+    """A sentence that nothing asks for reaches nobody. What begins with a known name is a remark on it: `NAME_scale`."""
+    known = TOPICS | set(profile.items)
+    for topic in profile.unknown:
+        if not any(topic == name or topic.startswith(f"{name}_") for name in known):
+            near = get_close_matches(topic, known, n=1)
+            meant = f"perhaps {near[0]}; " if near else ""
+            yield f"unknown.{topic}", profile.unknown[topic], f"{meant}asked for are " + ", ".join(sorted(known))
