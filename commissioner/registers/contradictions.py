@@ -1,5 +1,5 @@
 """What a drive file says against itself, each key being right alone: limits that cross, names that share a bit, a unit that its
-name denies, a register that has to be written and cannot be, a topic of [unknown] that nothing asks for."""
+name denies, a register that has to be written and cannot be, a misspelt topic of [unknown]."""
 
 from __future__ import annotations
 
@@ -141,10 +141,9 @@ def _supervision(profile: DriveProfile) -> Iterator[Problem]:
 
 
 def _topics(profile: DriveProfile) -> Iterator[Problem]:
-    """A sentence that nothing asks for reaches nobody. What begins with a known name is a remark on it: `NAME_scale`."""
+    """A name one letter off a known one: its sentence would reach nobody. Any other is a remark of the file's author."""
     known = TOPICS | set(profile.items)
-    for topic in profile.unknown:
-        if not any(topic == name or topic.startswith(f"{name}_") for name in known):
-            near = get_close_matches(topic, known, n=1)
-            meant = f"perhaps {near[0]}; " if near else ""
-            yield f"unknown.{topic}", profile.unknown[topic], f"{meant}asked for are " + ", ".join(sorted(known))
+    for topic in sorted(set(profile.unknown) - known):
+        for near in get_close_matches(topic, known, n=1, cutoff=0.85):
+            if not topic.startswith(f"{near}_"):
+                yield f"unknown.{topic}", profile.unknown[topic], f"perhaps {near}"
