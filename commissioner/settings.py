@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -113,13 +114,8 @@ def load_procedure(
     leniency."""
     source = path or CONFIG_FOLDER / "procedure.toml"
     model = load(source, ProcedureFile)
-    if model.supervision.watchdog_s > model.supervision.max_watchdog_s:
-        raise ConfigurationError(
-            file=str(source),
-            key="supervision.watchdog_s",
-            value=model.supervision.watchdog_s,
-            expected=f"at most supervision.max_watchdog_s = {model.supervision.max_watchdog_s} s",
-        )
+    for key, value, expected in _contradictions(model):
+        raise ConfigurationError(file=str(source), key=key, value=value, expected=expected)
     return ProcedurePlan(
         axes_deg=axes_deg or tuple(model.axes.orientations_deg),
         repeat_first=model.axes.repeat_first,
@@ -128,6 +124,19 @@ def load_procedure(
         excitation=ExcitationPlan(**model.excitation.model_dump()),
         acceptance=Acceptance(**model.acceptance.model_dump() | {"strict": strict or model.acceptance.strict}),
     )
+
+
+def _contradictions(model: ProcedureFile) -> Iterator[tuple[str, float, str]]:
+    """Key, value and what would be right, where a value cannot go with another. How long a test takes depends on the motor;
+    what is asked for here, every motor needs."""
+    supervision, limits, tones_s = model.supervision, model.limits, model.excitation.seconds
+    if supervision.watchdog_s > supervision.max_watchdog_s:
+        expected = f"at most supervision.max_watchdog_s = {supervision.max_watchdog_s} s"
+        yield "supervision.watchdog_s", supervision.watchdog_s, expected
+    if limits.total_time_s < limits.axis_time_s:
+        yield "limits.total_time_s", limits.total_time_s, f"at least limits.axis_time_s = {limits.axis_time_s} s"
+    if tones_s >= limits.axis_time_s:
+        yield "excitation.seconds", tones_s, f"less than limits.axis_time_s = {limits.axis_time_s} s"
 
 
 def read_toml(path: Path) -> JsonObject:

@@ -130,3 +130,44 @@ def test_a_procedure_that_cannot_be_right_is_refused(tmp_path, old, new, key):
     with pytest.raises(ConfigurationError) as caught:
         load_procedure(path)
     assert caught.value.key.startswith(key)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "key", "value", "limit"),
+    [
+        (
+            ("total_time_s = 240.0", "total_time_s = 15.9"),
+            "limits.total_time_s",
+            15.9,
+            "at least limits.axis_time_s = 16.0 s",
+        ),
+        (("\nseconds = 4.6", "\nseconds = 16"), "excitation.seconds", 16.0, "less than limits.axis_time_s = 16.0 s"),
+        (
+            ("axis_time_s = 16.0", "axis_time_s = 4.0"),
+            "excitation.seconds",
+            4.6,
+            "less than limits.axis_time_s = 4.0 s",
+        ),
+    ],
+)
+def test_times_that_contradict_each_other_are_refused_with_both_keys(tmp_path, replaced, key, value, limit):
+    text = (CONFIG_FOLDER / "procedure.toml").read_text()
+    assert replaced[0] in text
+    path = tmp_path / "procedure.toml"
+    path.write_text(text.replace(*replaced))
+    with pytest.raises(ConfigurationError) as caught:
+        load_procedure(path)
+    error = caught.value
+    assert (error.exit_code, error.step) == (2, "read configuration")
+    assert (error.key, error.value, error.limit) == (key, value, limit)
+    assert key in error.remedy
+    assert "limits.axis_time_s" in error.remedy
+
+
+def test_a_run_may_be_as_long_as_its_one_test_and_a_test_just_longer_than_its_tones(tmp_path):
+    path = tmp_path / "procedure.toml"
+    text = (CONFIG_FOLDER / "procedure.toml").read_text()
+    path.write_text(
+        text.replace("total_time_s = 240.0", "total_time_s = 16.0").replace("\nseconds = 4.6", "\nseconds = 15.9")
+    )
+    assert load_procedure(path).limits.total_time_s == 16.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
@@ -89,6 +89,13 @@ class DesignedExcitation:
     relative_std: tuple[float, float, float, float]
     seconds: float
     noise_a: float
+
+    def cut_to(self, seconds: float) -> DesignedExcitation:
+        """What it yields where a session ended after `seconds`; itself where all was played."""
+        if not 0.0 < seconds < self.seconds:
+            return self
+        r_s, r_r, l_s, l_m = (math.sqrt(self.seconds / seconds) * std for std in self.relative_std)
+        return replace(self, relative_std=(r_s, r_r, l_s, l_m), seconds=seconds)
 
 
 def design(

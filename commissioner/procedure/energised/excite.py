@@ -79,8 +79,8 @@ def excite(job: Job, findings: Findings) -> Step:
     seconds = min(seconds, max(left_s, SHORTEST * seconds))
     longest_s = max(seconds, left_s)
     chosen = _design(job, findings, seconds)
-    yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, bias_s=bias_s)
-    findings.excitations.append(chosen)
+    played_s = yield from _test(job, findings, axis_deg, chosen, seconds, longest_s, bias_s=bias_s)
+    findings.excitations.append(chosen.cut_to(played_s))
     findings.tests_done += 1
     if findings.tests_done == len(job.plan.tests_deg):
         return Event.AXES_DONE
@@ -151,10 +151,11 @@ def _test(
     *,
     is_look: bool = False,
     bias_s: float = 0.0,
-) -> Generator[Command, Any, None]:
+) -> Generator[Command, Any, float]:
     """One energised multitone session: raise the amplitude as the guard permits, end when the time is up and settled.
 
-    An estimate that has not settled after `seconds` gets more time, up to `longest_s`; then `bias_s` on a DC bias.
+    An estimate that has not settled after `seconds` gets more time, up to `longest_s`; then `bias_s` on a DC bias. Returns
+    the seconds of tones that were played.
     """
     tones = tuple((t.amplitude_v, t.frequency_hz, t.phase_rad) for t in chosen.excitation.tones)
     yield Tell(
@@ -167,7 +168,7 @@ def _test(
     yield from rest(job, findings)
     if findings.link.captured:
         yield from captured(job, findings, STEP, axis_deg, tones, under_test, seconds, is_look=is_look)
-        return
+        return seconds
     yield for_tones(job, findings)
     yield load(job, findings, axis_deg, tones)
     yield Enable(STEP)
@@ -198,3 +199,4 @@ def _test(
     yield from ramp_down(findings, STEP, axis_deg, 1.0 / job.scale_ramp_per_s)
     yield Disarm("test done")
     yield Tell(replace(finished, energised_s=under_test.time_s, peak_flux_fraction=under_test.peak_fraction))
+    return finished.energised_s

@@ -218,6 +218,15 @@ def test_what_a_longer_test_would_buy_is_known_after_a_run(good_run):
         assert 0.7 * now < then <= now
 
 
+def test_a_longer_test_is_measured_by_the_tones_that_were_played():
+    drive, findings, job = ScriptedDrive(), Findings(), _job(axis_time_s=5.0)
+    job = replace(job, plan=replace(job.plan, excitation=replace(job.plan.excitation, seconds=10.0)))
+    drive.run(course(job, findings))
+    test = _told(drive, AxisFinished)[-1]
+    assert test.energised_s < _told(drive, ExcitationChosen)[-1].seconds
+    assert findings.longer_test.seconds == pytest.approx(2 * test.energised_s)
+
+
 def test_the_staircase_of_a_slow_machine_is_not_waited_out():
     machine = Machine(r_s=0.625, r_r=0.376, l_sigma=0.0107, l_m=0.19)
     drive, findings = ScriptedDrive(machine, rated_a=20.0), Findings()

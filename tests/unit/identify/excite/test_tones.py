@@ -102,3 +102,12 @@ def test_the_design_beats_the_same_peak_flux_spent_on_decade_spaced_tones():
     ]
     assert worst[0] < worst[1]
     assert predicted_peaks(machine, chosen.excitation, PERIOD_S)[0] <= 1.02 * limits.flux_wb
+
+
+def test_a_quarter_of_the_time_has_twice_the_standard_errors_and_nothing_is_gained_by_going_on():
+    motor = MOTORS[0]
+    chosen = design(InverseGamma(*motor.truth), limits_of(motor), PERIOD_S, seconds=4.0)
+    cut = chosen.cut_to(1.0)
+    assert cut.seconds == 1.0
+    assert cut.relative_std == pytest.approx([2.0 * std for std in chosen.relative_std])
+    assert chosen.cut_to(4.5) == chosen
