@@ -321,7 +321,7 @@ def _remarks(results: Sequence[AxisResult], rated: RatedFlux, flux_wb: float, re
     )
     if flux_wb > reached_wb:
         remarks.append(
-            f"the tests reached {reached_wb:.3g} Wb; from there to {flux_wb:.3g} Wb, the level that L_M is told for in every run, "
+            f"the tests reached {reached_wb:.3g} Wb; from there to {flux_wb:.3g} Wb, the level that L_M is told for, "
             "their own magnetizing curve leads; a quarter of the way is in L_M's standard error"
         )
     remarks.append("gain errors of current and DC-link sensors scale all values and are not in the standard errors")

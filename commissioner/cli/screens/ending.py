@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from commissioner.cli.screens import screen
 from commissioner.run.commission import Commissioned
 
@@ -18,9 +20,11 @@ def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
             if (done.folder / name).is_file():
                 screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
         if done.is_being_diagnosed:
+            archive = done.folder.parent
+            where = "" if archive == Path("runs") else f' --runs "{archive}"'
             screen.out.print(
                 "[dim]diagnosis of the samples: a process of its own makes it, in minutes; then "
-                f"`commissioner runs show {done.folder.name}` and the report have it[/]",
+                f"`commissioner runs show {done.folder.name}{where}` and the report have it[/]",
                 soft_wrap=True,
             )
     if code := EXIT_CODES[done.ended.outcome]:

@@ -26,7 +26,7 @@ def result_of(run: RunSummary) -> Result:
     if not has_result(run):
         raise DataRefused(
             f"{run.run} identified nothing", step="compare", value=run.outcome, limit="a run with parameters",
-            remedy="compare runs that ended as commissioned or rejected",
+            remedy="compare runs of which `commissioner runs show RUN` shows the four parameters",
         )  # fmt: skip
     return result_from(run.result or {}, run.run)
 
