@@ -44,16 +44,16 @@ class FieldProblem:
 def first_problem(error: ValidationError, model: type[BaseModel]) -> FieldProblem:
     """The most telling one: a misspelt key explains a missing one."""
     problem = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-    key = ".".join(str(part) for part in problem["loc"])
+    key = ".".join(map(str, _named(problem["loc"])))
     return FieldProblem(key, None if problem["type"] == "missing" else problem["input"], wanted(problem, model))
 
 
 def wanted(problem: Mapping[str, Any], model: type[BaseModel] | None = None) -> str:
     """What a field must be. `problem`: one of pydantic's; `model`: whose field it is, where that is known."""
-    location = problem["loc"]
+    location = _named(problem["loc"])
     if problem["type"] == "extra_forbidden":
         return "no such key" + (f"; known here: {', '.join(_keys(model, location[:-1]))}" if model else "")
-    name = human(str(location[-1]))[0] if location else "the whole"
+    name = _spoken(location)[0] or "the whole"
     field = _field(model, location) if model else None
     description = f" ({field.description})" if field is not None and field.description else ""
     return f"{name}: {requirement(problem)}{description}"
@@ -61,13 +61,29 @@ def wanted(problem: Mapping[str, Any], model: type[BaseModel] | None = None) -> 
 
 def requirement(problem: Mapping[str, Any]) -> str:
     """The same without the field's name: `needed`, `a whole number`, `50 1/min or more`."""
-    location = problem["loc"]
-    unit = human(str(location[-1]))[1] if location else ""
+    unit = _spoken(_named(problem["loc"]))[1]
     kind = problem["type"].partition("_")[0]
     if kind in ("missing", "value"):
         return "needed" if kind == "missing" else str(problem["ctx"]["error"])
     what = _limit(problem, f" {unit}" if unit else "") or _WANTED.get(kind, "another value")
     return what + (f" in {unit}" if unit and kind in ("int", "float", "finite") else "")
+
+
+def _named(location: Sequence[int | str]) -> list[int | str]:
+    """Without pydantic's own words for the member of a union that was tried: `list[str]`, `float`."""
+    return [
+        part
+        for part in location
+        if isinstance(part, int) or not ("[" in part or part in ("str", "int", "float", "bool"))
+    ]
+
+
+def _spoken(location: Sequence[int | str]) -> tuple[str, str]:
+    """What the last key is called, with the entry of its list, and the unit of its number; empty for the whole document."""
+    entries = [f"entry {part + 1}" for part in location[-1:] if isinstance(part, int)]
+    key = next((part for part in reversed(location) if isinstance(part, str)), "")
+    name, unit = human(key)
+    return ", ".join(filter(None, [name, *entries])), unit
 
 
 def human(key: str) -> tuple[str, str]:

@@ -95,8 +95,10 @@ def install(app: FastAPI, answer: Callable[[Request, Refusal], Response]) -> Non
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
-        unreadable, expected = first["type"] == "json_invalid", wanted(first)
+        unreadable = first["type"] == "json_invalid"  # its place is then a character's number
+        expected = "valid JSON" if unreadable else wanted(first)
+        inner = [] if unreadable else [str(part) for part in first["loc"] if part not in ("body", "query", "path")]
+        where = ".".join(inner)
         return answer(
             request,
             Refusal(

@@ -31,6 +31,7 @@ class Table(Inner):
     name: typing.Annotated[str, Field(min_length=2, max_length=3, pattern="^[a-z]+$")] = "ab"
     inner: Inner = Inner()
     items: dict[str, Inner] = {}
+    axes_deg: list[float] | typing.Literal["all"] = "all"
 
 
 @pytest.mark.parametrize(
@@ -52,6 +53,8 @@ class Table(Inner):
         ({"inner": {"names": []}}, "inner.names", "names: at least 1 entries"),
         ({"inner": {"names": ["a", "b", "c"]}}, "inner.names", "names: at most 2 entries"),
         ({"inner": {"names": "a"}}, "inner.names", "names: a list"),
+        ({"axes_deg": 5}, "axes_deg", "axes: a list"),
+        ({"axes_deg": [0.0, "x"]}, "axes_deg.1", "axes, entry 2: a number in degrees"),
         ({"inner": 5}, "inner", "inner: a table of keys and values"),
         ({"items": []}, "items", "items: a table of keys and values"),
         ({"inner": {"hold": 1.0}}, "inner.hold", "no such key; known here: hold_s, is_on, names"),
