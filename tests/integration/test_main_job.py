@@ -262,7 +262,7 @@ def test_ctrl_c_while_energised_de_energises_and_still_writes_the_report(tmp_pat
 
 
 def test_a_killed_service_leaves_a_dead_drive_and_a_readable_run(tmp_path):
-    with SimProcess("--scenario", "default", "--tcp", "0", speed="2") as sim:
+    with SimProcess("--scenario", "default", "--tcp", "0", speed="1") as sim:
         run = started(sim.url, tmp_path)
         _wait_for(lambda: any(row["event"] == "energised" for row in sim.log()))
         time.sleep(0.7)
