@@ -1,10 +1,13 @@
-"""What is said of a path that leads to no file."""
+"""Where runs are kept unless it is told, and what is said of a path that leads to no file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from commissioner.errors import UsageError
+
+RUNS = Path("runs")
+"""The archive, in the folder that the command line is in."""
 
 
 def no_file(path: Path, step: str, limit: str = "an existing file") -> UsageError:

@@ -13,6 +13,7 @@ from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
 from commissioner.cli.help import Verbs, only
 from commissioner.cli.recordings import Map, recordings_app
+from commissioner.paths import RUNS
 
 app = typer.Typer(
     name="commissioner",
@@ -97,7 +98,6 @@ TableOut = Annotated[
     Path | None, typer.Option("--out", help="Write them as a table instead: .csv or .parquet, a row a run.")
 ]
 Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
-RUNS = Path("runs")
 
 
 def _say_version(asked: bool) -> None:

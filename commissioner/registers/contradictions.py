@@ -3,7 +3,6 @@ name denies, a register that has to be written and cannot be, a misspelt topic o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
@@ -106,7 +105,7 @@ def _units_by_name(item: Item) -> tuple[str, ...] | None:
 
 def _scales(profile: DriveProfile) -> Iterator[Problem]:
     for item in profile.items.values():
-        if not (math.isfinite(item.scale) and SMALLEST_SCALE <= item.scale <= LARGEST_SCALE):
+        if not SMALLEST_SCALE <= item.scale <= LARGEST_SCALE:
             limits = f"{SMALLEST_SCALE:g} ... {LARGEST_SCALE:g}: value = raw number * scale"
             yield f"items.{item.name}.scale", item.scale, limits
 

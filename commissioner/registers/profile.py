@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 WORDS_PER_ELEMENT = MappingProxyType({"u16": 1, "i16": 1, "u32": 2, "i32": 2, "f32": 2, "ascii": 1})
 """Registers one element of a type takes; an ascii element is a register with two characters."""
 
+IDENTITY_ITEMS = (
+    "magic",
+    "map_version",
+    "firmware_version",
+    "serial_number",
+    "drive_type",
+    "rated_drive_current_a",
+    "control_period_s",
+    "switching_frequency_hz",
+)
+"""What a drive's identity is read from."""
 STATUS_ITEMS = (
     "status_word",
     "fault_code",
@@ -41,14 +52,7 @@ STATUS_ITEMS = (
 )
 """What a status is read from."""
 COMMISSIONING_ITEMS = (
-    "magic",
-    "map_version",
-    "firmware_version",
-    "serial_number",
-    "drive_type",
-    "rated_drive_current_a",
-    "control_period_s",
-    "switching_frequency_hz",
+    *IDENTITY_ITEMS,
     "echo",
     "control_word",
     "mode",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from commissioner.cli.screens import screen
+from commissioner.paths import RUNS
 from commissioner.run.commission import Commissioned
 
 EXIT_CODES = {"commissioned": 0, "rejected": 3, "aborted": 4, "faulted": 5}
@@ -21,7 +20,7 @@ def show_and_exit(done: Commissioned, *, as_json: bool) -> None:
                 screen.out.print(f"[dim]{what:<9} {done.folder / name}[/]", soft_wrap=True)
         if done.is_being_diagnosed:
             archive = done.folder.parent
-            where = "" if archive == Path("runs") else f' --runs "{archive}"'
+            where = "" if archive == RUNS else f' --runs "{archive}"'
             screen.out.print(
                 "[dim]diagnosis of the samples: a process of its own makes it, in minutes; then "
                 f"`commissioner runs show {done.folder.name}{where}` and the report have it[/]",

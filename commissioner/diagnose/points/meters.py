@@ -113,12 +113,12 @@ def _of_meters(columns: Mapping[str, Array], names: tuple[str, ...], apart: floa
     if off.max(initial=0.0) > apart:
         yield _odd_one(there, shown, off, apart)
     else:
-        of = (
-            f"the mean of {', '.join(there)}, at most {off.max(initial=0.0):.2g} of it apart"
-            if len(there) > 1
-            else there[0]
-        )
-        yield _Form(there, np.where(counts > 0, mean, np.nan), f"is {of}.")
+        apart_by = f", at most {off.max(initial=0.0):.2g} of it apart" if len(there) > 1 else ""
+        yield _Form(there, np.where(counts > 0, mean, np.nan), f"is {_mean_of(there)}{apart_by}.")
+
+
+def _mean_of(names: tuple[str, ...]) -> str:
+    return f"the mean of {', '.join(names)}" if len(names) > 1 else names[0]
 
 
 def _odd_one(names: tuple[str, ...], shown: Array, off: Array, apart: float) -> DataRefused:
@@ -147,8 +147,8 @@ def _from_neutral(form: _Form, columns: Mapping[str, Array], said: Mapping[str, 
             "volts between two terminals, or of one winding", "add `# resistance_measured: line_to_line` (between two terminals), "
             "phase_winding or star_equivalent",
         )  # fmt: skip
-    said_so = f"is sqrt(3) times {' and '.join(form.columns) if len(form.columns) < 2 else 'the mean of ' + ', '.join(form.columns)}."
-    return _Form(form.columns, np.where(direct, form.values, ROOT_3 * form.values), said_so)
+    line = np.where(direct, form.values, ROOT_3 * form.values)
+    return _Form(form.columns, line, f"is sqrt(3) times {_mean_of(form.columns)}.")
 
 
 def _ask(columns: Mapping[str, Array], name: str) -> DataRefused:

@@ -9,19 +9,9 @@ from commissioner.errors import IdentityMismatch, RequestRefused
 from commissioner.link.drive.items import Items, number
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.codec import Value
-from commissioner.registers.profile import STATUS_ITEMS, DriveProfile
+from commissioner.registers.profile import IDENTITY_ITEMS, STATUS_ITEMS, DriveProfile
 from commissioner.registers.status import DriveState, decode_bits, decode_state
 
-IDENTITY_ITEMS = (
-    "magic",
-    "map_version",
-    "firmware_version",
-    "serial_number",
-    "drive_type",
-    "rated_drive_current_a",
-    "control_period_s",
-    "switching_frequency_hz",
-)
 BUS_CONTROL = "bus_control"
 NAMEPLATE_ITEMS = (
     "rated_power_w",
