@@ -24,6 +24,19 @@ SIZES = {"1280": (1280, 800), "1024": (1024, 768), "390": (390, 844)}
 SLOW_MS = 240_000
 """A simulated drive beside other work on the host."""
 LOOKS = 20
+KEEP_WHAT_IS_SAID = """() => {
+  const look = () => {
+    const said = JSON.parse(sessionStorage.getItem('said') || '[]'), before = said.length;
+    for (const id of ['big', 'small']) {
+      const text = document.getElementById(id)?.textContent.trim();
+      if (text && !said.includes(text)) said.push(text);
+    }
+    if (said.length > before) sessionStorage.setItem('said', JSON.stringify(said));
+  };
+  look();
+  new MutationObserver(look).observe(document, { subtree: true, childList: true, characterData: true });
+}"""
+"""Each sentence of the state's line, once: beside other work a sentence can come and go between two looks."""
 WORDS = {
     "en": {"try": "Try it without a drive", "check": "Check the drive", "again": "Check again", "what": "What will happen", "see": "See what would be written",
            "write": re.compile("Write these . values"), "written": re.compile("Written and read back"), "energised": "MOTOR ENERGISED",
@@ -127,7 +140,15 @@ class Technician:
         return self.page.url.rsplit("/", 1)[1]
 
     def wait_energised(self) -> None:
+        """From here on what the state's line says is kept."""
+        self.page.evaluate(KEEP_WHAT_IS_SAID)
         expect(self.page.locator("#big")).to_have_text(str(self.words["energised"]), timeout=SLOW_MS)
+
+    def wait_said(self, words: str) -> None:
+        """Until the state's line has said them, now or before, since `wait_energised`."""
+        self.page.wait_for_function(
+            "words => JSON.parse(sessionStorage.getItem('said') || '[]').some(text => text.includes(words))", arg=words
+        )
 
     def wait_result(self, timeout_ms: float = 600_000) -> None:
         expect(self.page.locator(".verdict")).to_be_visible(timeout=timeout_ms)

@@ -61,7 +61,7 @@ def test_a_drive_tunes_itself_by_clicks_and_gets_its_old_values_back(bench, brow
     with technician(browser, bench) as hand:
         run = begin(hand, "remote")
         hand.wait_energised()
-        expect(hand.page.locator("#small")).to_have_text("The drive tunes itself at standstill")
+        hand.wait_said("The drive tunes itself at standstill")
         assert hand.violations() == [] and hand.fits()
         expect(hand.page.locator("h1")).to_contain_text("tunings agree", timeout=SLOW_MS)
         expect(hand.page.locator("main")).to_contain_text("As before, read back")
