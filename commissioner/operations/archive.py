@@ -10,17 +10,18 @@ from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import check_ending, write_table
 from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import find_folder, find_run, run_folders
-from commissioner.run.archive.documents import damaged, read_saved
+from commissioner.run.archive.documents import Loss, damaged, read_saved
 from commissioner.run.archive.replay import Difference, replay
-from commissioner.run.archive.verify import DAMAGED, Loss, Verified, refuse_damage, verify
+from commissioner.run.archive.verify import DAMAGED, Verified, losses_at_sight, refuse_damage, verify
 
 
 @dataclass(frozen=True)
 class Reported:
-    """Where the page of a run is."""
+    """Where the page of a run is, and what of its folder is not as the run left it."""
 
     run: str
     report: str
+    losses: tuple[Loss, ...]
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def report_run(runs: Path, run: str) -> Reported:
     report = Path(summary.folder) / "report.html"
     if not report.is_file():
         make_report(summary)
-    return Reported(summary.run, str(report))
+    return Reported(summary.run, str(report), losses_at_sight(report.parent))
 
 
 def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exported:
@@ -63,7 +64,7 @@ def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exp
     source = Path(summary.folder)
     verified = verify(source)
     if not salvage:
-        refuse_damage(source, verified, "export", "blocks.bin", "request.json")
+        refuse_damage(source, verified, "export", "blocks.bin", "request.json", "journal.jsonl")
     nameplate = read_saved(source, "request.json", "nameplate")["nameplate"]
     if not isinstance(nameplate, dict):
         raise damaged(source, "request.json", f"nameplate {nameplate!r}")

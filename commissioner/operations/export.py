@@ -28,7 +28,7 @@ def export_model(runs: Path, run: str, out: Path, form: str) -> ExportedModel:
     chosen = form_named(form, out)
     summary = find_run(runs, run)
     source = Path(summary.folder)
-    refuse_damage(source, verify(source), "export", "result.json", "request.json")
+    refuse_damage(source, verify(source), "export", "result.json", "request.json", "journal.jsonl")
     result, plate = (
         read_saved(source, "result.json", "outcome"),
         read_saved(source, "request.json", "nameplate")["nameplate"],

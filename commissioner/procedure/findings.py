@@ -167,11 +167,12 @@ class VerdictReached:
 
 @dataclass(frozen=True)
 class RunEnded:
-    """`outcome`: commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy."""
+    """`outcome`: commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy. `energised_s`:
+    None where a run that was cut off is told from its archive."""
 
     outcome: str
     reason: str
-    energised_s: float
+    energised_s: float | None
     error: Mapping[str, object] | None = None
 
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -29,6 +29,7 @@ from commissioner.run.archive.replay import read_snapshot
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery
+from commissioner.run.index.results import flux_level
 from commissioner.run.proof import prove, read_plate
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.safety.commands import WriteParameters
@@ -51,13 +52,15 @@ class PlannedRow:
 
 @dataclass(frozen=True)
 class Plan:
-    """A table that somebody is asked to agree to. `token` stands for exactly this table."""
+    """A table that somebody is asked to agree to. `token` stands for exactly this table. `holds_for_stator_flux_wb`: the peak stator
+    flux of the L_M and T_R that would be written; at which the drive's hold, it does not say."""
 
     run: str
     what: str
     drive_type: str
     serial_number: int | None
     rows: tuple[PlannedRow, ...]
+    holds_for_stator_flux_wb: float | None = None
 
     @property
     def token(self) -> str:
@@ -80,7 +83,8 @@ def plan_write_back(run: RunSummary, url: str | None) -> Plan:
     """What writing this run's result would change. Reads the drive, changes nothing."""
     ready, circuit = _ready(run, url), _circuit(run)
     with _drive(ready) as inverter:
-        return _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.plate).values)
+        plan = _plan(run, ready, inverter, "write back", drive_values(ready.profile, circuit, ready.plate).values)
+    return replace(plan, holds_for_stator_flux_wb=flux_level(run.parameters))
 
 
 def plan_restore(run: RunSummary, url: str | None) -> Plan:
@@ -242,6 +246,7 @@ def as_document(plan: Plan) -> WritePlan:
         "what": plan.what,
         "drive_type": plan.drive_type,
         "serial_number": plan.serial_number,
+        "holds_for_stator_flux_wb": plan.holds_for_stator_flux_wb,
         "rows": [cast("PlanRow", asdict(row)) for row in plan.rows],
         "token": plan.token,
     }

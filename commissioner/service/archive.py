@@ -32,7 +32,7 @@ class Entry:
     outcome: str
     standing: str
     reason: str
-    energised_s: float
+    energised_s: float | None
     written: str
     parameters: Mapping[str, Measured] | None
     flux_wb: float | None

@@ -16,6 +16,7 @@ from rich.table import Table
 from commissioner.encoding import plain
 from commissioner.errors import Aborted, CommissionerError, UsageError
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE, finding_sentences, standing
+from commissioner.run.archive.documents import Loss
 from commissioner.text import LONGEST
 from commissioner.text import shown as visible
 
@@ -163,7 +164,19 @@ def result(document: Mapping[str, Any], standing_now: str = "") -> None:
             out.print(
                 "  [dim]•[/] the drive still holds its old values; the same call with --write-back writes the new ones"
             )
-    out.print(f"  energised {document['energised_s']:.1f} s in all")
+    out.print(f"  energised {seconds(document['energised_s'])} in all")
+
+
+def losses(run: str, found: Sequence[Loss]) -> None:
+    """That a run's folder is not as the run left it, where it is not."""
+    if found:
+        what = "; ".join(f"{loss.file}: {loss.what}" for loss in found[:3])
+        err.print(f"[red]damaged[/] {escape(what)}; `commissioner runs verify {escape(run)}` says all", soft_wrap=True)
+
+
+def seconds(energised_s: float | None) -> str:
+    """How long the motor was energised; a run that was cut off could not say it."""
+    return "not known" if energised_s is None else f"{energised_s:.1f} s"
 
 
 def _rows(document: Mapping[str, Any], done: str) -> Iterable[Sequence[str]]:

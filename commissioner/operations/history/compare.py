@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,8 +14,9 @@ from commissioner.history.explain import Array, Explanation, explain
 from commissioner.identify.estimate.axes import Combined, Comparison, compare
 from commissioner.identify.estimate.common_ground import CommonGround, Result, brought_together
 from commissioner.motor.circuit import PARAMETERS
+from commissioner.operations.history.runs import Archive, find_runs
 from commissioner.run.archive.catalogue import find_run
-from commissioner.run.index.results import result_from, result_of
+from commissioner.run.index.results import flux_level, result_from, result_of
 
 
 @dataclass(frozen=True)
@@ -42,13 +45,24 @@ class HeldRow:
 
 
 @dataclass(frozen=True)
+class SetBy:
+    """Another run of the archive whose values the drive holds, and the peak stator flux that its L_M and T_R hold at."""
+
+    run: str
+    holds_for_stator_flux_wb: float | None
+
+
+@dataclass(frozen=True)
 class Held:
-    """What the drive holds beside what a run identified. `holds`: the run's values | other values."""
+    """What the drive holds beside what a run identified. `holds`: the run's values | other values. `holds_for_stator_flux_wb`: of the
+    run's L_M and T_R; of the drive's it is known only where another run set them, `set_by`."""
 
     run: str
     drive: str
     holds: str
     rows: tuple[HeldRow, ...]
+    holds_for_stator_flux_wb: float | None = None
+    set_by: SetBy | None = None
 
 
 SAME_VALUE = 1e-5
@@ -99,8 +113,20 @@ def compare_with_drive(runs: Path, run: str, drive: str | None = None) -> Held:
             "the drive holds none of the four parameters as they are named here", step="compare", value=identity,
             limit="an inverse-Gamma parameter in its file", remedy="`commissioner drives show` says what its file describes",
         )  # fmt: skip
-    is_same = all(abs(row.relative_change) < SAME_VALUE for row in rows)
-    return Held(summary.run, identity, "the run's values" if is_same else "other values", rows)
+    level = flux_level(summary.parameters)
+    if all(abs(row.relative_change) < SAME_VALUE for row in rows):
+        return Held(summary.run, identity, "the run's values", rows, level)
+    return Held(summary.run, identity, "other values", rows, level, _set_by(runs, held))
+
+
+def _set_by(runs: Path, held: Mapping[str, float]) -> SetBy | None:
+    """The newest run of the archive that identified what the drive holds."""
+    ours = {name: value for name, value in held.items() if name in PARAMETERS}
+    for row in find_runs(Archive(runs)).rows:
+        found = json.loads(row.document)["parameters"]
+        if all(name in found and abs(ours[name] / found[name]["value"] - 1.0) < SAME_VALUE for name in ours):
+            return SetBy(row.run, flux_level(found))
+    return None
 
 
 def beside(first: Result, second: Result) -> Compared:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from commissioner.errors import UsageError
 from commissioner.run.archive.catalogue import RunSummary, find_folder, read_run
-from commissioner.run.archive.documents import read_result
+from commissioner.run.archive.documents import Loss, read_result
+from commissioner.run.archive.summary import STANDINGS
 from commissioner.run.index.index import Found, Refreshed
 from commissioner.run.index.index import find as look_up
 from commissioner.run.index.index import refresh as bring_into_step
@@ -27,11 +28,23 @@ class Archive:
 
 def find_runs(archive: Archive, wanted: Wanted | None = None) -> Found:
     """Newest first, all of them where nothing is wanted; a folder that cannot be read is a row that says so. UsageError: a date
-    that is none."""
+    that is none, an outcome that no run has."""
     wanted = wanted or Wanted()
+    if wanted.outcome and wanted.outcome not in STANDINGS:
+        raise UsageError(
+            "no run ends like this", step="archive", value=wanted.outcome, limit=" | ".join(STANDINGS), remedy="give --outcome one of these",
+        )  # fmt: skip
     for name in ("since", "until"):
         _check_date(getattr(wanted, name), name)
     return look_up(archive.runs, wanted, archive.database)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A run, and what of its folder is not as the run left it."""
+
+    summary: RunSummary
+    losses: tuple[Loss, ...]
 
 
 @dataclass(frozen=True)
@@ -49,10 +62,12 @@ def write_runs(archive: Archive, wanted: Wanted, out: Path) -> WrittenTable:
     )
 
 
-def show_run(runs: Path, run: str) -> RunSummary:
+def show_run(runs: Path, run: str) -> Shown:
     """The run of which the id starts so, or the newest for `last`. UsageError: none or several. DataRefused: its result is damaged."""
+    from commissioner.run.archive.verify import losses_at_sight
+
     folder = find_folder(runs, run)
-    return replace(read_run(folder, with_result=False), result=read_result(folder))
+    return Shown(replace(read_run(folder, with_result=False), result=read_result(folder)), losses_at_sight(folder))
 
 
 def index_runs(archive: Archive, *, rebuild: bool = False) -> Refreshed:

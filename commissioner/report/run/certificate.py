@@ -143,7 +143,7 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
     else:
         yield (
             "Energised in all",
-            f"{float(result['energised_s']):.1f} s",
+            _energised(result),
             f"{_tests(len(subject.estimates))} begun",
         )
         yield (
@@ -237,13 +237,13 @@ def _measurement(subject: Subject) -> Markup:
     rows.append(
         (
             "Energised",
-            f"{float(result['energised_s']):.1f} s" + (f" in {_tests(len(subject.tests))}: {axes}" if axes else ""),
+            _energised(result) + (f" in {_tests(len(subject.tests))}: {axes}" if axes else ""),
         )
     )
     if (seconds := subject.seconds) is not None:
         ahead = (
             ": the simulator ran ahead of time"
-            if subject.is_simulated and seconds < float(result["energised_s"])
+            if subject.is_simulated and seconds < (result["energised_s"] or 0.0)
             else ""
         )
         rows.append(("Clock", f"{seconds:.0f} s{ahead}"))
@@ -457,6 +457,11 @@ def sentence(text: str) -> str:
 def _counted(number: int) -> str:
     words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
     return words[number] if number < len(words) else fixed(number, 0)
+
+
+def _energised(result: Record) -> str:
+    seconds = result["energised_s"]
+    return "not known: the run was cut off" if seconds is None else f"{seconds:.1f} s"
 
 
 def _tests(number: int) -> str:

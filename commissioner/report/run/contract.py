@@ -147,8 +147,8 @@ class RunDocument(TypedDict):
     outcome: str
     reason: str
     error: ErrorDocument | None
-    energised_s: float
-    duration_s: float
+    energised_s: float | None
+    duration_s: float | None
     drive: IdentityDocument | None
     checks: list[CheckRow]
     before: dict[str, float | None] | None
@@ -196,5 +196,6 @@ class WritePlan(TypedDict):
     what: str
     drive_type: str
     serial_number: int | None
+    holds_for_stator_flux_wb: float | None
     rows: list[PlanRow]
     token: str

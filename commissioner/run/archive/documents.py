@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,15 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
     from commissioner.report.run.contract import RunDocument
+
+
+@dataclass(frozen=True)
+class Loss:
+    """One thing that is lost or was changed: in which file, at which record of the journal if it is one, what."""
+
+    file: str
+    record: int | None
+    what: str
 
 
 def read_document(text: str) -> JsonObject:

@@ -20,20 +20,22 @@ NOT_KEPT = frozenset({"folder", "result"})
 NAMED = "motor_named"
 """Kind of the record that says which motor a run was made on, where a person says so afterwards."""
 RESTORED, OLD_OR_NEW, CUT_OFF, UNREADABLE = "as before (restored)", "old or new", "cut off", "unreadable"
+STANDINGS = ("commissioned", ACCEPTED, RESTORED_SINCE, "rejected", "aborted", "faulted", CUT_OFF, UNREADABLE)
+"""How a run can have ended, or stand."""
 
 
 @dataclass(frozen=True)
 class RunSummary:
     """`written` says which parameter set the drive holds after the run, as far as the run could know. `motor`: the plate;
     `parameters`: value and standard error of each; both empty where the run did not get so far. `motor_tag`, `motor_serial`: which
-    motor it is, as a person said; `motor_name`: under which name the plate was given."""
+    motor it is, as a person said; `motor_name`: under which name the plate was given. `energised_s`: None of a run that was cut off."""
 
     run: str
     folder: str
     outcome: str
     reason: str
     drive: str
-    energised_s: float
+    energised_s: float | None
     written: str
     result: JsonObject | None = None
     serial_number: int | None = None
@@ -125,7 +127,7 @@ def read_summary(folder: Path, journal_bytes: int) -> RunSummary | None:
 def unreadable(folder: Path, error: Exception) -> RunSummary:
     """The row of a folder that cannot be read at all."""
     what = getattr(error, "what", "") or f"{type(error).__name__}: {error}"
-    return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", 0.0, "not known")
+    return RunSummary(folder.name, str(folder), UNREADABLE, what, "not known", None, "not known")
 
 
 def sound_result(folder: Path) -> JsonObject | None:
@@ -148,7 +150,7 @@ def _is_typed(summary: RunSummary) -> bool:
     )  # fmt: skip
     return (
         all(isinstance(getattr(summary, name), str) for name in texts)
-        and isinstance(summary.energised_s, int | float)
+        and isinstance(summary.energised_s, int | float | None)
         and isinstance(summary.motor, dict)
         and isinstance(summary.parameters, dict)
         and isinstance(summary.serial_number, int | None)
@@ -169,8 +171,8 @@ def _mapping(value: object) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _seconds(value: object) -> float:
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
+def _seconds(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 def _drive(identity: Record) -> str:

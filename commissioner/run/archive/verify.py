@@ -10,27 +10,21 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from commissioner.errors import CommissionerError, DataRefused
-from commissioner.run.archive.blocks import BlockDamage, read_blocks
+from commissioner.run.archive.documents import Loss
 from commissioner.run.archive.journal import FIRST, Line, Record, read_lines
 from commissioner.run.archive.seal import CLOSED, cover, is_sealed_by
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import read_file
 
+if TYPE_CHECKING:
+    from commissioner.run.archive.blocks import BlockDamage
+
 INTACT, UNVERIFIED, CUT_OFF, DAMAGED = "intact", "unverified", "cut off", "damaged"
 DECIDES = ("journal.jsonl", "snapshot.json", "request.json", "result.json", SUMMARY)
 """What a restore rests on; of a damaged sample or page it only speaks."""
-
-
-@dataclass(frozen=True)
-class Loss:
-    """One thing that is lost or was changed: in which file, at which record of the journal if it is one, what."""
-
-    file: str
-    record: int | None
-    what: str
 
 
 @dataclass(frozen=True)
@@ -62,7 +56,7 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
     counts = _count(folder / "blocks.bin", damage)
     is_chained = any("previous" in record for record in whole)
     is_over = any(record["kind"] == "run_ended" for record in whole)
-    closed = [record for record in whole if record["kind"] == CLOSED and isinstance(record["record"], dict)]
+    closed = _closings(whole)
     losses = [
         *_journal_losses(lines, is_chained=is_chained),
         *_end_losses(folder, whole, is_over=is_over),
@@ -78,6 +72,23 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
         len(whole), *counts, lost_samples, said, tuple(_remarks(folder, whole, is_torn=is_torn, is_chained=is_chained)),
         not losses,
     )  # fmt: skip
+
+
+def losses_at_sight(folder: Path) -> tuple[Loss, ...]:
+    """What is lost or changed of the journal and of the files it covers, without looking into the samples: for whoever shows a run."""
+    lines, _ = read_lines(folder / "journal.jsonl")
+    whole = _whole_records(lines)
+    is_chained = any("previous" in record for record in whole)
+    is_over = any(record["kind"] == "run_ended" for record in whole)
+    return (
+        *_journal_losses(lines, is_chained=is_chained),
+        *_end_losses(folder, whole, is_over=is_over),
+        *_file_losses(folder, _closings(whole)),
+    )
+
+
+def _closings(whole: list[Record]) -> list[Record]:
+    return [record for record in whole if record["kind"] == CLOSED and isinstance(record["record"], dict)]
 
 
 def refuse_damage(folder: Path, verified: Verified, step: str, *files: str) -> None:
@@ -169,6 +180,8 @@ def _fits(summary: Record, whole: list[Record]) -> bool:
 # --- samples ---------------------------------------------------------------------------------------------------------
 def _count(path: Path, damage: list[BlockDamage]) -> tuple[int, int]:
     """Whole blocks and their samples."""
+    from commissioner.run.archive.blocks import BlockDamage, read_blocks  # late: who shows a run reads no samples
+
     blocks = samples = 0
     try:
         for _, block in read_blocks(path, damage):

@@ -46,6 +46,11 @@ def result_from(document: Mapping[str, Any], name: str) -> Result:
     )
 
 
+def flux_level(parameters: Mapping[str, Any]) -> float | None:
+    """The peak stator flux, Wb, that a run's L_M and T_R hold at; None where it said none."""
+    return _number((parameters.get("magnetizing_inductance_h") or {}).get("at_stator_flux_wb"))
+
+
 def _curve(document: Mapping[str, Any]) -> tuple[tuple[float, float, float], ...]:
     points = document.get("magnetizing_curve") or ()
     return tuple(

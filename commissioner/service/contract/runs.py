@@ -68,7 +68,7 @@ class RunRow(TypedDict):
     outcome: str
     standing: str
     reason: str
-    energised_s: float
+    energised_s: float | None
     holds: str
     parameters: Mapping[str, Measured] | None
 
@@ -93,7 +93,7 @@ class RunWithoutResult(TypedDict):
     run: str
     outcome: str
     reason: str
-    energised_s: float
+    energised_s: float | None
     parameters: None
     written: list[str]
     holds: str

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
 
+from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
 from commissioner.service.archive import Entry
@@ -329,12 +330,14 @@ async def run(request: Request, run: str) -> Response:
     result: Mapping[str, Any] = parts.archive.result(run)
     place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
     state = live.feed.state if live is not None else _told(entry)
+    is_over = live is None or live.is_over
     facts: dict[str, Any] = {
         "entry": entry,
         "result": result,
         "asked": asked,
         "state": state,
-        "is_diagnosing": bool(live and not live.is_over),
+        "is_diagnosing": not is_over,
+        "losses": await asyncio.to_thread(losses_at_sight, entry.folder) if is_over else (),
         "has_report": (entry.folder / "report.html").is_file(),
         "has_snapshot": (entry.folder / "snapshot.json").is_file(),
     }

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from commissioner.cli.verbs.archived.comparing import compare_drive
 from commissioner.errors import DataRefused, IdentityMismatch, UsageError
 from commissioner.identify.estimate.axes import Identity
-from commissioner.operations.history.compare import compare_runs, compare_with_drive, compare_with_recordings
+from commissioner.operations.history.compare import SetBy, compare_runs, compare_with_drive, compare_with_recordings
 from commissioner.operations.recordings import identify
 from commissioner.run import write_accepted
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
@@ -54,6 +55,25 @@ def test_a_drive_that_holds_the_runs_values_in_single_precision_holds_them(bench
     held = bench.held()
     path = close_with(bench, {NAMES[name]: held[name] * (1 + 3e-8) for name in NAMES})
     assert compare_with_drive(path.parent, "last").holds == "the run's values"
+
+
+def test_at_which_flux_the_drives_inductance_holds_is_said_where_another_run_set_it(bench, capsys):
+    """L_M at two levels differs by saturation alone: a bare change would be read as another motor."""
+    held = {NAMES[name]: value for name, value in bench.held().items()}
+    path = close_with(bench, MACHINE)
+    assert (seen := compare_with_drive(path.parent, "last")).set_by is None
+    assert seen.holds_for_stator_flux_wb == 0.716
+    assert leave_text(capsys, path.parent).count("not known: saturation alone moves them") == 1
+    before = "20200101-000000-simulated-abcdef"
+    make_run(path.parent, before, result=result_of(before, held, flux_wb=0.63))
+    assert compare_with_drive(path.parent, path.name).set_by == SetBy(before, 0.63)
+    assert f"at 0.630 Wb: `commissioner runs compare {before} {path.name}`" in leave_text(capsys, path.parent)
+
+
+def leave_text(capsys, runs):
+    """What the verb tells a person, its lines joined."""
+    compare_drive(runs, "last", None, as_json=False)
+    return " ".join(capsys.readouterr().out.split())
 
 
 def test_another_drive_is_not_compared(bench):

@@ -10,7 +10,7 @@ from typing import Any
 
 from commissioner.encoding import plain
 from commissioner.run.archive.journal import Journal, digest, read_journal
-from commissioner.run.archive.seal import CLOSED
+from commissioner.run.archive.seal import CLOSED, cover
 from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.rows import utc_of
 
@@ -39,9 +39,11 @@ def result_of(
     curve: tuple[tuple[float, float], ...] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """The result document of a run, as far as lists, trends and comparisons read it."""
+    found = quantities(machine)
+    found["magnetizing_inductance_h"]["at_stator_flux_wb"] = flux_wb
     return {
         "run": name, "outcome": outcome, "reason": "every parameter is within its acceptance", "error": None, "energised_s": 46.9,
-        "parameters": quantities(machine), "holds_for_stator_flux_wb": flux_wb, "winding_temperature_degc": degc, "written": [],
+        "parameters": found, "holds_for_stator_flux_wb": flux_wb, "winding_temperature_degc": degc, "written": [],
         "magnetizing_curve": [
             {"stator_flux_wb": flux, "magnetizing_inductance_h": {"value": henry, "std": 0.001 * henry}} for flux, henry in curve
         ],
@@ -68,9 +70,9 @@ def make_run(
         said = reason or f"every parameter is within its acceptance, or so says {outcome}"
         ended = {"outcome": outcome, "reason": said, "energised_s": 46.9}
         journal.write("run_ended", ended, blocks, durable=False)
-        files = {}
         if result is not None:
             (folder / "result.json").write_text(json.dumps(result), "utf-8")
+        files = {path.name: cover(path) for path in folder.iterdir() if path.suffix == ".json"}
         (folder / "blocks.bin").write_bytes(b"")
         summary = plain(summary_of(folder, read_journal(folder / "journal.jsonl")), without=NOT_KEPT)
         record = {"files": files, "blocks": {"bytes": 0, "sha256": digest(b"")}, "summary": summary, "seal": None}

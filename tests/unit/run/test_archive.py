@@ -7,9 +7,12 @@ import stat
 import numpy as np
 import pytest
 
+from commissioner.cli.screens import screen
 from commissioner.encoding import plain
-from commissioner.errors import DataRefused
-from commissioner.operations.history.runs import show_run
+from commissioner.errors import DataRefused, UsageError
+from commissioner.operations.archive import export_run
+from commissioner.operations.history.runs import Archive as RunFolders
+from commissioner.operations.history.runs import Wanted, find_runs, show_run
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import find_run, summarise
@@ -179,7 +182,7 @@ def test_a_damaged_result_is_refused_by_name_and_hides_no_other_run(tmp_path, wr
     result = result_of(good, MACHINE)
     make_run(tmp_path, good, result=result)
     (make_run(tmp_path, bad, result=result) / "result.json").write_text(written)
-    assert show_run(tmp_path, good).result == Archive(tmp_path).result(good) == result
+    assert show_run(tmp_path, good).summary.result == Archive(tmp_path).result(good) == result
     for read in (show_run, lambda root, run: Archive(root).result(run)):
         with pytest.raises(DataRefused, match=r"result\.json is damaged") as refusal:
             read(tmp_path, bad)
@@ -191,4 +194,38 @@ def test_a_damaged_result_is_refused_by_name_and_hides_no_other_run(tmp_path, wr
 def test_a_result_of_an_older_version_is_shown(tmp_path):
     run = "20250101-000000-simulated-abcdef"
     make_run(tmp_path, run, result={"outcome": "rejected", "energised_s": None, "parameters": {}})
-    assert show_run(tmp_path, run).result == {"outcome": "rejected", "energised_s": None, "parameters": {}}
+    assert show_run(tmp_path, run).summary.result == {"outcome": "rejected", "energised_s": None, "parameters": {}}
+
+
+def test_a_run_that_was_cut_off_says_no_energised_time(tmp_path):
+    """0.0 s would say that the motor was never energised."""
+    run = "20260101-000000-simulated-abcdef"
+    make_run(tmp_path, run, closed=False)
+    shown = show_run(tmp_path, run)
+    assert (shown.summary.outcome, shown.summary.energised_s, shown.losses) == ("cut off", None, ())
+
+
+def test_whoever_shows_an_edited_run_says_so(tmp_path, capsys):
+    run = "20260101-000000-simulated-abcdef"
+    path = make_run(tmp_path, run, result=result_of(run, MACHINE)) / "result.json"
+    assert show_run(tmp_path, run).losses == ()
+    path.write_text(path.read_text("utf-8").replace("46.9", "46.8"), "utf-8")
+    assert [(loss.file, loss.what) for loss in show_run(tmp_path, run).losses] == [
+        ("result.json", "its content was changed")
+    ]
+    screen.losses(run, show_run(tmp_path, run).losses)
+    assert "damaged result.json: its content was changed" in " ".join(capsys.readouterr().err.split())
+
+
+def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
+    """The journal's chain is what proves the samples."""
+    run = "20260101-000000-simulated-abcdef"
+    journal = make_run(tmp_path, run) / "journal.jsonl"
+    journal.write_text(journal.read_text("utf-8").replace("anna", "bert"), "utf-8")
+    with pytest.raises(DataRefused, match=r"journal\.jsonl is not as the run left it"):
+        export_run(tmp_path, run, tmp_path / "out.csv")
+
+
+def test_an_outcome_that_no_run_has_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="no run ends like this"):
+        find_runs(RunFolders(tmp_path), Wanted(outcome="nonsense"))

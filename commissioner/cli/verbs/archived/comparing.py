@@ -63,3 +63,19 @@ def _show_held(done: Held) -> None:
     screen.out.print(
         screen.table("", ("parameter", "run", "drive", "change", "standard errors"), rows, right=(1, 2, 3, 4))
     )
+    if done.holds != "the run's values":
+        screen.out.print(f"  [dim]•[/] {screen.text(_levels(done))}", soft_wrap=True)
+
+
+def _levels(done: Held) -> str:
+    """At which flux the two L_M hold, as far as it is known."""
+    ours = (
+        "the run says no flux"
+        if done.holds_for_stator_flux_wb is None
+        else f"the run's L_M and T_R hold at {done.holds_for_stator_flux_wb:.3f} Wb of stator flux"
+    )
+    if done.set_by is None:
+        return f"{ours}; at which flux the drive's hold is not known: saturation alone moves them"
+    theirs = done.set_by.holds_for_stator_flux_wb
+    level = "at a flux it does not say" if theirs is None else f"at {theirs:.3f} Wb"
+    return f"{ours}; the drive's are those of {done.set_by.run}, {level}: `commissioner runs compare {done.set_by.run} {done.run}` brings both to one flux"

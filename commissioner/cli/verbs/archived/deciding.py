@@ -84,6 +84,12 @@ def _show_plan(plan: Plan, *, as_json: bool) -> None:
     screen.out.print(f"[bold]{screen.text(drive_words(plan.drive_type, plan.serial_number))}[/]")
     header = ("register", "parameter", "now", "will be", "unit", "convention")
     screen.out.print(screen.table("", header, rows, right=(2, 3)))
+    if plan.holds_for_stator_flux_wb is not None:
+        screen.out.print(
+            f"  [dim]•[/] L_M and T_R are written for {plan.holds_for_stator_flux_wb:.3f} Wb of stator flux; at which flux the drive's "
+            "hold, it does not say, and saturation alone moves them",
+            soft_wrap=True,
+        )
 
 
 def diagnose_run(runs: Path, run: str, seconds: float | None, *, seal: Path | None, as_json: bool) -> None:

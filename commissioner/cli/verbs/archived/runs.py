@@ -11,6 +11,7 @@ from commissioner.encoding import JsonObject
 from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs, write_runs
 from commissioner.operations.history.runs import show_run as look_up
 from commissioner.run.archive.catalogue import RunSummary
+from commissioner.run.archive.documents import Loss
 
 SHOWN = 50
 """Rows of a list for a person, unless another number is given."""
@@ -60,20 +61,23 @@ def index(folder: Path, *, rebuild: bool, database: str | None, as_json: bool) -
 
 
 class ShownRun(TypedDict):
-    """`result`: the run's, as it lies in the archive; null where it left none."""
+    """`result`: the run's, as it lies in the archive; null where it left none. `losses`: what of it is not as the run left it."""
 
     run: str
     summary: RunSummary
     result: JsonObject | None
+    losses: tuple[Loss, ...]
 
 
 def show_run(folder: Path, name: str, *, as_json: bool) -> None:
     """One run, as its result says; a run that was cut off is told from its journal."""
-    summary = look_up(folder, name)
+    shown = look_up(folder, name)
+    summary = shown.summary
     if as_json:
-        screen.emit(ShownRun(run=summary.run, summary=summary, result=summary.result))
+        screen.emit(ShownRun(run=summary.run, summary=summary, result=summary.result, losses=shown.losses))
         return
     _print(summary)
+    screen.losses(summary.run, shown.losses)
 
 
 def _print(summary: RunSummary) -> None:
@@ -85,7 +89,7 @@ def _print(summary: RunSummary) -> None:
     screen.out.print(
         f"  drive       {screen.text(summary.drive)}\n  motor       {screen.text(motor) or 'nobody said which'}"
     )
-    screen.out.print(f"  energised   {summary.energised_s:.1f} s")
+    screen.out.print(f"  energised   {screen.seconds(summary.energised_s)}")
     screen.out.print(f"  parameters  {screen.text(summary.written)}\n  folder      {screen.text(summary.folder)}")
     if summary.result is not None:
         screen.result(summary.result, summary.standing)
@@ -101,6 +105,7 @@ def report_run(folder: Path, name: str, *, as_json: bool) -> None:
         screen.emit(done)
     else:
         screen.out.print(done.report, soft_wrap=True)
+        screen.losses(done.run, done.losses)
 
 
 def export_run(folder: Path, name: str, out: Path, form: str, *, as_json: bool, salvage: bool = False) -> None:
