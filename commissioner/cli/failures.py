@@ -28,7 +28,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     as_json, hide = "--json" in arguments, Secrets(arguments).hide
     listen()
     try:
-        error = _carried_out(app, arguments, as_json, hide)
+        error = _carried_out(app, arguments)
     except KeyboardInterrupt:  # a second one while the first was being answered
         error = _stopped(arguments)
     finally:
@@ -37,9 +37,7 @@ def run_to_exit(app: typer.Typer, arguments: Sequence[str]) -> NoReturn:
     sys.exit(error.exit_code)
 
 
-def _carried_out(
-    app: typer.Typer, arguments: Sequence[str], as_json: bool, hide: Callable[[Any], Any]
-) -> CommissionerError:
+def _carried_out(app: typer.Typer, arguments: Sequence[str]) -> CommissionerError:
     """Why the verb could not be carried out; SystemExit where it could."""
     try:
         code = app(list(arguments), standalone_mode=False, prog_name="commissioner") or 0
@@ -56,9 +54,6 @@ def _carried_out(
             typer.echo(usage.message)
             sys.exit(0)
         error = _usage(usage, arguments)
-        if not as_json and hasattr(usage, "show") and hide(error.what) == error.what:
-            usage.show()
-            sys.exit(UsageError.exit_code)
     except KeyboardInterrupt:
         error = _stopped(arguments)
     except typer.Abort:
@@ -87,9 +82,12 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
 
 def _usage(error: Exception, arguments: Sequence[str]) -> CommissionerError:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
+    context = getattr(error, "ctx", None)
     return UsageError(
-        text, step="command line", value=shown_call(arguments), limit="see --help", remedy="correct the call"
-    )
+        text, step="command line", value=shown_call(arguments),
+        limit=" ".join(context.get_usage().removeprefix("Usage:").split()) if context else "see --help",
+        remedy=f"`{context.command_path} --help` says what it takes" if context else "correct the call",
+    )  # fmt: skip
 
 
 def _stopped(arguments: Sequence[str], by: str = "Ctrl-C or SIGTERM") -> CommissionerError:

@@ -26,7 +26,7 @@ from commissioner.motor.computed import without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
-from commissioner.recordings.reading.said_tests import codes, is_title
+from commissioner.recordings.reading.said_tests import codes, is_title, unknown
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
@@ -181,6 +181,11 @@ def to_standstill(table: Table) -> StandstillRecording:
     _require(table, needed, "a standstill recording")
     optional = [name for name in ("current_w_a", "dc_link_v", "averaged_periods") if name in columns]
     _require_finite(table, [*needed, *optional])
+    if "dc_link_v" in columns and np.any(columns["dc_link_v"] <= 0.0):
+        bad = float(columns["dc_link_v"][columns["dc_link_v"] <= 0.0][0])
+        raise _refuse(
+            table.source, "dc_link_v is no DC link's voltage", bad, "> 0 V", "correct it, or leave the column out"
+        )
     segment = columns["segment"]
     if np.any(segment != np.round(segment)):
         bad = float(segment[segment != np.round(segment)][0])
@@ -365,6 +370,7 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
     if table.num_rows == 0:
         raise _refuse(path, "the file has no rows", 0, "at least 2 rows", "record again")
     columns: dict[str, Signal] = {}
+    notes: tuple[ReadingNote, ...] = ()
     for name in table.column_names:
         column = table.column(name)
         if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
@@ -372,9 +378,9 @@ def _as_table(path: Path, table: pa.Table, metadata: Mapping[str, float | str]) 
             columns[name] = np.ascontiguousarray(values, dtype=np.float64)
         elif name in CONTRACT_COLUMNS:
             raise _not_numeric(path, name, _first_text(column))
-        elif is_title(name) and (said := codes([str(cell) for cell in column.to_pylist()])) is not None:
-            columns[name] = said
-    return Table(columns, metadata, str(path))
+        elif is_title(name) and (said := codes(cells := [str(cell) for cell in column.to_pylist()])) is not None:
+            columns[name], notes = said, (*notes, *unknown(cells, said))
+    return Table(columns, metadata, str(path), notes)
 
 
 def _first_text(column: pa.ChunkedArray) -> str:

@@ -53,6 +53,9 @@ class SafetyFacts:
     run_ended: bool = False
 
 
+MORE_TIME = "raise limits.total_time_s, or measure fewer axes"
+
+
 @dataclass(frozen=True)
 class Refusal:
     """Why a command does not go out."""
@@ -148,7 +151,9 @@ def _judge_enable(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refus
         return Refusal("the drive's own limits are not set", None, "current, voltage and time limit read back")
     if facts.loaded is None:
         return Refusal("no excitation is loaded", None, "an excitation loaded since the last disarm")
-    return _within("energised time of the run", facts.energised_s + facts.loaded.duration_s, 0.0, bounds.total_time_s)
+    seconds = facts.energised_s + facts.loaded.duration_s
+    refusal = _within("energised time of the run", seconds, 0.0, bounds.total_time_s)
+    return refusal and replace(refusal, remedy=MORE_TIME)
 
 
 def _judge_scale(command: Command, facts: SafetyFacts, bounds: Bounds) -> Refusal | None:

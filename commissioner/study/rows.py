@@ -15,6 +15,8 @@ from commissioner.monitor.contract import Measured
 from commissioner.recordings.whole import whole_file
 
 ENDED, TABLE, ASKED = "ended.jsonl", "cases.parquet", "study.json"
+DEFECT = "defect"
+"""Outcome of a case that ended in an error of ours, or that took its worker with it."""
 
 
 class Row(TypedDict):

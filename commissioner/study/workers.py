@@ -11,7 +11,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.study.rows import Row
+from commissioner.study.rows import DEFECT, Row
 from commissioner.study.specification import Case
 
 AHEAD = 4
@@ -38,7 +38,7 @@ def carried_out(case: Case) -> Row:
         }
     except Exception as defect:
         reason = f"{type(defect).__name__}: {defect}"
-        return {"case": case.number, "seed": case.seed, "motor": case.motor, "outcome": "defect", "reason": reason}
+        return {"case": case.number, "seed": case.seed, "motor": case.motor, "outcome": DEFECT, "reason": reason}
 
 
 def here(cases: Sequence[Case], workers: int) -> Iterator[Row]:
@@ -59,7 +59,7 @@ def here(cases: Sequence[Case], workers: int) -> Iterator[Row]:
                 if breaks[first.number] >= MOST_BREAKS:
                     del left[first.number]
                     yield {
-                        "case": first.number, "seed": first.seed, "motor": first.motor, "outcome": "defect",
+                        "case": first.number, "seed": first.seed, "motor": first.motor, "outcome": DEFECT,
                         "reason": f"the worker died {MOST_BREAKS} times at it",
                     }  # fmt: skip
     finally:
@@ -103,7 +103,7 @@ def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
         client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise UsageError(
-            f"no scheduler answers at {scheduler}", step="study", value=str(error) or type(error).__name__,
+            f"no scheduler answers at {scheduler}", step="study", value=scheduler,
             limit="a running Dask scheduler of the same version", remedy="start one, or leave --scheduler out",
         ) from error  # fmt: skip
     with client:

@@ -37,4 +37,5 @@ def _show(done: Checked) -> None:
         for r in done.checks
     ]
     rows += [("[yellow]–[/]", r.name, "not checked", "", screen.text(r.why)) for r in done.not_checked]
-    screen.out.print(screen.table("", ("", "check", "seen", "wanted", "remedy"), rows))
+    header, width = ("", "check", "seen", "wanted", "remedy"), 5 if any(row[4] for row in rows) else 4
+    screen.out.print(screen.table("", header[:width], [row[:width] for row in rows]))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from commissioner.cli.screens import screen
+from commissioner.errors import CommissionerError
 from commissioner.study.campaign import CaseEnded, Studied, StudyRequest, carry_out
+from commissioner.study.rows import DEFECT
 
 
 def study(request: StudyRequest, *, as_json: bool) -> None:
@@ -13,6 +15,10 @@ def study(request: StudyRequest, *, as_json: bool) -> None:
         screen.emit(done)
     else:
         _show(done)
+    if defects := done.outcomes.get(DEFECT, 0):
+        what = f"{defects} of {done.cases} cases ended in a defect of this program: their rows in the table say which"
+        screen.err.print(f"[red]{what}; please report it[/]", soft_wrap=True)
+        raise SystemExit(CommissionerError.exit_code)
 
 
 def _progress(ended: CaseEnded) -> None:

@@ -20,7 +20,7 @@ from commissioner.recordings.reading.encoding import decode
 from commissioner.recordings.reading.layout import Layout, head_lines, layout_of, split
 from commissioner.recordings.reading.preface import Clock, clock_in, factors_in, metadata_of, pairs, probes_in, units_in
 from commissioner.recordings.reading.rows import WrongRow, without_headers, without_torn_row
-from commissioner.recordings.reading.said_tests import codes, is_title
+from commissioner.recordings.reading.said_tests import codes, is_title, unknown
 from commissioner.recordings.table import CONTRACT_COLUMNS
 from commissioner.records import ReadingNote, Signal
 
@@ -104,8 +104,10 @@ def _columns(body: str, layout: Layout, marks: Marks, source: str) -> tuple[list
     for name, column in zip(layout.names, table.columns, strict=True):
         values, _ = to_numbers(column, marks)
         filled += np.isfinite(values)
-        said = codes([str(cell) for cell in column.to_pylist()]) if is_title(name) else None
+        cells = [str(cell) for cell in column.to_pylist()] if is_title(name) else []
+        said = codes(cells)
         columns.append(values if said is None else said)
+        notes += () if said is None else unknown(cells, said)
     if wrong_rows:
         _require_footer(wrong_rows, rows, source)
         notes.append(ReadingNote("footer", f"{len(wrong_rows)} rows that are no row of the table were left out"))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from commissioner.recordings.words import folded, translated
-from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, Signal
+from commissioner.records import DIRECT_TEST, IDLE_TEST, LOCKED_TEST, ReadingNote, Signal
 
 TITLES = frozenset({"test", "testtype", "typetest", "kind", "pruefung", "versuchsart", "typeoftest"})
 WORDS = {
@@ -28,6 +28,16 @@ def codes(cells: Sequence[str]) -> Signal | None:
     said = [re.sub("^test|test$", "", _letters(cell)) for cell in cells]
     out = np.array([next((c for c, w in WORDS.items() if re.fullmatch(w, one)), np.nan) for one in said])
     return out if np.isfinite(out).any() else None
+
+
+def unknown(cells: Sequence[str], said: Signal) -> tuple[ReadingNote, ...]:
+    """That some rows name a test which is not known: what they are is told from their values."""
+    names = sorted({cell.strip() for cell, code in zip(cells, said, strict=True) if _letters(cell) and np.isnan(code)})
+    return (
+        (ReadingNote("unknown_test", f"no known test: {', '.join(names)[:80]}; such rows are told from their values"),)
+        if names
+        else ()
+    )
 
 
 def _letters(text: str) -> str:

@@ -275,3 +275,15 @@ def test_a_folder_given_for_a_file_is_called_one(verb, tmp_path):
 def test_the_last_run_of_an_empty_archive_is_told_as_such(verb, tmp_path):
     done = call(*verb, "last", "--runs", str(tmp_path))
     assert done.code == 2 and "there is no run in" in " ".join(done.stderr.split()), done.stderr
+
+
+def test_a_call_that_cannot_be_read_names_step_value_limit_and_remedy(capsys):
+    with pytest.raises(SystemExit) as left:
+        run_to_exit(app, ["runs", "list", "--nope"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert left.value.code == 2
+    assert "No such option: --nope" in said
+    assert (
+        "step command line value runs list --nope limit commissioner runs list [OPTIONS] remedy `commissioner runs list --help`"
+        in said
+    )

@@ -6,6 +6,7 @@ import pytest
 from commissioner.errors import DataRefused
 from commissioner.recordings.imported import understand
 from commissioner.recordings.importers import read_running
+from commissioner.recordings.table import Table, to_standstill
 
 NAMES = "Time (s),Ia (A),Ib (A),Ic (A),Va (V),Vb (V),Vc (V)"
 STEP_S = 5e-4
@@ -33,14 +34,14 @@ def read(path):
 
 
 @pytest.mark.parametrize("header", [[NAMES], ["t,Ia,Ib,Ic,Va,Vb,Vc", "s,A,A,A,V,V,V"]])
-def test_header_lines_among_the_rows_are_left_out(tmp_path, header):
+def test_header_lines_among_the_countare_left_out(tmp_path, header):
     body = rows()
     recording, codes = read(written(tmp_path, [*header, *body[:250], *header, *body[250:]]))
     assert codes == {"header_again"} and recording.sample_period_s == pytest.approx(STEP_S)
     np.testing.assert_allclose(recording.currents_a[0], SIGNALS[0], atol=1e-4)
 
 
-def test_header_lines_do_not_count_where_the_rows_make_the_time(tmp_path):
+def test_header_lines_do_not_count_where_the_countmake_the_time(tmp_path):
     names, body = NAMES.partition(",")[2], rows([""] * TIME.size)
     recording, codes = read(
         written(tmp_path, ["# sample_period_s: 0.0005", names, *body[:250], names + ",", *body[250:]])
@@ -52,7 +53,7 @@ def test_header_lines_do_not_count_where_the_rows_make_the_time(tmp_path):
 @pytest.mark.parametrize(
     "footer", [["Min,-4,-4,-4,-325,-325,-325", "Max,4,4,4,325,325,325"], ["rms,3,3,3,230,230,230"]]
 )
-def test_statistics_below_the_rows_are_left_out(tmp_path, footer):
+def test_statistics_below_the_countare_left_out(tmp_path, footer):
     recording, codes = read(written(tmp_path, [NAMES, *rows(), *footer]))
     assert codes == {"no_time"} and recording.time_s.size == 600
     assert recording.currents_a[0][-1] == pytest.approx(SIGNALS[0][-1], abs=1e-4)
@@ -112,3 +113,15 @@ def test_the_same_time_again_or_one_from_another_zero_is_left_out(tmp_path, skew
     recording, codes = read(written(tmp_path, time_per_channel(skew_s, scale)))
     assert codes == {"second_column"}
     np.testing.assert_allclose(recording.time_s, TIME, atol=1e-9)
+
+
+@pytest.mark.parametrize("volts", [0.0, -540.0])
+def test_a_link_without_voltage_is_no_drives(volts):
+    """A drive that makes a voltage has one: the column is another signal, or its scale is lost."""
+    count = 40
+    columns = {
+        name: np.zeros(count) for name in ("segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
+    }
+    table = Table(columns | {"time_s": np.arange(count) * 2e-4, "dc_link_v": np.full(count, volts)}, {}, "x.csv")
+    with pytest.raises(DataRefused, match="dc_link_v is no DC link's voltage"):
+        to_standstill(table)

@@ -11,6 +11,7 @@ from commissioner.errors import DataRefused
 from commissioner.operations.recordings.diagnose import DiagnoseRequest, diagnose
 from commissioner.operations.recordings.identify import IdentifiedSheets, IdentifyRequest, identify_any
 from commissioner.recordings.sheet_names import resistance_meaning
+from commissioner.recordings.table import read_table
 
 SHEETS = {
     "contract": "test,frequency_hz,voltage_line_v,current_line_a,power_w\ndc,0,13.6,28.0,380.8\nno_load,60,208,8.17,420\n"
@@ -178,3 +179,12 @@ def test_a_resistance_that_is_not_understood_is_said_and_two_frequencies_are_not
     assert "What is in R_u1 (Ohm) was not understood as a winding resistance" in said
     assert "25 ... 50 Hz tell the rotor at slip frequency only with the stator's resistance" in said
     assert "one frequency" not in said and "No winding resistance" not in said
+
+
+def test_a_test_of_an_unknown_name_is_said_and_told_from_its_values(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(SHEETS["units"].replace("No load", "Zerlegeversuch"), encoding="utf-8")
+    done = identify_any(IdentifyRequest((path,)))
+    assert isinstance(done, IdentifiedSheets)
+    assert any("no known test: Zerlegeversuch" in one.what for one in read_table(path).notes)
+    assert done.document["parameters"]["magnetizing_inductance_h"]["value"] == pytest.approx(35.11e-3, rel=1e-3)

@@ -68,6 +68,13 @@ def test_enable_is_refused_when_one_thing_is_missing(missing, says):
     assert refusal.remedy
 
 
+def test_a_run_whose_time_is_up_is_told_what_to_raise():
+    """The limit is the procedure file's: no defect of ours."""
+    refusal = permit(Enable("test"), replace(READY, energised_s=85.001), BOUNDS)
+    assert refusal is not None
+    assert "limits.total_time_s" in refusal.remedy
+
+
 def test_the_run_may_use_its_energised_time_to_the_last_second():
     assert permit(Enable("test"), replace(READY, energised_s=85.0), BOUNDS) is None
     assert permit(Enable("test"), replace(READY, watchdog_s=1.0), BOUNDS) is None

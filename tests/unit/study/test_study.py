@@ -2,11 +2,14 @@
 
 import json
 import math
+from contextlib import nullcontext
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from commissioner.cli.verbs import study as verb
 from commissioner.encoding import plain
 from commissioner.errors import ConfigurationError, RequestRefused, UsageError
 from commissioner.link.drive.inverter import Inverter
@@ -18,9 +21,9 @@ from commissioner.run.job import bounds, make_job, watch_limits
 from commissioner.run.runner import Runner
 from commissioner.run.stopping.operator_stop import OperatorStop
 from commissioner.settings import load, load_procedure
-from commissioner.study.campaign import StudyRequest, carry_out
+from commissioner.study.campaign import Studied, StudyRequest, carry_out
 from commissioner.study.commissioning import NoArchive
-from commissioner.study.rows import ENDED, TABLE, Rows
+from commissioner.study.rows import DEFECT, ENDED, TABLE, Rows
 from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
 from commissioner.study.specification import Specification, cases_of
@@ -233,3 +236,15 @@ def test_the_same_seed_gives_the_same_commands_and_samples():
         assert np.array_equal(one.voltage_axis_v, again.voltage_axis_v)
         assert np.array_equal(one.current_u_a, again.current_u_a)
     assert not np.array_equal(first.blocks[0].current_u_a, other.blocks[0].current_u_a)
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "leaves"), [({"commissioned": 2, "faulted": 1}, None), ({"commissioned": 2, DEFECT: 1}, 5)]
+)
+def test_a_study_with_a_defect_of_ours_does_not_end_as_good(monkeypatch, capsys, outcomes, leaves):
+    done = Studied(3, outcomes, 1.0, "cases.parquet", "study.html", summarise([row(k) for k in range(3)]))
+    monkeypatch.setattr(verb, "carry_out", lambda *_: done)
+    with pytest.raises(SystemExit) if leaves else nullcontext() as left:
+        verb.study(StudyRequest(Path("x.toml"), Path("out")), as_json=True)
+    assert leaves is None or left.value.code == leaves
+    assert json.loads(capsys.readouterr().out)["outcomes"] == outcomes
