@@ -16,6 +16,7 @@ from commissioner.conformance.records import Ask, Reply, Wait
 from commissioner.errors import LinkUnreachable
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.rtu import find_answers
+from commissioner.link.wire.unopened import unopened
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.codec import crc16_bytes
 
@@ -66,13 +67,7 @@ class Line:
             self._client.comm_params.timeout_connect = max(self._timeout_s, 2.0)
             self._client.connect()
         except Exception as error:  # pyserial lets system errors through
-            raise LinkUnreachable(
-                f"no connection to {self._url}",
-                step="connect",
-                value=str(error),
-                limit="an open line",
-                remedy="check that the drive is powered, the cable, the address and that no other master holds it",
-            ) from error
+            raise unopened(self._url, error, "an open line") from error
 
     def _reopen(self) -> None:
         self.close()

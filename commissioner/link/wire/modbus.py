@@ -14,11 +14,12 @@ from typing import NoReturn, TypeVar
 from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 from pymodbus.pdu import ModbusPDU
 
-from commissioner.errors import CommissionerError, LinkUnreachable, ReplyMismatch, ReplyTimeout, RequestRefused
+from commissioner.errors import CommissionerError, ReplyMismatch, ReplyTimeout, RequestRefused
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.debts import Shape
 from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, LinkStats, Words
 from commissioner.link.wire.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, SerialTrust, Trust
+from commissioner.link.wire.unopened import unopened
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.profile import DriveProfile
 
@@ -151,13 +152,7 @@ class ModbusPort:
         try:
             self._client.connect()
         except Exception as error:  # pyserial lets termios errors through
-            raise LinkUnreachable(
-                f"no connection to {self._url}",
-                step="connect",
-                value=str(error),
-                limit=f"a connection within {self._connect_timeout_s:g} s",
-                remedy="check that the drive is powered, the cable, the address and that no other master holds it",
-            ) from error
+            raise unopened(self._url, error, f"a connection within {self._connect_timeout_s:g} s") from error
         self.stats.connections += 1
 
     # --- one request each -------------------------------------------------------------------------------------------

@@ -1,0 +1,75 @@
+"""A line that does not open: what is named is what to look at."""
+
+import errno
+import os
+import pty
+import socket
+from contextlib import closing
+
+import pytest
+
+from commissioner.errors import LinkUnreachable
+from commissioner.link.files.drive_file import load_profile
+from commissioner.link.wire.modbus import open_port
+from commissioner.link.wire.unopened import unopened
+from commissioner.link.wire.url import parse_url
+from commissioner.service.page.texts import Texts
+
+
+def refused(url):
+    with (
+        pytest.raises(LinkUnreachable) as failure,
+        closing(open_port(parse_url(url), load_profile("simulated"), reply_timeout_s=0.1)),
+    ):
+        pass
+    return failure.value
+
+
+def test_a_port_that_is_not_there():
+    failure = refused("rtu:///dev/ttyUSB99?parity=N")
+    assert failure.what == "there is no serial port /dev/ttyUSB99"
+    assert "commissioner ports" in failure.remedy
+
+
+def test_a_file_that_is_no_port(tmp_path):
+    (tmp_path / "x").write_text("")
+    assert refused(f"rtu://{tmp_path}/x?parity=N").what == f"{tmp_path}/x is no serial port"
+
+
+def test_a_pseudo_terminal_takes_no_parity():
+    master, slave = pty.openpty()
+    try:
+        failure = refused(f"rtu://{os.ttyname(slave)}?parity=E")
+        assert failure.what == f"{os.ttyname(slave)} does not take 19200 Bd with even parity"
+        assert "parity=N" in failure.remedy
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+@pytest.mark.parametrize(
+    "error", [PermissionError(errno.EACCES, "denied"), OSError(errno.EBUSY, "busy"), OSError("PermissionError(13)")]
+)
+def test_a_port_that_somebody_else_holds(tmp_path, error):
+    failure = unopened(parse_url(f"rtu://{tmp_path}"), error, "an open line")
+    assert "another program holds it" in failure.what
+
+
+def test_a_drive_that_does_not_listen_and_a_name_that_nobody_knows():
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        port = closed.getsockname()[1]
+        assert "nothing listens on this port" in refused(f"tcp://127.0.0.1:{port}").remedy
+    assert (
+        "name is not known" in unopened(parse_url("tcp://drive:502"), socket.gaierror(-2, "x"), "an open line").remedy
+    )
+
+
+def test_each_is_told_in_german_too():
+    errors = [OSError(number, "x") for number in (errno.ENOTTY, errno.EINVAL, errno.ENOENT, errno.EACCES, errno.EIO)]
+    for path in ("/dev/ttyUSB99", "/dev"):
+        for error in errors:
+            failure = unopened(parse_url(f"rtu://{path}?parity=N"), error, "an open line")
+            assert Texts("de").knows(failure.what) and Texts("de").knows(failure.remedy)
+    for error in (socket.gaierror(-2, "x"), ConnectionRefusedError(111, "x"), TimeoutError("x")):
+        assert Texts("de").knows(unopened(parse_url("tcp://drive:502"), error, "an open line").remedy)
