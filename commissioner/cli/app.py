@@ -273,8 +273,8 @@ def identify(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE; the three "
-            "tests of a textbook; or a manufacturer's sheet (values by their names)."
+            help="Recordings at standstill, or of a running motor (a start, loads): CSV, CSV.gz, Parquet, MATLAB, TDMS, MDF 4, COMTRADE, XLSX; the "
+            "three tests of a textbook; or a manufacturer's sheet (values by their names)."
         ),
     ],
     motor: Annotated[str | None, typer.Option("--motor", help="Nameplate; overrides the recording's metadata.")] = None,

@@ -2,7 +2,8 @@
 
 Oscilloscope and logger CSV: any of comma, semicolon, tab; decimal commas; preface lines; a row of units; start and
 increment; UTF-8, UTF-16, GBK, Latin; column names such as `Ia`, `i_L1`, `Strom U`, `CH1 (mA)`. MATLAB v5: vectors or
-columns of a matrix under such names, also inside structures. TDMS, MDF 4 and COMTRADE: channels by name and unit.
+columns of a matrix under such names, also inside structures. TDMS, MDF 4 and COMTRADE: channels by name and unit. A workbook's one
+table: as its text.
 What was changed or left unused stands in the table's notes.
 """
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.paths import no_file
-from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms
+from commissioner.recordings.formats import comtrade, matlab, mdf4, tdms, workbook
 from commissioner.recordings.formats.foreign_csv import parse_csv, read_text
 from commissioner.recordings.plate import has_no_plate, plate_of
 from commissioner.recordings.reading.cells import is_number
@@ -61,7 +62,7 @@ _BINARY: Mapping[str, Callable[[Path], tuple[dict[str, Signal], dict[str, float 
 }
 _EXPORT = "export the recording as CSV or Parquet"
 NOT_READ = {
-    ".mdf": ("MDF 3", _EXPORT), ".xlsx": ("Excel", _EXPORT), ".xls": ("Excel", _EXPORT), ".ods": ("OpenDocument", _EXPORT),
+    ".mdf": ("MDF 3", _EXPORT),
     ".toml": ("TOML", "give a nameplate by --motor, a mapping by --map, and the recording or the sheet as CSV"),
 }  # fmt: skip
 """What the files are, and what to do."""
@@ -114,6 +115,8 @@ def _read(path: Path, mapping: ChannelMap) -> Table:
         raise DataRefused(
             f"{path}: {kind} files are not read", step="read recording", value=suffix, limit=READ, remedy=remedy,
         )  # fmt: skip
+    if suffix in workbook.ENDINGS:
+        return _of_text(path, mapping)
     if suffix in _BINARY:
         return _of_binary(path, mapping)
     if suffix == ".parquet":

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from commissioner.recordings.names import ALPHABETS, PHASES, is_remark, key_of, meanings_of
 from commissioner.recordings.units import IN_NAME, unit_in
 from commissioner.recordings.words import readings
+from commissioner.records import WATT_METERS
 
 _VOLTS = r"(?:v|u|e|voltage|volts?|spannung|tension)"
 _AMPS = r"(?:i|current|amps?|strom|courant)"
@@ -38,7 +39,7 @@ SHEET = {
 FORMS = {
     "voltage_line_v": ("voltage_line_v", "voltage_neutral_v", "voltage_phase_v"),
     "current_line_a": ("current_line_a", "current_phase_a"),
-    "power_w": ("power_w",),
+    "power_w": ("power_w", *WATT_METERS),
 }  # fmt: skip
 """What a test sheet needs, in any of these columns or, of volts and amperes, in those of each phase."""
 _OF_WINDING = r"(?:winding|stator|stander|motor|wicklungs|statorwicklungs|standerwicklungs)*(?:resistance|widerstand|r)"
@@ -58,6 +59,10 @@ SHEET_RESISTANCE = {
 """Columns of a test sheet with the windings' resistance, beside those between two terminals that are named (`R_UV`, `R 1-2`)."""
 _TERMINALS = re.compile(rf"{_OF_WINDING}(?:between)?(?:terminals)?l?([abcuvwrst123])l?([abcuvwrst123])")
 _OHM_ENDING = re.compile(r"_([mkµu]?ohms?)$", re.IGNORECASE)
+_WATT_METER = re.compile(
+    r"(?:p|w|power|watts?|wattmeter|leistung|puissance|potencia)l?([123])|(?:p|power)l?([uvwabcrst])"
+)
+"""A wattmeter's number, or its phase."""
 _NUMBERED_VOLTS = re.compile(rf"(?:{_VOLTS}|voltmeter)l?[123]")
 """A meter's number or a phase's, between lines or to the neutral: not said."""
 
@@ -79,7 +84,24 @@ def sheet_columns(names: Iterable[str]) -> dict[str, str]:
     meters = meanings_of(names)
     several = {m[:7] for m in meters.values() if len({other for other in meters.values() if other[:7] == m[:7]}) > 1}
     own = {n: c for n in names if (c := sheet_meaning(n)) and (n in SHEET or meters.get(n, "")[:7] not in several)}
+    own |= _watt_meters(names)
     return own | {n: c for n in names if n not in own and (c := resistance_meaning(n))}
+
+
+def _watt_meters(names: Iterable[str]) -> dict[str, str]:
+    """Names of two or three wattmeters (`W1`, `W2`; `P_u`, `P_v`, `P_w`) with the column of each; nothing of one alone."""
+    found: dict[str, int] = {}
+    for name in names:
+        bare = (
+            re.sub(r"_k?w$", "", IN_NAME.sub("", name).strip(), flags=re.IGNORECASE)
+            if name not in WATT_METERS
+            else name[:-2]
+        )
+        meter = next((m for reading in readings(bare) if (m := _WATT_METER.fullmatch(key_of(reading)))), None)
+        if meter:
+            found[name] = "uvw".index(PHASES[meter[1] or meter[2]])
+    is_clear = len(found) > 1 and len(set(found.values())) == len(found)
+    return {name: WATT_METERS[k] for name, k in found.items()} if is_clear else {}
 
 
 def resistance_meaning(name: str) -> str | None:
@@ -126,7 +148,7 @@ def form_of(need: str) -> frozenset[str]:
 
 
 def _own(names: list[str]) -> Counter[str]:
-    return Counter(column for column in sheet_columns(names).values() if column in SHEET)
+    return Counter(column for column in sheet_columns(names).values() if column in SHEET or column in WATT_METERS)
 
 
 def _meters(names: list[str]) -> set[str]:

@@ -84,7 +84,7 @@ HOW_TO_MAP = (
     'and lines like "CH1" = "current_u_a" ("-current_v_a * 10" turns and scales)'
 )
 
-READ = "CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4 or COMTRADE"
+READ = "CSV, CSV.gz, Parquet, MATLAB v5, TDMS, MDF 4, COMTRADE or a workbook (XLSX, XLS, ODS)"
 
 
 def read_table(path: Path) -> Table:

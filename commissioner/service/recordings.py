@@ -21,7 +21,21 @@ from commissioner.service.runs.child import ask
 
 Verb = Literal["identify", "diagnose", "monitor"]
 VERBS: tuple[Verb, ...] = ("identify", "diagnose", "monitor")
-ENDINGS = (".csv", ".csv.gz", ".parquet", ".mat", ".tdms", ".mf4", ".cfg", ".dat", ".cff", ".txt")
+ENDINGS = (
+    ".csv",
+    ".csv.gz",
+    ".parquet",
+    ".mat",
+    ".tdms",
+    ".mf4",
+    ".cfg",
+    ".dat",
+    ".cff",
+    ".txt",
+    ".xlsx",
+    ".xls",
+    ".ods",
+)
 LARGEST = 1_000_000_000
 """Bytes of one upload."""
 LONGEST_S, KEPT = 1800.0, 50
@@ -160,7 +174,7 @@ async def _keep(folder: Path, name: str, pieces: AsyncIterator[bytes]) -> str:
             step="recordings",
             value=safe,
             limit=", ".join(ENDINGS),
-            remedy="give CSV, Parquet, MATLAB 5, TDMS, MDF 4 or COMTRADE",
+            remedy="give CSV, XLSX, Parquet, MATLAB 5, TDMS, MDF 4 or COMTRADE",
         )
     size, path = 0, folder / safe
     with path.open("xb") as file:

@@ -1,6 +1,7 @@
 """Line values of a test sheet from what its meters showed: between lines, to the neutral, in one phase, in all three.
 
-A symmetric motor on a symmetric supply: V_line = sqrt(3) V_neutral, and of three meters the mean (IEEE 112).
+A symmetric motor on a symmetric supply: V_line = sqrt(3) V_neutral, of three meters the mean, and of wattmeters the sum; two of them
+tell the apparent power as well, 2 sqrt(P1^2 - P1 P2 + P2^2), and with it whether one was read backward (IEEE 112).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from commissioner.diagnose.intake.points import Array
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.errors import DataRefused
 from commissioner.motor.nameplate import connection_of
-from commissioner.records import DIRECT_TEST
+from commissioner.records import DIRECT_TEST, WATT_METERS
 
 VOLTS_APART, AMPERES_APART = 0.05, 0.15
 """By which one of three meters may differ from their mean. NEMA MG 1-14.36: no motor is to run on volts that differ by more than
@@ -51,8 +52,8 @@ def line_values(columns: Mapping[str, Array], said: Mapping[str, float | str]) -
     DataRefused: meters of one quantity contradict each other, or it is not told what `phase` means.
     """
     out, remarks = dict(columns), []
-    for line, forms in (("voltage_line_v", _volts), ("current_line_a", _amperes)):
-        given = list(forms(columns, said))
+    for line, forms in (("voltage_line_v", _volts), ("current_line_a", _amperes), ("power_w", _watts)):
+        given = list(forms(out, said))
         for form in given:
             if isinstance(form, DataRefused):
                 return form
@@ -85,6 +86,53 @@ def _amperes(columns: Mapping[str, Array], said: Mapping[str, float | str]) -> I
         )
 
 
+def _watts(columns: Mapping[str, Array], _said: Mapping[str, float | str]) -> Iterator[_Form | DataRefused]:
+    """The power of all phases. `columns`: with line volts and amperes as far as they are known."""
+    yield from _as_given(columns, "power_w")
+    there = tuple(name for name in WATT_METERS if name in columns)
+    if len(there) == 1 and "power_w" not in columns:
+        yield refused(
+            f"{there[0]} is one wattmeter's alone", None, "power_w of all three phases, or two or three wattmeters",
+            "give the others too, or the power of all phases",
+        )  # fmt: skip
+    if len(there) < 2:
+        return
+    shown, direct = np.stack([np.asarray(columns[name], dtype=float) for name in there]), _direct(columns)
+    if np.any(lost := ~np.isfinite(shown) & ~direct):
+        yield _lost(there, lost)
+    elif len(there) == 2 and (turned := _read_backward(there, shown, columns)) is not None:
+        yield turned
+    else:
+        yield _Form(
+            there, np.where(direct, np.nansum(shown, axis=0), shown.sum(axis=0)), f"is the sum of {', '.join(there)}."
+        )
+
+
+def _read_backward(there: tuple[str, ...], shown: Array, columns: Mapping[str, Array]) -> DataRefused | None:
+    """The wattmeter that must be negative, where the apparent power says so: below a power factor of 0.5 one deflects backward."""
+    if not {"voltage_line_v", "current_line_a"} <= columns.keys():
+        return None
+    apparent = ROOT_3 * np.asarray(columns["voltage_line_v"]) * np.asarray(columns["current_line_a"])
+    first, second = shown
+    told, turned = (
+        2.0 * np.sqrt(first**2 - sign * first * second + second**2) / apparent - 1.0 for sign in (1.0, -1.0)
+    )
+    wrong = np.flatnonzero(
+        (np.abs(told) > AMPERES_APART)
+        & (np.abs(turned) < np.minimum(AMPERES_APART, np.abs(told) / 2))
+        & ~_direct(columns)
+    )
+    if not wrong.size:
+        return None
+    row = int(wrong[0])
+    meter = int(np.argmin(np.abs(shown[:, row])))
+    return refused(
+        f"{there[meter]} is {shown[meter, row]:g} W in row {row + 1}, and the apparent power wants the other sign", float(1.0 + told[row]),
+        "a ratio of 1 of the wattmeters' apparent power to the volts' and amperes'", "write what a wattmeter showed with its leads "
+        "reversed as a negative number",
+    )  # fmt: skip
+
+
 def _as_given(columns: Mapping[str, Array], name: str) -> Iterator[_Form]:
     if name in columns:
         yield _Form((name,), np.asarray(columns[name], dtype=float), f"is {name}.")
@@ -99,13 +147,7 @@ def _of_meters(columns: Mapping[str, Array], names: tuple[str, ...], apart: floa
     direct = _direct(columns)
     shown[:, direct] = np.where(shown[:, direct] == 0.0, np.nan, np.abs(shown[:, direct]))
     if np.any(lost := ~np.isfinite(shown) & ~direct):
-        meter, row = np.argwhere(lost)[0]
-        yield refused(
-            f"{there[meter]} holds no number in row {row + 1}",
-            None,
-            "a number in every row",
-            "fill the cell, or leave the row out",
-        )
+        yield _lost(there, lost)
         return
     counts = np.where(direct, np.isfinite(shown).sum(axis=0), len(there))
     mean = np.where(direct, np.nansum(shown, axis=0), shown.sum(axis=0)) / np.maximum(counts, 1)
@@ -115,6 +157,16 @@ def _of_meters(columns: Mapping[str, Array], names: tuple[str, ...], apart: floa
     else:
         apart_by = f", at most {off.max(initial=0.0):.2g} of it apart" if len(there) > 1 else ""
         yield _Form(there, np.where(counts > 0, mean, np.nan), f"is {_mean_of(there)}{apart_by}.")
+
+
+def _lost(there: tuple[str, ...], lost: NDArray[np.bool_]) -> DataRefused:
+    meter, row = np.argwhere(lost)[0]
+    return refused(
+        f"{there[meter]} holds no number in row {row + 1}",
+        None,
+        "a number in every row",
+        "fill the cell, or leave the row out",
+    )
 
 
 def _mean_of(names: tuple[str, ...]) -> str:

@@ -56,8 +56,8 @@ def require_whole_sheets(tables: Sequence[Table]) -> None:
                 f"{table.source}: this looks like a test sheet and lacks {', '.join(missing)}", step="recognise columns",
                 value=", ".join(r.name for r in table.readings)[:200],
                 limit="one column each of line-to-line volts, line amperes and the watts of all three phases (rms)",
-                remedy="name the columns frequency_hz, voltage_line_v (or voltage_neutral_v, voltage_uv_v ...), current_line_a (or current_u_a ...), power_w; "
-                "take the sum of two wattmeters",
+                remedy="name the columns frequency_hz, voltage_line_v (or voltage_neutral_v, voltage_uv_v ...), current_line_a (or current_u_a ...), power_w "
+                "(or power_1_w, power_2_w of two wattmeters)",
             )  # fmt: skip
 
 

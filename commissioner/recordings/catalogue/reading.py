@@ -16,13 +16,14 @@ from commissioner.identify.catalogue.sheet import ABSOLUTE, KEYS, Sheet, Value
 from commissioner.motor.nameplate import connection_of
 from commissioner.recordings.catalogue import names
 from commissioner.recordings.catalogue.cells import refused, split_unit, unit_key, value_of
+from commissioner.recordings.formats import workbook
 from commissioner.recordings.formats.foreign_csv import read_text
 from commissioner.recordings.names import meaning_of
 from commissioner.recordings.reading.cells import is_number
 from commissioner.recordings.reading.layout import split
 from commissioner.recordings.sheet_names import is_sheet
 
-ENDINGS = (".csv", ".txt", ".tsv")
+ENDINGS = (".csv", ".txt", ".tsv", *workbook.ENDINGS)
 LARGEST_BYTES, MOST_LINES, FEWEST = 100_000, 200, 3
 """Of a sheet; and how many values that it knows make one."""
 TELLING = (

@@ -148,7 +148,15 @@ def test_a_single_channel_is_refused_with_what_is_missing() -> None:
 
 @pytest.mark.parametrize(
     ("suffix", "name"),
-    [(".mdf", "MDF 3"), (".xlsx", "Excel"), (".tdms", "TDMS"), (".mf4", "MDF 4"), (".cff", "COMTRADE")],
+    [
+        (".mdf", "MDF 3"),
+        (".xlsx", "Excel"),
+        (".ods", "OpenDocument"),
+        (".xls", "Excel"),
+        (".tdms", "TDMS"),
+        (".mf4", "MDF 4"),
+        (".cff", "COMTRADE"),
+    ],
 )
 def test_formats_that_are_not_read_or_damaged_are_named(tmp_path: Path, suffix: str, name: str) -> None:
     path = tmp_path / f"file{suffix}"

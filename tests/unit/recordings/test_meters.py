@@ -218,3 +218,53 @@ def test_a_nameplate_in_place_of_a_recording_is_told_where_it_belongs(tmp_path: 
     with pytest.raises(DataRefused, match="TOML files are not read") as refused:
         identify_any(IdentifyRequest((path,)))
     assert "--motor" in refused.value.remedy
+
+
+def two_wattmeters(volts: float, amperes: float, watts: float) -> tuple[float, float]:
+    """What two wattmeters show: P1,2 = P/2 +- Q / (2 sqrt(3))."""
+    reactive = np.sqrt(3.0 * (volts * amperes) ** 2 - watts**2)
+    return (watts + reactive / np.sqrt(3.0)) / 2.0, (watts - reactive / np.sqrt(3.0)) / 2.0
+
+
+def wattmeter_rows(sign: float = 1.0, unit: float = 1.0) -> list[str]:
+    rows = [
+        ("no load", 60, 208, 8.17, *two_wattmeters(208, 8.17, 420)),
+        ("locked rotor", 15, 25, 27.9, *two_wattmeters(25, 27.9, 920)),
+    ]
+    return [
+        f"{test},{f},{v},{i},{w1 * unit:.6g},{(w2 if w2 > 0 else sign * w2) * unit:.6g}"
+        for test, f, v, i, w1, w2 in rows
+    ]
+
+
+@pytest.mark.parametrize(
+    ("watts", "unit"),
+    [("W1,W2", 1.0), ("P1 [W],P2 [W]", 1.0), ("P_1 (kW),P_2 (kW)", 1e-3), ("power_1_w,power_2_w", 1.0), ("Wattmeter 1 (W),Wattmeter 2 (W)", 1.0),
+     ("P_a (W),P_c (W)", 1.0)],
+)  # fmt: skip
+def test_two_wattmeters_are_added(tmp_path: Path, watts: str, unit: float) -> None:
+    done = identified(sheet(tmp_path, f"test,f (Hz),V (V),I (A),{watts}", *wattmeter_rows(unit=unit)))
+    assert is_true(done)
+    assert any("power_w is the sum of" in remark for remark in done.document["remarks"])
+
+
+def test_a_wattmeter_that_was_read_backward_is_named(tmp_path: Path) -> None:
+    """At no load the power factor is 0.14: the second one deflects backward, and without its sign the loss would be several times as high."""
+    with pytest.raises(
+        DataRefused, match=r"power_2_w is 63[01]\..* W in row 1, and the apparent power wants the other sign"
+    ):
+        identified(sheet(tmp_path, "test,f (Hz),V (V),I (A),W1,W2", *wattmeter_rows(-1.0)))
+
+
+def test_three_wattmeters_are_added_and_one_alone_is_asked_about(tmp_path: Path) -> None:
+    rows = ["no load,60,208,8.17,150,140,130", "locked rotor,15,25,27.9,306,307,307"]
+    assert is_true(identified(sheet(tmp_path, "test,f (Hz),V (V),I (A),P_R (W),P_S (W),P_T (W)", *rows)))
+    with pytest.raises(DataRefused, match="one wattmeter's alone"):
+        identified(
+            sheet(
+                tmp_path,
+                "test,frequency_hz,voltage_line_v,current_line_a,power_1_w",
+                "no load,60,208,8.17,150",
+                "locked rotor,15,25,27.9,306",
+            )
+        )
