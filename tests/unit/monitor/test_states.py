@@ -39,6 +39,13 @@ def test_off_start_step_and_coasting_are_told_with_their_times():
         assert own.speed_rad_per_s == pytest.approx(speed, abs=2.0 * own.speed_std_rad_per_s)
 
 
+def test_a_start_at_the_head_of_a_recording_is_one():
+    """Off to 0.05 s, direct start to 0.58 s: its current's plateau is not steady, and what precedes nothing is no dip."""
+    _, _, seen = stretches("direct_start.csv.gz")
+    assert [s.state for s in seen] == ["off", "start", "steady"]
+    assert seen[0].end_s == pytest.approx(0.05, abs=0.005) and 0.58 <= seen[1].end_s < 0.75
+
+
 def test_a_ramp_of_the_supply_is_told_from_the_steady_state_behind_it():
     """5 to 50 Hz in 1.5 s, then 50 Hz."""
     _, _, seen = stretches("ramp.csv.gz")
@@ -127,3 +134,31 @@ def test_nothing_is_steady_while_the_order_of_the_phases_is_reversed():
     (ramp,) = [s for s in runs_of(reversal) if s[0] == "ramp"]
     assert ramp[1] <= 1.9 and ramp[2] >= 2.15
     assert [s[0] for s in runs_of(reversal)] == ["steady", "ramp", "steady"]
+
+
+def test_the_plateau_of_a_long_start_is_never_steady():
+    """Seconds of five times the rated current, at its end still or not."""
+    never = levels(current_a=(0.0, 4.0, 5.2 * PLATE.rated_current_a))
+    assert runs_of(named(never, PLATE)) == [("start", 0.0, 4.0)]
+    late = levels(current_a=(0.0, 2.5, 5.2 * PLATE.rated_current_a))
+    assert [s[0] for s in runs_of(named(late, PLATE))] == ["start", "steady"]
+    assert runs_of(named(late, PLATE))[1][1] == pytest.approx(2.5, abs=0.1)
+
+
+@pytest.mark.parametrize("edges_s", [(2.0, 4.0), (2.0, 4.0, 6.0), (1.5, 2.6, 5.0, 6.5)])
+def test_a_load_that_steps_up_and_back_is_told_each_time(edges_s):
+    """No single cut leaves two level sides: each side is looked at for a second."""
+    seen = levels(8.0)
+    for k, edge_s in enumerate(edges_s):
+        seen.current_a[round(edge_s / 0.02) :] = 8.8 if k % 2 == 0 else 5.8
+    found = runs_of(named(seen, PLATE))
+    assert [s[0] for s in found] == ["steady", *["load step", "steady"] * len(edges_s)]
+    for edge_s, step in zip(edges_s, found[1::2], strict=True):
+        assert step[1] <= edge_s <= step[2]
+
+
+@pytest.mark.parametrize("swing_hz", [0.1, 0.2, 0.35, 0.5, 1.0, 2.2])
+def test_a_load_that_swings_has_no_steps(swing_hz):
+    seen = levels(20.0)
+    seen.current_a[:] += 2.0 * np.sin(2 * np.pi * swing_hz * seen.time_s)
+    assert set(named(seen, PLATE)) == {"steady"}

@@ -13,14 +13,17 @@ RESIDUAL_VOLTAGE = 0.03
 FAST_CHANGE = 0.12
 """Of the supply frequency, within half a second, that makes a ramp."""
 STEP = 0.15
-"""Of the current's level, between two stretches that are each constant within a third of it."""
+"""Of the current's level, between two sides that are each constant within `STEADIER` of it: a slow swing's are no better than 0.3."""
+STEADIER = 0.25
 SETTLED = 0.08
 """Of the level that follows, within which a start's current has come down."""
 START_CURRENT = 2.0
-"""Of the rated current, from which on a recording that begins with it begins in a start."""
+"""Of the rated current, from which on a motor starts: the level of a start stays for seconds where the inertia is large, and is none that
+follows it."""
 STANDING = 0.02
 """Of the rated frequency: a slower vector is direct current."""
-LEAST_STEADY_S = 0.4
+LEAST_STEADY_S, STEP_SIDE_S = 0.4, 1.0
+"""What is steady, and how far to each side of a step the level is looked at."""
 DIP, LONGEST_DIP_S, SAME_FREQUENCY = 0.12, 1.0, 0.02
 """A voltage that is lower by this share than that of a second before and after, at the same frequency."""
 OFF_CURRENT = 0.05
@@ -78,7 +81,7 @@ def _name_dips(levels: Levels, names: list[str]) -> None:
         is_lower = levels.voltage_v[k] < (1.0 - DIP) * volts
         is_low[k] = is_lower and abs(levels.frequency_hz[k] - hertz) < SAME_FREQUENCY * hertz
     for begin, end in _runs((~is_low).tolist()):
-        if {*names[max(begin - 1, 0) : begin], *names[end : end + 1]} == {"steady"}:
+        if begin > 0 and end < len(names) and names[begin - 1] == names[end] == "steady":
             names[begin:end] = ["voltage dip"] * (end - begin)
 
 
@@ -94,17 +97,20 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
     later = float(np.median(current[current.size // 2 :]))
     settled = 0
     was_off = begin > 0 and names[begin - 1] in ("off", "residual", "coast-down")
-    is_first = begin == 0 and float(current[:HOPS].max()) > max(START_CURRENT * rated_a, 2.0 * later)
+    is_first = begin == 0 and float(current[:HOPS].max()) > START_CURRENT * rated_a
     if was_off or is_first:
+        peak = int(np.argmax(current))
         above = np.flatnonzero(current > (1.0 + STEP) * later)
-        if above.size and above[0] <= 2 * HOPS and current.max() > 1.5 * later:
-            settled = int(_first_still(current, int(np.argmax(current))))
+        if current[peak] > START_CURRENT * rated_a or (
+            above.size and above[0] <= 2 * HOPS and current[peak] > 1.5 * later
+        ):
+            settled = _first_still(current, peak, START_CURRENT * rated_a)
         else:
             settled = HOPS
         for k in range(begin, min(begin + settled, end)):
             names[k] = "start"
     elif begin > 0 and names[begin - 1] == "voltage dip":
-        settled = int(_first_still(current, 0))
+        settled = _first_still(current, 0, np.inf)
         names[begin : begin + settled] = ["voltage dip"] * settled
     if end < len(names):
         # windows that reach over the switch-off: half of them lie before it
@@ -117,28 +123,39 @@ def _name_within(levels: Levels, begin: int, end: int, names: list[str], rated_a
     _name_steps(levels, begin + settled, end, names)
 
 
-def _first_still(current: Signal, peak: int) -> int:
-    """From where behind the peak the level stays within a few per cent of what follows."""
+def _first_still(current: Signal, peak: int, below: float) -> int:
+    """From where behind the peak the level is lower than `below` and stays within a few per cent of what follows."""
     for k in range(peak, current.size - HOPS):
         ahead = current[k : k + 3 * HOPS]
-        if np.ptp(ahead) < SETTLED * np.median(ahead):
+        if np.ptp(ahead) < SETTLED * np.median(ahead) < SETTLED * below:
             return k
     return current.size
 
 
 def _name_steps(levels: Levels, begin: int, end: int, names: list[str]) -> None:
-    least = round(LEAST_STEADY_S / levels.hop_s)
-    if end - begin < 2 * least:
+    """The clearest step of the level first, then those before and behind it."""
+    at = _clearest_step(
+        levels.current_a[begin:end], round(LEAST_STEADY_S / levels.hop_s), round(STEP_SIDE_S / levels.hop_s)
+    )
+    if at is None:
         return
-    current = levels.current_a[begin:end]
-    at = range(least, current.size - least)
-    apart = [abs(np.median(current[k + HOPS // 2 :]) - np.median(current[: k - HOPS // 2])) for k in at]
-    rest = [float(np.std(current[: k - HOPS // 2]) + np.std(current[k + HOPS // 2 :])) for k in at]
-    k = int(np.argmin(rest))
-    if apart[k] < STEP * float(np.median(current)) or rest[k] > apart[k] / 3.0:
-        return
-    middle = begin + at[k]
-    for j in range(middle - HOPS // 2, middle + HOPS // 2):
-        names[j] = "load step"
-    _name_steps(levels, begin, middle - HOPS // 2, names)
-    _name_steps(levels, middle + HOPS // 2, end, names)
+    edges = begin + at - HOPS // 2, begin + at + HOPS // 2
+    names[edges[0] : edges[1]] = ["load step"] * (edges[1] - edges[0])
+    _name_steps(levels, begin, edges[0], names)
+    _name_steps(levels, edges[1], end, names)
+
+
+def _clearest_step(current: Signal, least: int, side: int) -> int | None:
+    """Where the level before and the level behind differ most, against how much each varies; None where nowhere enough. Windows that
+    reach over the step are left out of both."""
+    best, found = STEADIER, None
+    for k in range(least, current.size - least):
+        before, behind = (
+            current[max(k - HOPS // 2 - side, 0) : k - HOPS // 2],
+            current[k + HOPS // 2 : k + HOPS // 2 + side],
+        )
+        apart = abs(float(np.median(behind) - np.median(before)))
+        rest = float(np.std(before) + np.std(behind))
+        if apart > STEP * float(np.median(current)) and rest < best * apart:
+            best, found = rest / apart, k
+    return found
