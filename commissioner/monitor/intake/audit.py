@@ -37,7 +37,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     findings = [Finding(note.code, "note", note.what) for note in recording.notes]
     recording, exchanged = columns.sort_by_kind(recording, plate)
     recording, completed = columns.complete(recording)
-    findings += [Finding(*entry) for entry in (*exchanged, *completed)]
+    findings += [*exchanged, *completed]
     low, high = clock.whole_stretch(recording, findings)
     period = clock.sample_clock(recording, slice(low, high), findings)
     clock.fast_enough(period, plate, findings)
@@ -59,7 +59,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         recording.voltages_are_line_to_line,
         lag_deg,
     )
-    findings += [Finding(*entry) for entry in pairing.findings]
+    findings += pairing.findings
     if pairing.is_refused:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
     straight_i = [sign * currents[k] for k, sign in zip(pairing.current_order, pairing.current_sign, strict=True)]

@@ -20,9 +20,9 @@ Vector = NDArray[np.complex128]
 Instants = NDArray[np.floating[Any]]
 
 KNOT_SPACING_S = 1.5
+"""Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 LEAST_SAMPLES = 64
 """For a first look at the supply, however far the samples are apart."""
-"""Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 BAND_IN_SUPPLY_FREQUENCIES = 14.0
 """Kept either side of the supply frequency: shaft harmonics up to 28 of a four-pole motor, supply lines up to 13."""
 
