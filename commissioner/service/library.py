@@ -113,7 +113,7 @@ class Library:
 def judge_plate(values: Mapping[str, Any]) -> JudgedPlate:
     """Each field of a plate: ok, or what is wrong and what to do; then what the whole plate implies."""
     fields: dict[str, JudgedField] = {name: {"ok": True, "what": "", "remedy": ""} for name in PLATE_FIELDS}
-    numbers = {key: _number(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
+    numbers = {key: number_of(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
     try:
         table = MotorFile.model_validate(numbers)
     except ValidationError as error:
@@ -162,7 +162,7 @@ def questions(plate: Nameplate) -> list[str]:
     return ["is a number misread?"]
 
 
-def _number(value: Any) -> Any:
+def number_of(value: Any) -> Any:
     """Text as a plate is typed: decimal comma or point."""
     if not isinstance(value, str):
         return value

@@ -12,7 +12,7 @@ from commissioner.service.library import Drive
 from commissioner.service.page.texts import NBSP, Texts
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.control import Control, Party
+from commissioner.service.runs.control import Control
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.watch import Seen
 
@@ -85,7 +85,7 @@ def band_of(parts: Parts, who: Visitor, place: Place, t: Texts) -> Band:
         run.id if run else "",
         run.feed.state.phase if run else "",
         asking,
-        held is not None and held.is_held_by(_party(who)),
+        held is not None and held.is_held_by(who.party),
         held is not None and held.holder is not None,
     )
 
@@ -102,10 +102,6 @@ def _run_of(parts: Parts, place: Place) -> LiveRun | None:
 
 def _drive_of(parts: Parts, identifier: str) -> Drive | None:
     return next((drive for drive in parts.library.drives() if drive.id == identifier), None)
-
-
-def _party(who: Visitor) -> Party:
-    return Party(who.session.id if who.session else "", who.person)
 
 
 # --- a run goes on ------------------------------------------------------------------------------------------------
@@ -316,7 +312,7 @@ def _control(parts: Parts, who: Visitor, drive: Drive | None, live: LiveRun | No
             if by_command
             else (t.gettext("free"), t.gettext("nobody controls"))
         )
-    if held.is_held_by(_party(who)):
+    if held.is_held_by(who.party):
         others = max(0, (live.feed.watchers if live else 1) - 1)
         watching = t.gettext("nobody watching") if not others else t.say("%(n)s watching", n=others)
         return t.gettext("you"), watching
