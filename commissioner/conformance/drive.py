@@ -273,5 +273,5 @@ def words_for(item: Item, value: Value) -> Words:
     return encode_item(replace(item, minimum=None, maximum=None), value)
 
 
-def is_close(seen: float, wanted: float, relative: float, absolute: float = 0.0) -> bool:
-    return math.isfinite(seen) and abs(seen - wanted) <= max(relative * abs(wanted), absolute)
+def is_close(seen: float, wanted: float, relative: float) -> bool:
+    return math.isfinite(seen) and abs(seen - wanted) <= relative * abs(wanted)

@@ -104,7 +104,6 @@ class Item:
     quantity: str = ""
     access: str = "r"
     needs_stop: bool = False
-    is_volatile: bool = False
     minimum: float | None = None
     maximum: float | None = None
     word_order: str = "big"

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
-from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.lack import Lack, lack_of_fit
-from commissioner.running.nominal import FOUR, with_shaft, with_speed
+from commissioner.running.nominal import with_shaft, with_speed
 
 Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
@@ -135,7 +135,7 @@ def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | No
     spread = 0.0
     for step in np.linalg.cholesky(covariance + 1e-18 * np.eye(4)).T:
         theta = fit.machine.theta.copy()
-        theta[: len(NAMES[:4])] += step
+        theta[: len(FOUR)] += step
         moved = _inertia(problem, replace(fit.machine, theta=theta))
         spread += (moved[0][0] - values[0]) ** 2 if moved else 0.0
     load = {"constant_nm": float(values[1]), "fan_at_synchronous_nm": float(values[2])}

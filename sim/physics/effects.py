@@ -34,8 +34,6 @@ class Kind:
 CATALOGUE: dict[str, Kind] = {}
 SINCE = ("sensor_switch_on",)
 """Effects that joined the catalogue later: drawn alone only, so that a seed's mixture stays what it was."""
-RESAMPLED = ("sampling_delay", "clock_drift", "lost_samples")
-"""Effects of the sampling clock, which a recording applies when it samples and not in the machine."""
 
 
 def _entry(name: str, unit: str, meaning: str, shapes: tuple[str, ...], smallest: float, largest: float):

@@ -17,7 +17,7 @@ from commissioner.monitor.signals.supply import (
     Vector,
     dominant_frequency_hz,
     follow_supply,
-    harmonic_phasor,
+    fundamental_phasor,
     phase_voltages,
     space_vector,
 )
@@ -125,8 +125,8 @@ def _phasors(
     count = min(currents[0].size, max(int(2.0 / period), int(5 / (frequency_hz * period))))
     angle = 2 * np.pi * frequency_hz * np.arange(count) * period
     return (
-        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
-        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
+        [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
+        [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
     )
 
 

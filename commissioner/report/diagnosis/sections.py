@@ -20,8 +20,9 @@ from commissioner.report.diagnosis.words import (
     remarks,
     tone,
 )
-from commissioner.report.folded import coded, hinted
+from commissioner.report.folded import hinted
 from commissioner.report.page import Section, Table, Tone
+from commissioner.report.sheet.marks import coded
 
 SURE = 0.8
 """Names below this probability are marked."""

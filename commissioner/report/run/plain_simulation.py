@@ -61,9 +61,6 @@ def plain_simulation(subject: Subject) -> Markup:
 
 
 _FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
-
-
-_FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
 _REST = (
     "The result on page 1 does not rest on this: the run measured the inverter’s loss, the delay and the iron itself."
 )
