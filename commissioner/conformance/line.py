@@ -16,10 +16,9 @@ from commissioner.conformance.records import Ask, Reply, Wait
 from commissioner.errors import LinkUnreachable
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.rtu import find_answers
-from commissioner.link.wire.url import DriveUrl, RtuUrl
+from commissioner.link.wire.trust import longest_frames_s
+from commissioner.link.wire.url import DriveUrl
 from commissioner.registers.codec import crc16_bytes
-
-LONGEST_FRAME_CHARACTERS = 256
 
 
 class Line:
@@ -34,8 +33,7 @@ class Line:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        wire_s = 2 * LONGEST_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
-        self._url, self._device, self._timeout_s = url, device, reply_timeout_s + wire_s
+        self._url, self._device, self._timeout_s = url, device, reply_timeout_s + longest_frames_s(url)
         self._clock, self._sleep = clock, sleep
         self._client = make_client(url, device)
         self._transaction = 0

@@ -81,6 +81,16 @@ class Page:
     footer: str = ""
 
 
+def figure_of(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """A figure in the pages' style, and its axes `(rows, columns)`."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(PLOT_STYLE):
+        figure = Figure(figsize=(9.2, height), layout="constrained")
+        return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
 def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:
     """The figure as inline SVG, or as an inline PNG where it holds more points than a browser likes."""
     import base64

@@ -57,8 +57,8 @@ def _shape(effect: Effect) -> int:
     return shapes.index(effect.shape) if effect.shape else 0
 
 
-def _direction(effect: Effect, default_deg: float = 25.0) -> tuple[float, float]:
-    angle = math.radians(effect.details.get("angle_deg", default_deg))
+def _direction(effect: Effect) -> tuple[float, float]:
+    angle = math.radians(effect.details.get("angle_deg", 25.0))
     return math.cos(angle), math.sin(angle)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 
 from commissioner.conformance import pdu
@@ -155,7 +156,6 @@ def _must_hold(drive: Drive, prefix: str, wanted: Mapping[str, Words], after: st
 
 def _changed(words: Mapping[str, Words]) -> dict[str, Words]:
     """The same floats times `CHANGE`, as words (the wire's unit: no scale in between)."""
-    import struct
 
     def times(pair: Words) -> Words:
         (value,) = struct.unpack(">f", struct.pack(">2H", *pair))

@@ -18,6 +18,7 @@ from commissioner.report.running.words import (
     spoken,
     tone,
 )
+from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
@@ -155,7 +156,7 @@ def _parameters(document: Document) -> Section:
         before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
         if before and after:
             values = [
-                f"{number(x['value'] * scale, 4)} ± {number(1.96 * x['std'] * scale, 2)} {unit}"
+                f"{number(x['value'] * scale, 4)} ± {number(QUANTILE * x['std'] * scale, 2)} {unit}"
                 for x in (before, after)
             ]
             rows.append((title, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
