@@ -306,6 +306,11 @@ class DriveProfile:
     unlock: Unlock | None = None
     mailbox: Mailbox | None = None
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Of the motor parameters, in the drive file's order; none where it describes none."""
+        return self.parameters.order if self.parameters else ()
+
     def item(self, name: str) -> Item:
         """The item; UsageError says why where the file does not know it."""
         if name in self.items:

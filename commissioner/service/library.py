@@ -17,6 +17,7 @@ from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
+from commissioner.service.problems import Refusal
 from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
 from commissioner.validation import requirement
 
@@ -108,6 +109,19 @@ class Library:
 
     def _files(self, folder: str, ending: str) -> list[Path]:
         return sorted((self._data / folder).glob(f"*.{ending}"))
+
+
+def must_be_there(drive: Drive, step: str, remedy: str = "start the simulator first") -> None:
+    """Refusal 409 where the drive has no address yet: the simulator before its start."""
+    if not drive.url:
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step=step,
+            value=drive.id,
+            limit="a drive with an address",
+            remedy=remedy,
+        )
 
 
 def judge_plate(values: Mapping[str, Any]) -> JudgedPlate:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.report.page import Page, Section, Table, Tone, picture
+from commissioner.report.page import MACHINE, Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
 from commissioner.report.running.words import (
     Document,
@@ -23,11 +23,7 @@ from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
 NAMES = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
-    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
-    ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
-    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
+    *MACHINE,
     ("inertia_kg_m2", "inertia", 1.0, "kg m²"),
 )
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from commissioner.service.access.visitors import Operator, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import CheckedDocument
-from commissioner.service.library import Drive, Motor
+from commissioner.service.library import Drive, Motor, must_be_there
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask_for
@@ -37,15 +37,7 @@ async def checks(request: Request, wish: CheckWish, _who: Operator) -> CheckedDo
 
 async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> CheckedDocument:
     """The document of `commissioner check`, with the time it was made. Refusal: a run has the drive, or it is silent."""
-    if not drive.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="check",
-            value=drive.id,
-            limit="a drive with an address",
-            remedy="start the simulator first",
-        )
+    must_be_there(drive, "check")
     live = parts.desk.live_on(drive.id)
     if live is not None or parts.desk.is_starting(drive.id):
         raise Refusal(

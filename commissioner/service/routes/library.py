@@ -20,7 +20,7 @@ from commissioner.service.contract.drives import (
     ProceduresDocument,
 )
 from commissioner.service.contract.plates import JudgedPlate
-from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate
+from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate, must_be_there
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
@@ -66,15 +66,7 @@ async def drive_state(request: Request, drive: str, _who: Viewer) -> DriveStateD
     """The drive's own word while no run has it, and how old that is. The first call begins to look."""
     parts = parts_of(request)
     found = _drive(parts.library, drive)
-    if not found.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="drive",
-            value=drive,
-            limit="a drive with an address",
-            remedy="POST /api/simulator starts it",
-        )
+    must_be_there(found, "drive", "POST /api/simulator starts it")
     watch = parts.desk.watch(found)
     watch.want()
     live = parts.desk.live_on(found.id)

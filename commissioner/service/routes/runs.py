@@ -15,9 +15,8 @@ from commissioner.service.access.visitors import Operator, Viewer, Visitor, part
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument
-from commissioner.service.library import Drive, Motor
+from commissioner.service.library import Drive, Motor, must_be_there
 from commissioner.service.parts import Parts
-from commissioner.service.problems import Refusal
 from commissioner.service.runs.child import ask_for, succeed
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.live import live_document
@@ -53,15 +52,7 @@ async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
 
 async def begin(parts: Parts, drive: Drive, motor: Motor, verb: list[str], who: Visitor, **told: Any) -> LiveRun:
     """The run of this verb, begun; the audit says so before anything moves."""
-    if not drive.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="start a run",
-            value=drive.id,
-            limit="a drive with an address",
-            remedy="start the simulator first",
-        )
+    must_be_there(drive, "start a run")
     facts = {"drive": drive.id, "motor": motor.id, **told}
     await parts.note(who, "asked to energise", **facts)
     run = await parts.desk.start(drive, motor, verb, who.party)
