@@ -71,8 +71,9 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     inertia, load = _shaft(problem, fit, covariance)
     four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
+    bound = {name: quantity.std for name, quantity in _parameters(four, covariance / fit.scale).items()}
     return Identified(
-        _parameters(four, covariance), _bounds(four, covariance / fit.scale), covariance, inertia, load, to_t_model(four, absolute), left,
+        _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
         fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left),
     )  # fmt: skip
 
@@ -110,10 +111,6 @@ def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
     spread = covariance[3, 3] + covariance[1, 1] - 2.0 * covariance[1, 3]
     t = four.rotor_time_constant_s
     return {**out, "rotor_time_constant_s": Quantity(t, float(t * np.sqrt(max(spread, 0.0))))}
-
-
-def _bounds(four: InverseGamma, covariance: Array) -> dict[str, float]:
-    return {k: q.std for k, q in _parameters(four, covariance).items()}
 
 
 def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | None, dict[str, float]]:

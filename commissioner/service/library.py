@@ -70,6 +70,10 @@ class Library:
         """UsageError where there is none of this id."""
         return _found(self.drives(), identifier, "drive")
 
+    def known_drive(self, identifier: str) -> Drive | None:
+        """None where there is none of this id."""
+        return next((drive for drive in self.drives() if drive.id == identifier), None)
+
     def add_drive(self, table: DriveTable) -> Drive:
         """Check and keep. UsageError: address or drive file cannot be right, or the id is taken."""
         from commissioner.link.files.drive_file import load_profile

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED, INK)
-MOST_POINTS = 1500
+MOST_POINTS, MOST_LINES = 1500, 2500
 MOST_NAMED = 12
 
 
@@ -143,9 +143,9 @@ def spectrum(seen: Observation) -> Figure:
     return figure
 
 
-def _envelope(x: Signal, y: Signal, points: int = 2500) -> tuple[Signal, Signal]:
+def _envelope(x: Signal, y: Signal) -> tuple[Signal, Signal]:
     """The largest of each group of points, so that narrow lines survive."""
-    step = max(1, x.size // points)
+    step = max(1, x.size // MOST_LINES)
     count = x.size // step
     return x[: count * step : step], y[: count * step].reshape(count, step).max(axis=1)
 

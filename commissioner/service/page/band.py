@@ -61,7 +61,7 @@ PARTS = {"levels": "DC levels", "look": "first look", "tones": "five tones", "bi
 def band_of(parts: Parts, who: Visitor, place: Place, t: Texts) -> Band:
     """The band of a page, now. A page that shows a drive wants to know of it: its watch goes on."""
     run = _run_of(parts, place)
-    drive = _drive_of(parts, place.drive or (run.drive if run else ""))
+    drive = parts.library.known_drive(place.drive or (run.drive if run else ""))
     live = run if run is not None and not run.is_over and not run.has_freed_drive else None
     seen = Seen()
     if drive is not None and drive.url and live is None:
@@ -98,10 +98,6 @@ def _run_of(parts: Parts, place: Place) -> LiveRun | None:
     if place.drive:
         return parts.desk.live_on(place.drive)
     return next((run for run in parts.desk.live() if not run.has_freed_drive), None)
-
-
-def _drive_of(parts: Parts, identifier: str) -> Drive | None:
-    return next((drive for drive in parts.library.drives() if drive.id == identifier), None)
 
 
 # --- a run goes on ------------------------------------------------------------------------------------------------
