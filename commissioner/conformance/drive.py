@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -268,10 +268,8 @@ def nan_words(item: Item) -> Words:
 
 def words_for(item: Item, value: Value) -> Words:
     """`value` without the item's own range in the way."""
-    from dataclasses import replace
-
     return encode_item(replace(item, minimum=None, maximum=None), value)
 
 
-def is_close(seen: float, wanted: float, relative: float, absolute: float = 0.0) -> bool:
-    return math.isfinite(seen) and abs(seen - wanted) <= max(relative * abs(wanted), absolute)
+def is_close(seen: float, wanted: float, relative: float) -> bool:
+    return math.isfinite(seen) and abs(seen - wanted) <= relative * abs(wanted)

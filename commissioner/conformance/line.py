@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
 from contextlib import suppress
 
 from pymodbus.exceptions import ConnectionException
@@ -16,46 +15,35 @@ from commissioner.conformance.records import Ask, Reply, Wait
 from commissioner.errors import LinkUnreachable
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.rtu import find_answers
+from commissioner.link.wire.trust import longest_frames_s
 from commissioner.link.wire.unopened import unopened
-from commissioner.link.wire.url import DriveUrl, RtuUrl
+from commissioner.link.wire.url import DriveUrl
 from commissioner.registers.codec import crc16_bytes
-
-LONGEST_FRAME_CHARACTERS = 256
 
 
 class Line:
     """A connected line; `perform` sends one request or waits. LinkUnreachable where it cannot be opened."""
 
-    def __init__(
-        self,
-        url: DriveUrl,
-        device: int,
-        reply_timeout_s: float,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
-        wire_s = 2 * LONGEST_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
-        self._url, self._device, self._timeout_s = url, device, reply_timeout_s + wire_s
-        self._clock, self._sleep = clock, sleep
+    def __init__(self, url: DriveUrl, device: int, reply_timeout_s: float) -> None:
+        self._url, self._device, self._timeout_s = url, device, reply_timeout_s + longest_frames_s(url)
         self._client = make_client(url, device)
         self._transaction = 0
         self._connect()
-        self._began = clock()
+        self._began = time.monotonic()
 
     def perform(self, step: Ask | Wait) -> Reply:
         """The answer, or silence, to a request; an empty reply after a wait."""
         if isinstance(step, Wait):
-            self._sleep(step.seconds)
-            return Reply(at_s=self._clock() - self._began)
-        start = self._clock()
+            time.sleep(step.seconds)
+            return Reply(at_s=time.monotonic() - self._began)
+        start = time.monotonic()
         device = self._device if step.device is None else step.device
         try:
             pdu, flaw = self._ask(step.pdu, device)
         except (OSError, ConnectionException) as error:
             pdu, flaw = None, f"the connection broke: {error}"
             self._reopen()
-        now = self._clock()
+        now = time.monotonic()
         return Reply(pdu, start - self._began, now - start, flaw)
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ OF_RECORDINGS = (
 )
 
 
-def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
+def as_document(seen: Diagnosis) -> DiagnosisDocument:
     """Document of a recording's diagnosis."""
     held, noise, left = seen.held_out, seen.noise, seen.left
     document: DiagnosisDocument = {
@@ -54,7 +54,7 @@ def as_document(seen: Diagnosis, model_file: str | None) -> DiagnosisDocument:
         "is_complete": seen.is_complete,
         "search": seen.written_steps,
         "next_experiment": seen.next_experiment,
-        "model_file": model_file,
+        "model_file": None,
     }
     if seen.refusal is not None:
         document["error"] = seen.refusal.as_dict()

@@ -37,11 +37,6 @@ class Column:
     index: int
     window: int = 0
 
-    @property
-    def name(self) -> str:
-        """For covariance tables."""
-        return NAMES[self.index] if self.kind == "p" else f"{self.kind}{self.window}.{self.index}"
-
 
 @dataclass(frozen=True)
 class Machine:
@@ -67,6 +62,10 @@ class Machine:
         for k in LOGARITHMIC:
             p[k] = np.exp(p[k])
         return p
+
+    def values(self) -> dict[str, float]:
+        """All numbers by name."""
+        return dict(zip(NAMES, self.physical().tolist(), strict=True))
 
     def slope(self) -> Array:
         """d physical / d theta."""

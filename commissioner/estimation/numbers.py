@@ -22,7 +22,7 @@ NAMES = (
 )  # fmt: skip
 AT = {name: k for k, name in enumerate(NAMES)}
 COUNT = len(NAMES)
-FOUR = (0, 1, 2, 3)
+FOUR = NAMES[:4]
 LOGARITHMIC = frozenset(
     AT[n]
     for n in (
@@ -44,11 +44,6 @@ class Scales:
     frequency_rad_per_s: float
     torque_nm: float
     pole_pairs: int
-
-    @property
-    def flux_wb(self) -> float:
-        """Rated peak stator flux."""
-        return self.voltage_v / self.frequency_rad_per_s
 
     def as_tuple(self) -> tuple[float, ...]:
         """As the kernel takes them."""

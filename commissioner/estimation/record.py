@@ -43,7 +43,6 @@ class Window:
     speed: Array
     state: NDArray[np.int64]
     is_from_rest: bool
-    source: str = ""
 
     @property
     def count(self) -> int:
@@ -285,7 +284,6 @@ def _window(
         speed,
         np.zeros(time.size, np.int64),
         is_from_rest,
-        one.source,
     )
     return replace(window, state=_states(window, scales, one.sample_period_s))
 

@@ -33,7 +33,7 @@ from commissioner.monitor.periods.periods import ShaftSearch, slip_of
 from commissioner.monitor.periods.steadiness import frequency_wander, too_little
 from commissioner.monitor.signals import feeder
 from commissioner.monitor.signals.averaging import Comb, Lines, separate
-from commissioner.monitor.signals.quiet import SEGMENT_S, quietest
+from commissioner.monitor.signals.quiet import quietest
 from commissioner.monitor.signals.supply import TurningFrame, turning_frame
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import from_nameplate
@@ -93,7 +93,6 @@ class Wishes:
     load_frequencies_hz: tuple[float, ...] = ()
     inertia_kg_m2: float | None = None
     start: Start | None = None
-    segment_s: float = SEGMENT_S
     trust: str | None = None
 
 
@@ -112,7 +111,7 @@ def observe(
         return Refused(audited, reason, audited.findings)
     frame = turning_frame(audited.current_a, audited.voltage_v, audited.supply, audited.sample_period_s)
     frame = replace(frame, slip_phase_rad=slip_phase(frame, start.circuit))
-    part = quietest(frame, wishes.segment_s)
+    part = quietest(frame)
     wander = frequency_wander(frame, part)
     if wander.stops:
         return Refused(audited, wander, (*audited.findings, wander))

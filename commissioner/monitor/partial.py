@@ -85,7 +85,7 @@ def of_currents(recording: RunningRecording, plate: Nameplate, wishes: Wishes) -
         return audited.refusal or Finding("unknown", "refused", "the audit did not finish")
     frame = turning_frame(audited.current_a, audited.voltage_v, audited.supply, audited.sample_period_s)
     frame = replace(frame, slip_phase_rad=slip_phase(frame, start.circuit))
-    part = quietest(frame, wishes.segment_s)
+    part = quietest(frame)
     wander = frequency_wander(frame, part)
     if wander.stops:
         return wander

@@ -27,11 +27,12 @@ from commissioner.monitor.contract import (
 )
 from commissioner.monitor.intake.findings import Audited, Finding
 from commissioner.monitor.machine.fit import NAMES, Fitted, circuit_at, steps
-from commissioner.monitor.partial import Partial
+from commissioner.monitor.partial import Partial, of_terminals
 from commissioner.monitor.trend.indicators import Indicator, Pulses, rotor_side_bands
-from commissioner.monitor.trend.trend import Entry, Verdict
+from commissioner.monitor.trend.trend import FALSE_ALARM, Entry, Verdict
 from commissioner.motor.circuit import EQUAL_LEAKAGE, PARAMETERS
 
+QUANTITIES = "SI, per-phase star equivalent, referred to the stator; std is one standard deviation"
 OPEN = 0.25
 """A combination that keeps more than this share of its prior variance was not fixed by the data."""
 UNBALANCE_NOISE, SIDE_BAND_NOISE_DB = 0.002, 3.0
@@ -107,7 +108,7 @@ def as_document(
         "indicators": indicator_document(observation, pulses, indicators),
         "trend": None if verdict is None else verdict_document(verdict),
         "audit": audit_document(observation.audited, observation.findings),
-        "quantities": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
+        "quantities": QUANTITIES,
     }
 
 
@@ -154,7 +155,7 @@ def partial_document(part: Partial, stretches: list[State], audited: Audited) ->
         "trend": None,
         "states": stretches,
         "audit": audit_document(audited, (*audited.findings, *part.findings)),
-        "quantities": "SI, per-phase star equivalent, referred to the stator; std is one standard deviation",
+        "quantities": QUANTITIES,
     }
 
 
@@ -231,7 +232,7 @@ def verdict_document(verdict: Verdict) -> TrendDocument:
         "sentence": verdict.state.value,
         "compared_with": verdict.compared_with,
         "alarms": list(verdict.names),
-        "false_alarm_per_indicator": verdict.false_alarm,
+        "false_alarm_per_indicator": FALSE_ALARM,
         "healthy_recordings_that_alarm_against_the_others": verdict.left_out_alarms,
         "healthy_recordings_at_other_operating_points": verdict.other_operating_points,
         "watched": [cast("WatchedRow", {**asdict(w), "alarms": w.alarms}) for w in verdict.watched],
@@ -267,18 +268,7 @@ def _terminal(audited: Audited) -> Indicators:
     f = audited.fundamental
     if f is None:
         return {}
-    root = np.sqrt(2.0)
-    return {
-        "supply_frequency_hz": f.frequency_hz,
-        "voltage_rms_v": abs(f.voltage_v) / root,
-        "current_rms_a": abs(f.current_a) / root,
-        "voltage_unbalance": f.voltage_unbalance,
-        "current_unbalance": f.current_unbalance,
-        "power_w": f.power_w,
-        "reactive_power_var": f.reactive_var,
-        "power_factor": f.power_factor,
-        "runs_backwards": f.runs_backwards,
-    }
+    return {"supply_frequency_hz": f.frequency_hz, **of_terminals(f), "runs_backwards": f.runs_backwards}
 
 
 def _segment(observation: Observation) -> dict[str, float]:

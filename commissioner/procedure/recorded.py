@@ -14,8 +14,6 @@ from commissioner.procedure.verdict import Decision, decide, evidence_of, match_
 from commissioner.records import DriveStatus
 from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, TakeSnapshot, Tell
 
-__all__ = ["recorded_course"]
-
 
 def recorded_course(job: Job, findings: Findings) -> Generator[Command, Any, RunEnded]:
     """As `course`, for a job whose `findings.identification` came from a recording."""

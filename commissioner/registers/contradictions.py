@@ -111,7 +111,7 @@ def _scales(profile: DriveProfile) -> Iterator[Problem]:
 
 
 def _order(profile: DriveProfile) -> Iterator[Problem]:
-    order = profile.parameters.order if profile.parameters else ()
+    order = profile.parameter_names
     for k, name in enumerate(order):
         if name in order[:k]:
             yield (

@@ -76,7 +76,7 @@ class Written:
 def drive_values(profile: DriveProfile, circuit: InverseGamma, nameplate: Nameplate | None = None) -> Written:
     """The circuit as the drive wants it. Items the file does not know are refused by its own sentence; what stands for no
     quantity of the circuit (the kind of a tuning) stays as it is."""
-    order = profile.parameters.order if profile.parameters else ()
+    order = profile.parameter_names
     refused = {name: profile.unknown[name] for name in QUANTITIES if name in profile.unknown}
     items = [profile.item(name) for name in order]
     meant = [item for item in items if item.convention or (item.quantity or item.name) in QUANTITIES]
@@ -109,7 +109,7 @@ def parameter_limits(profile: DriveProfile, plate: Nameplate) -> dict[str, tuple
     box = prior(plate)
     sides = zip(box.lower.as_tuple(), box.upper.as_tuple(), strict=True)
     corners = [InverseGamma(*corner) for corner in itertools.product(*sides)]
-    order = profile.parameters.order if profile.parameters else ()
+    order = profile.parameter_names
     items = [profile.item(name) for name in order]
     values = {i.name: [drive_value(i, corner, plate) for corner in corners] for i in items if i.convention}
     return {name: (min(found), max(found)) for name, found in values.items()}

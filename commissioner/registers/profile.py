@@ -104,7 +104,6 @@ class Item:
     quantity: str = ""
     access: str = "r"
     needs_stop: bool = False
-    is_volatile: bool = False
     minimum: float | None = None
     maximum: float | None = None
     word_order: str = "big"
@@ -306,6 +305,11 @@ class DriveProfile:
     tuning: Tuning | None = None
     unlock: Unlock | None = None
     mailbox: Mailbox | None = None
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Of the motor parameters, in the drive file's order; none where it describes none."""
+        return self.parameters.order if self.parameters else ()
 
     def item(self, name: str) -> Item:
         """The item; UsageError says why where the file does not know it."""

@@ -112,7 +112,7 @@ def _unknown_items(profile: DriveProfile, tuning: Tuning) -> Iterator[Problem]:
         for k, step in enumerate(steps):
             if step.do == "write" and step.item in profile.items and "w" not in profile.items[step.item].access:
                 yield f"{key}[{k}].item", (step.item, "an item that can be written")
-    order = profile.parameters.order if profile.parameters else ()
+    order = profile.parameter_names
     for name in (*tuning.results, *tuning.also_changes):
         if name in profile.items and "w" in profile.items[name].access and name not in order:
             yield "results", (name, "a name in parameters.order: what tuning changes must be restored")

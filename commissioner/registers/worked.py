@@ -32,7 +32,7 @@ def check_worked(profile: DriveProfile) -> DriveProfile:
 
 def _check_each_has_one(profile: DriveProfile) -> None:
     proved = {w.item for w in profile.worked if w.words and w.value is not None and w.per_phase is not None}
-    for name in profile.parameters.order if profile.parameters else ():
+    for name in profile.parameter_names:
         if profile.item(name).convention and name not in proved:
             raise ConfigurationError(
                 file=profile.file, key="worked", value=None,

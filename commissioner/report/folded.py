@@ -20,12 +20,6 @@ def folded(summary: str, parts: Sequence[str | Picture]) -> Picture:
     return Picture(str(Markup("<details><summary>{}</summary>{}</details>").format(summary, inside)), "")
 
 
-def coded(text: str) -> Markup:
-    """What stands between back quotes as a command or file line."""
-    parts = text.split("`")
-    return Markup("").join(Markup("<code>{}</code>").format(part) if k % 2 else part for k, part in enumerate(parts))
-
-
 def hinted(text: str, hint: str) -> Markup:
     """A cell whose number shows when the pointer rests on it."""
     return Markup('<span title="{}">{}</span>').format(hint, text)

@@ -45,6 +45,16 @@ PLOT_STYLE: dict[Any, Any] = {
 }
 
 
+MACHINE = (
+    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
+    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
+    ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
+    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
+    ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
+)
+"""What a motor is known by: key, name, factor and unit in which it is shown."""
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of cells; a cell is shown as it stands. `tones[i]` colours row i."""
@@ -79,6 +89,16 @@ class Page:
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
     footer: str = ""
+
+
+def figure_of(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
+    """A figure in the pages' style, and its axes `(rows, columns)`."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(PLOT_STYLE):
+        figure = Figure(figsize=(9.2, height), layout="constrained")
+        return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def picture(figure: Figure, caption: str, *, raster: bool = False) -> Picture:

@@ -80,7 +80,7 @@ def _diagnosed(recording: Path, go_on: Callable[[], bool]) -> tuple[dict[str, An
         refused = {"verdict": "refused", "reason": error.what, "causes": [], "moved": [], "is_complete": True}
         return refused | {"file": None}, None
     seen = diagnose([samples], go_on=go_on)
-    document = plain(as_document(seen, None))
+    document = plain(as_document(seen))
     short = {
         "verdict": document["verdict"],
         "reason": document["reason"],

@@ -116,7 +116,7 @@ def _not_checked(profile: DriveProfile) -> Iterator[NotChecked]:
             yield NotChecked(
                 f"{name} in the drive", profile.unknown.get(name, "the drive file knows no register for it")
             )
-    for name in profile.parameters.order if profile.parameters else ():
+    for name in profile.parameter_names:
         if not profile.item(name).convention:
             yield NotChecked(
                 f"{name} in the drive", "its unit or convention has no source: it is shown as the drive counts"

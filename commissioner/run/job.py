@@ -105,7 +105,7 @@ def _pace(inverter: Inverter, now_s: Callable[[], float]) -> StreamPace | None:
 def names_of(profile: DriveProfile) -> tuple[dict[str, str], dict[str, float]]:
     """Of each parameter that says one of the contract's by itself: the drive's name -> that field, and the factor by
     which the drive multiplies its SI value where that is not 1."""
-    order = profile.parameters.order if profile.parameters else ()
+    order = profile.parameter_names
     names: dict[str, str] = {}
     factors: dict[str, float] = {}
     for name, ours in our_values(profile, dict.fromkeys(order, 1.0), None).items():

@@ -100,7 +100,7 @@ def _bring_back(
 
 def _complete(snapshot: ParameterSnapshot, profile: DriveProfile, folder: Path) -> ParameterSnapshot:
     """The snapshot where it holds exactly the drive file's parameters; no `stored` where the drive cannot show it."""
-    names = set(profile.parameters.order) if profile.parameters else set()
+    names = set(profile.parameter_names)
     for which, values in (("in_use", snapshot.in_use), ("stored", snapshot.stored or dict.fromkeys(names, 0.0))):
         wrong = sorted(names.symmetric_difference(values))
         if wrong:

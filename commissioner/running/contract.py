@@ -27,7 +27,7 @@ NEVER_NAMEABLE = (
 )
 
 
-def as_document(seen: Diagnosis, model_file: str | None = None) -> DiagnosisDocument:
+def as_document(seen: Diagnosis) -> DiagnosisDocument:
     """Plain JSON types."""
     gain, left, found, record = seen.gain, seen.left, seen.found, seen.record
     document: DiagnosisDocument = {
@@ -63,7 +63,7 @@ def as_document(seen: Diagnosis, model_file: str | None = None) -> DiagnosisDocu
             "do": seen.next_experiment.do, "steps": list(seen.next_experiment.steps), "splits": list(seen.next_experiment.splits),
             "repeats": seen.next_experiment.repeats, "command": seen.next_experiment.command,
         },
-        "model_file": model_file,
+        "model_file": None,
     }  # fmt: skip
     if seen.refusal is not None:
         document["error"] = seen.refusal.as_dict()

@@ -10,7 +10,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, problem_of
-from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.numbers import AT, FOUR, NAMES
 from commissioner.estimation.record import Record, prepare
 from commissioner.motor.circuit import PARAMETERS, Quantity
 from commissioner.motor.nameplate import Nameplate
@@ -18,7 +18,7 @@ from commissioner.records import RunningRecording
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.experiment import Experiment, next_experiment
 from commissioner.running.lack import Lack, lack_of_fit, rms_errors
-from commissioner.running.rules import RULES, Rules
+from commissioner.running.rules import RULES
 from commissioner.running.search import Found, Named, Step, search
 
 UNEXPLAINED_SIGMA, FAR_OFF_SIGMA, LEAST_SHARE = 0.3, 1.0, 0.97
@@ -77,7 +77,6 @@ class Diagnosis:
     causes: tuple[NamedCause, ...] = ()
     gain: Gain | None = None
     left: Lack | None = None
-    before: Lack | None = None
     parameters_before: Mapping[str, Quantity] = field(default_factory=dict)
     parameters_after: Mapping[str, Quantity] = field(default_factory=dict)
     next_experiment: Experiment | None = None
@@ -88,9 +87,7 @@ class Diagnosis:
 
     def numbers(self) -> dict[str, float]:
         """Of the final machine, by name; empty where the data were refused."""
-        return (
-            dict(zip(NAMES, (float(x) for x in self.found.fit.machine.physical()), strict=True)) if self.found else {}
-        )
+        return self.found.fit.machine.values() if self.found else {}
 
 
 def diagnose(
@@ -98,7 +95,6 @@ def diagnose(
     plate: Nameplate,
     *,
     excluded: Sequence[str] = (),
-    rules: Rules = RULES,
     observe: Callable[[Step], None] = lambda _: None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Diagnosis:
@@ -112,18 +108,17 @@ def diagnose(
         found = search(
             problem_of(record, HELD_OUT if record.has_speed else 0.0),
             excluded=excluded,
-            rules=rules,
             observe=observe,
             go_on=go_on,
         )
     except DataRefused as refusal:
         return Diagnosis(Verdict.REFUSED, f"{refusal.what}; {refusal.remedy}", refusal=refusal)
-    return _conclude(record, found, rules)
+    return _conclude(record, found)
 
 
-def _conclude(record: Record, found: Found, rules: Rules) -> Diagnosis:
-    left, before = lack_of_fit(found.problem, found.fit.machine), lack_of_fit(found.problem, found.nominal.machine)
-    causes = tuple(sorted((_cause(found, one, rules) for one in found.accepted), key=lambda c: -c.gain_share))
+def _conclude(record: Record, found: Found) -> Diagnosis:
+    left = lack_of_fit(found.problem, found.fit.machine)
+    causes = tuple(sorted((_cause(found, one) for one in found.accepted), key=lambda c: -c.gain_share))
     gain = _gain(found)
     verdict, reason = _verdict(causes, left, gain)
     remarks = list(record.remarks)
@@ -145,7 +140,7 @@ def _conclude(record: Record, found: Found, rules: Rules) -> Diagnosis:
             "No speed column: the speed is that of a shaft with the fitted load, nothing is held out; iron loss and heating of the rotor are hard to see."
         )
     return Diagnosis(
-        verdict, reason, causes, gain, left, before, _parameters(found.nominal), _parameters(found.fit),
+        verdict, reason, causes, gain, left, _parameters(found.nominal), _parameters(found.fit),
         next_experiment(verdict.value, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
     )  # fmt: skip
 
@@ -162,9 +157,9 @@ def _gain(found: Found) -> Gain:
     return Gain(held, before or fitted_before, after or fitted_after, floor, float(np.clip(share, 0.0, 1.0)))
 
 
-def _cause(found: Found, one: Named, rules: Rules) -> NamedCause:
+def _cause(found: Found, one: Named) -> NamedCause:
     gain, rivals = found.gain[one.cause], found.rivals[one.cause]
-    close = max(rules.tie * found.fit.scale, rules.tie_share * gain)
+    close = max(RULES.tie * found.fit.scale, RULES.tie_share * gain)
     tied = [name for name, lost in rivals.items() if lost < close]
     equivalent = tuple(dict.fromkeys((*always_tied(one.cause), *tied)))
     nearest = min((lost for name, lost in rivals.items() if name not in equivalent), default=gain)
@@ -229,11 +224,7 @@ def _verdict(causes: Sequence[NamedCause], left: Lack, gain: Gain) -> tuple[Verd
 
 def _parameters(fit: Fit) -> dict[str, Quantity]:
     out = {}
-    for name, key in zip(
-        NAMES[:4],
-        PARAMETERS,
-        strict=True,
-    ):
+    for name, key in zip(FOUR, PARAMETERS, strict=True):
         out[key] = Quantity(fit.machine.value(name), fit.std(name))
     time_constant = fit.machine.value("magnetizing_inductance") / fit.machine.value("rotor_resistance")
     covariance = fit.covariance()

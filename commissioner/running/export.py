@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from commissioner.estimation.fit import Machine
-from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, FOUR, Scales
 from commissioner.estimation.record import Record
 from commissioner.motor.circuit import Gamma, InverseGamma
 from commissioner.motor.nameplate import Nameplate, Plate
@@ -49,8 +49,8 @@ class RunningModel(TypedDict):
 def model_document(found: Found, record: Record) -> RunningModel:
     """What `model.json` holds. `numbers`: those of the machine that are not none; relative ones as in the chapter `running`."""
     machine = found.fit.machine
-    values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
-    kept = {n: v for n, v in values.items() if v != 0.0 and (n in NAMES[:4] or n == "inertia" or v != DEFAULTS.get(n))}
+    values = machine.values()
+    kept = {n: v for n, v in values.items() if v != 0.0 and (n in FOUR or n == "inertia" or v != DEFAULTS.get(n))}
     return {
         "format": FORMAT,
         "kind": "running",
@@ -59,7 +59,7 @@ def model_document(found: Found, record: Record) -> RunningModel:
         "numbers": kept,
         "has_shaft": machine.has_shaft,
         "effects": [one.cause for one in found.accepted],
-        "effect_numbers": {one.cause: list(one.numbers(with_spare=True)) for one in found.accepted},
+        "effect_numbers": {one.cause: list(one.numbers) for one in found.accepted},
         "scenario": scenario(found, record),
     }
 
@@ -67,8 +67,8 @@ def model_document(found: Found, record: Record) -> RunningModel:
 def scenario(found: Found, record: Record) -> RunningScenario:
     """The simulator's document: Gamma circuit, mains of the plate, a start with two load steps, the causes' sizes."""
     machine, scales, plate = found.fit.machine, record.scales, record.plate
-    values = dict(zip(NAMES, (float(x) for x in machine.physical()), strict=True))
-    gamma = Gamma.from_inverse_gamma(InverseGamma(*(values[n] for n in NAMES[:4])))
+    values = machine.values()
+    gamma = Gamma.from_inverse_gamma(InverseGamma(*(values[n] for n in FOUR)))
     inertia = (
         values["inertia"]
         if machine.has_shaft

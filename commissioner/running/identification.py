@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
-from commissioner.estimation.numbers import AT, NAMES
+from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
 from commissioner.motor.circuit import PARAMETERS, InverseGamma, Quantity, TModel, to_t_model
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from commissioner.running.lack import Lack, lack_of_fit
-from commissioner.running.nominal import FOUR, with_shaft, with_speed
+from commissioner.running.nominal import with_shaft, with_speed
 
 Array = NDArray[np.float64]
 SPEED_STEP_S = 4e-3
@@ -71,8 +71,9 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     inertia, load = _shaft(problem, fit, covariance)
     four = InverseGamma(*(fit.machine.value(n) for n in FOUR))
     absolute = covariance * np.outer(four.as_tuple(), four.as_tuple())
+    bound = {name: quantity.std for name, quantity in _parameters(four, covariance / fit.scale).items()}
     return Identified(
-        _parameters(four, covariance), _bounds(four, covariance / fit.scale), covariance, inertia, load, to_t_model(four, absolute), left,
+        _parameters(four, covariance), bound, covariance, inertia, load, to_t_model(four, absolute), left,
         fit.chi2 / fit.count, _flux(record), record, fit, _remarks(record, left),
     )  # fmt: skip
 
@@ -112,10 +113,6 @@ def _parameters(four: InverseGamma, covariance: Array) -> dict[str, Quantity]:
     return {**out, "rotor_time_constant_s": Quantity(t, float(t * np.sqrt(max(spread, 0.0))))}
 
 
-def _bounds(four: InverseGamma, covariance: Array) -> dict[str, float]:
-    return {k: q.std for k, q in _parameters(four, covariance).items()}
-
-
 def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | None, dict[str, float]]:
     """Inertia and load of a start: from the fit where the shaft is in it, else from torque against measured speed."""
     record = problem.record
@@ -135,7 +132,7 @@ def _shaft(problem: Problem, fit: Fit, covariance: Array) -> tuple[Quantity | No
     spread = 0.0
     for step in np.linalg.cholesky(covariance + 1e-18 * np.eye(4)).T:
         theta = fit.machine.theta.copy()
-        theta[: len(NAMES[:4])] += step
+        theta[: len(FOUR)] += step
         moved = _inertia(problem, replace(fit.machine, theta=theta))
         spread += (moved[0][0] - values[0]) ** 2 if moved else 0.0
     load = {"constant_nm": float(values[1]), "fan_at_synchronous_nm": float(values[2])}

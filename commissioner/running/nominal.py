@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.errors import DataRefused
 from commissioner.estimation.fit import Fit, Machine, Problem, columns_of, plain_machine, refine, with_noise_of
-from commissioner.estimation.numbers import NAMES
+from commissioner.estimation.numbers import FOUR
 from commissioner.estimation.record import Record
 from commissioner.motor.nameplate import prior
 
@@ -18,7 +18,6 @@ FREED_FROM_S = (("load_constant", 0.25), ("load_fan", 0.5))
 """What of the load is free in a prefix of this length: a fan is nothing before the shaft turns."""
 RUN_UP_TORQUE = 2.0
 """Mean accelerating torque of a start, of rated."""
-FOUR = NAMES[:4]
 RIPPLE = ("speed_ripple_cos", "speed_ripple_sin")
 """Of an encoder, at the shaft's frequency."""
 STARTS = ((1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.6, 1.0), (2.0, 1.6, 1.5, 1.0), (0.6, 1.6, 1.0, 1.5))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from commissioner.estimation.numbers import AT, NAMES
 from commissioner.running.causes import CATALOGUE, always_tied
 from commissioner.running.causes.cause import Form
 from commissioner.running.nominal import nominal
-from commissioner.running.rules import RULES, Rules
+from commissioner.running.rules import RULES
 
 Array = NDArray[np.float64]
 
@@ -34,9 +34,10 @@ class Named:
     cause: str
     form: Form
 
-    def numbers(self, *, with_spare: bool) -> tuple[str, ...]:
+    @property
+    def numbers(self) -> tuple[str, ...]:
         """Those that are fitted."""
-        return (*self.form.numbers, *(self.form.spare if with_spare else ()))
+        return (*self.form.numbers, *self.form.spare)
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,6 @@ class Search:
     problem: Problem
     base: Fit
     excluded: frozenset[str]
-    rules: Rules
     observe: Callable[[Step], None]
     go_on: Callable[[], bool]
     steps: list[Step] = field(default_factory=list)
@@ -92,7 +92,7 @@ class Search:
 
     def columns(self, causes: Sequence[Named]) -> tuple[Column, ...]:
         """All that is free with these causes."""
-        own = [Column("p", AT[n]) for c in causes for n in c.numbers(with_spare=True)]
+        own = [Column("p", AT[n]) for c in causes for n in c.numbers]
         return (*self.base.columns, *own)
 
     def fitted(self, start: Machine, causes: Sequence[Named], near: Fit, *, first: Array | None = None) -> Fit:
@@ -131,16 +131,15 @@ def search(
     problem: Problem,
     *,
     excluded: Sequence[str] = (),
-    rules: Rules = RULES,
     observe: Callable[[Step], None] = lambda _: None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Found:
     """Names what the four-parameter machine gets wrong. DataRefused where not even that one can be fitted."""
     problem, base = nominal(problem)
-    seeking = Search(problem, base, frozenset(excluded), rules, observe, go_on)
+    seeking = Search(problem, base, frozenset(excluded), observe, go_on)
     fit, is_complete = base, True
     accepted: tuple[Named, ...] = ()
-    for round_ in range(rules.most_causes):
+    for round_ in range(RULES.most_causes):
         if not go_on():
             is_complete = False
             break
@@ -149,7 +148,7 @@ def search(
             break
         fit, accepted = taken
         if round_ == 0:  # weights of a machine that is nearly right
-            seeking.problem = with_noise_of(replace(problem), fit.machine)
+            seeking.problem = with_noise_of(problem, fit.machine)
             seeking.base = base = refine(seeking.problem, base.machine, base.columns)
             fit = refine(seeking.problem, fit.machine, fit.columns)
         fit, accepted = _exchanged(seeking, fit, accepted)
@@ -194,25 +193,23 @@ def _screen(seeking: Search, fit: Fit, causes: Sequence[Named]) -> list[tuple[fl
 
 
 def _needed(seeking: Search, one: Named) -> float:
-    rules = seeking.rules
-    return rules.least_gain + rules.each_further_number * (len(one.numbers(with_spare=True)) - 1)
+    return RULES.least_gain + RULES.each_further_number * (len(one.numbers) - 1)
 
 
 def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit, tuple[Named, ...]] | None:
     """The cause that gains most and holds on what was kept aside; None where none does."""
-    rules = seeking.rules
     screened = _screen(seeking, fit, seeking.candidates(c.cause for c in accepted))
     tried: list[tuple[float, Named, Fit, str]] = []
-    for gain, one, own in screened[: rules.tried]:
+    for gain, one, own in screened[: RULES.tried]:
         seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
-        if gain / fit.scale < 0.6 * rules.least_gain:
+        if gain / fit.scale < 0.6 * RULES.least_gain:
             continue
         first = np.concatenate([fit.jacobian, own])
         other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
         won = fit.chi2 - other.chi2
         why = _refusal(seeking, fit, other, (*accepted, one), won)
         tried.append((won, one, other, why))
-        if other.chi2 < rules.nothing_left * other.count and not why:
+        if other.chi2 < RULES.nothing_left * other.count and not why:
             break  # whoever explains as much is told apart as its rival
     tried.sort(key=lambda item: -item[0])
     for gain, one, other, why in tried:
@@ -225,18 +222,17 @@ def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit,
 
 def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:
     """Why the last of these causes is not taken in; empty where it is."""
-    rules = seeking.rules
     is_steady = seeking.problem.record.is_steady
     if gain / other.scale < _needed(seeking, causes[-1]):
         return "gains too little"
-    if gain < rules.least_share * max(seeking.base.chi2 - fit.chi2, 0.0):
+    if gain < RULES.least_share * max(seeking.base.chi2 - fit.chi2, 0.0):
         return "gains less than what the laws of the accepted causes leave"
-    if np.sqrt(gain / fit.count) < (rules.material_steady_sigma if is_steady else rules.material_sigma):
+    if np.sqrt(gain / fit.count) < (RULES.material_steady_sigma if is_steady else RULES.material_sigma):
         return "too small to matter"
     if not seeking.is_plausible(other, causes):
         return "its size is one that physics does not allow"
     worse = other.held - fit.held
-    if worse / max(fit.held / max(fit.held_count, 1), 1.0) > rules.hold_out_loss + 0.01 * gain:
+    if worse / max(fit.held / max(fit.held_count, 1), 1.0) > RULES.hold_out_loss + 0.01 * gain:
         return "what was held out gets worse"
     return ""
 
@@ -246,7 +242,7 @@ def _exchanged(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[
     for k, one in enumerate(accepted[:-1]):  # the last one has just won against all
         others = tuple(c for j, c in enumerate(accepted) if j != k)
         for lost, rival, other in _rivals(seeking, fit, accepted, k, most=2):
-            if lost < -seeking.rules.tie * other.scale and seeking.is_plausible(other, (*others, rival)):
+            if lost < -RULES.tie * other.scale and seeking.is_plausible(other, (*others, rival)):
                 seeking.say(Step("exchanged", one.cause, rival.form.name, -lost / other.scale, rival.cause))
                 return refreshed(seeking.problem, other), (*others, rival)
     return fit, accepted
@@ -278,7 +274,7 @@ def _rivals(
 ) -> list[tuple[float, Named, Fit]]:
     """Fits with cause k replaced by those that look alike: (chi-square lost, rival, fit); `less` is the one without either."""
     one, names = accepted[k], {c.cause for c in accepted}
-    own_names = set(one.numbers(with_spare=True))
+    own_names = set(one.numbers)
     own = np.array([j for j, c in enumerate(fit.columns) if c.kind == "p" and NAMES[c.index] in own_names])
     kept = np.array([j for j in range(len(fit.columns)) if j not in set(own.tolist())])
     basis, _ = np.linalg.qr(fit.jacobian[kept].T)
@@ -298,7 +294,7 @@ def _rivals(
     out = []
     others = tuple(c for j, c in enumerate(accepted) if j != k)
     for cosine, rival in alike[:most]:
-        if cosine < seeking.rules.least_cosine:
+        if cosine < RULES.least_cosine:
             break
         less = less or _less(seeking, fit, accepted, k)
         other = seeking.fitted(less.machine, (*others, rival), less)

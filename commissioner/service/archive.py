@@ -11,12 +11,10 @@ from typing import Any
 
 from commissioner.encoding import JsonObject
 from commissioner.identify.contract import Measured
-from commissioner.run.archive.catalogue import RunSummary, read_run
+from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.documents import read_document, read_result
 from commissioner.service.contract.runs import RunWithoutResult
 from commissioner.service.problems import Refusal
-
-OUTCOMES = ("commissioned", "rejected", "aborted", "faulted", "cut off")
 
 
 @dataclass(frozen=True)
@@ -72,9 +70,6 @@ class Archive:
                 remedy="choose one from the list of runs",
             )
         return entry
-
-    def summary(self, run: str) -> RunSummary:
-        return read_run(self.find(run).folder)
 
     def result(self, run: str) -> JsonObject | RunWithoutResult:
         """The result document; of a run without one, what its journal says. DataRefused: it is damaged."""

@@ -17,6 +17,7 @@ from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
+from commissioner.service.problems import Refusal
 from commissioner.settings import CONFIG_FOLDER, MotorFile, load_motor, read_toml
 from commissioner.validation import requirement
 
@@ -69,6 +70,10 @@ class Library:
         """UsageError where there is none of this id."""
         return _found(self.drives(), identifier, "drive")
 
+    def known_drive(self, identifier: str) -> Drive | None:
+        """None where there is none of this id."""
+        return next((drive for drive in self.drives() if drive.id == identifier), None)
+
     def add_drive(self, table: DriveTable) -> Drive:
         """Check and keep. UsageError: address or drive file cannot be right, or the id is taken."""
         from commissioner.link.files.drive_file import load_profile
@@ -110,10 +115,23 @@ class Library:
         return sorted((self._data / folder).glob(f"*.{ending}"))
 
 
+def must_be_there(drive: Drive, step: str, remedy: str = "start the simulator first") -> None:
+    """Refusal 409 where the drive has no address yet: the simulator before its start."""
+    if not drive.url:
+        raise Refusal(
+            409,
+            "the simulator is not running",
+            step=step,
+            value=drive.id,
+            limit="a drive with an address",
+            remedy=remedy,
+        )
+
+
 def judge_plate(values: Mapping[str, Any]) -> JudgedPlate:
     """Each field of a plate: ok, or what is wrong and what to do; then what the whole plate implies."""
     fields: dict[str, JudgedField] = {name: {"ok": True, "what": "", "remedy": ""} for name in PLATE_FIELDS}
-    numbers = {key: _number(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
+    numbers = {key: number_of(values[key]) for key in values if key in {*PLATE_FIELDS, "name"}}
     try:
         table = MotorFile.model_validate(numbers)
     except ValidationError as error:
@@ -162,7 +180,7 @@ def questions(plate: Nameplate) -> list[str]:
     return ["is a number misread?"]
 
 
-def _number(value: Any) -> Any:
+def number_of(value: Any) -> Any:
     """Text as a plate is typed: decimal comma or point."""
     if not isinstance(value, str):
         return value

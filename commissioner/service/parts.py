@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, field
+from typing import Any
 
 from commissioner.service.access.accounts import Accounts
 from commissioner.service.access.sessions import Sessions
 from commissioner.service.access.throttle import Throttle
+from commissioner.service.access.visitors import Visitor
 from commissioner.service.archive import Archive
 from commissioner.service.audit import Audit
 from commissioner.service.configuration import Settings
@@ -44,6 +46,10 @@ class Parts:
     checks: dict[str, CheckedDocument] = field(default_factory=dict)
     """Newest checks by drive and motor, for the page."""
     closing: asyncio.Event = field(default_factory=asyncio.Event)
+
+    async def note(self, who: Visitor, what: str, **facts: Any) -> None:
+        """Into the audit, in a thread: it waits for the disk."""
+        await asyncio.to_thread(self.audit.write, who.person, who.address, what, **facts)
 
     @property
     def needs_accounts(self) -> bool:

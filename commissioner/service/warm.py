@@ -8,8 +8,6 @@ import sys
 import time
 from pathlib import Path
 
-USUAL_S = 60.0
-
 
 class WarmUp:
     """A child process that compiles, or finds compiled, what a run needs."""

@@ -34,8 +34,6 @@ class Kind:
 CATALOGUE: dict[str, Kind] = {}
 SINCE = ("sensor_switch_on",)
 """Effects that joined the catalogue later: drawn alone only, so that a seed's mixture stays what it was."""
-RESAMPLED = ("sampling_delay", "clock_drift", "lost_samples")
-"""Effects of the sampling clock, which a recording applies when it samples and not in the machine."""
 
 
 def _entry(name: str, unit: str, meaning: str, shapes: tuple[str, ...], smallest: float, largest: float):
@@ -59,8 +57,8 @@ def _shape(effect: Effect) -> int:
     return shapes.index(effect.shape) if effect.shape else 0
 
 
-def _direction(effect: Effect, default_deg: float = 25.0) -> tuple[float, float]:
-    angle = math.radians(effect.details.get("angle_deg", default_deg))
+def _direction(effect: Effect) -> tuple[float, float]:
+    angle = math.radians(effect.details.get("angle_deg", 25.0))
     return math.cos(angle), math.sin(angle)
 
 

@@ -58,10 +58,6 @@ class PowerStage:
     link_ripple: float = 0.006
     link_ripple_hz: float = 300.0
 
-    @property
-    def dead_time_v(self) -> float:
-        return self.dead_time_s * self.switching_frequency_hz * self.link_v
-
 
 @dataclass(frozen=True)
 class Sensors:

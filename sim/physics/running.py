@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from sim.physics.compiled import cached
 from sim.physics.loads import PeriodicLoad
 
+SETTLE_S, START_SLIP = 3.0, 0.03
+
 
 @dataclass(frozen=True)
 class Machine:
@@ -70,15 +72,13 @@ def play(
     steady_load: tuple[float, float, float],
     duration_s: float,
     sample_period_s: float,
-    settle_s: float = 3.0,
-    start_slip: float = 0.03,
 ) -> Played:
-    """The motor's terminal quantities and shaft over `duration_s`, after `settle_s` that is thrown away.
+    """The motor's terminal quantities and shaft over `duration_s`, after `SETTLE_S` that are thrown away.
 
     `steady_load`: constant (N m), per speed (N m s), per speed squared (N m s2).
     """
     count = round(duration_s / sample_period_s)
-    settle = round(settle_s / sample_period_s)
+    settle = round(SETTLE_S / sample_period_s)
     substeps = max(2, int(np.ceil(sample_period_s / 70e-6)))
     tables = np.array([load.torque_nm for load in loads]) if loads else np.zeros((0, 2))
     turning = np.array([[load.turns_per_shaft_turn, load.turns_per_s, load.start] for load in loads]).reshape(-1, 3)
@@ -120,7 +120,7 @@ def play(
             -supply.amplitude_v / (2 * np.pi * supply.frequency_hz),
             0.0,
             -supply.amplitude_v / (2 * np.pi * supply.frequency_hz),
-            synchronous * (1 - start_slip),
+            synchronous * (1 - START_SLIP),
             0.0,
         ]
     )

@@ -15,6 +15,7 @@ SCENARIOS = Path(__file__).parents[1] / "scenarios"
 CURRENTS = ("current_u_a", "current_v_a", "current_w_a")
 PHASES = ("voltage_u_v", "voltage_v_v", "voltage_w_v")
 LINES = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
+POINTS_PER_TURN = 360
 NAMEPLATE = (
     "rated_power_w",
     "rated_voltage_v",
@@ -203,13 +204,13 @@ def _answer_key(
     }
 
 
-def _over_angle(played: Played, points: int = 360) -> dict[str, list[float]]:
+def _over_angle(played: Played) -> dict[str, list[float]]:
     """Means of speed and torques in bins of the shaft angle (what repeats with the shaft, and nothing else)."""
     angle = np.mod(played.angle_rad, 2 * np.pi)
-    place = np.minimum((angle / (2 * np.pi) * points).astype(np.int64), points - 1)
-    count = np.maximum(np.bincount(place, minlength=points), 1)
-    return {"shaft_angle_rad": ((np.arange(points) + 0.5) * 2 * np.pi / points).tolist()} | {
-        name: (np.bincount(place, values, minlength=points) / count).tolist()
+    place = np.minimum((angle / (2 * np.pi) * POINTS_PER_TURN).astype(np.int64), POINTS_PER_TURN - 1)
+    count = np.maximum(np.bincount(place, minlength=POINTS_PER_TURN), 1)
+    return {"shaft_angle_rad": ((np.arange(POINTS_PER_TURN) + 0.5) * 2 * np.pi / POINTS_PER_TURN).tolist()} | {
+        name: (np.bincount(place, values, minlength=POINTS_PER_TURN) / count).tolist()
         for name, values in (
             ("speed_rad_per_s", played.speed_rad_per_s),
             ("electromagnetic_torque_nm", played.electromagnetic_torque_nm),

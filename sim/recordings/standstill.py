@@ -26,8 +26,6 @@ ACCURACY = 4.0
 """Integration steps are this much finer than the live drive's: the solver's error stays far below the noise."""
 
 Columns = dict[str, np.ndarray]
-UNLISTED = ("voltage_curvature", "sensor_slew", "echo")
-"""Causes that no catalogue names, for data whose right verdict is `unexplained`."""
 
 
 def record(scenario: Scenario, seed: int) -> tuple[Columns, dict[str, Any], dict[str, Any]]:
@@ -98,6 +96,7 @@ def command_voltage(segment: Segment, period_s: float) -> np.ndarray:
 
 
 def _unlisted(scenario: Scenario) -> dict[str, float]:
+    """Causes that no catalogue names (voltage_curvature, sensor_slew, echo), for data whose right verdict is `unexplained`."""
     return scenario.document.get("unlisted", {})
 
 

@@ -220,9 +220,9 @@ class VendorDrive:
         return cell.name == (self.face.tune or {}).get("facts", {}).get("stop", {}).get("item")
 
     def _action(self, address: int, value: int) -> int:
-        if (address, value) in self.face.stores or (address, value) in self.face.enters:
-            self.words |= self.entered
-            self.entered.clear()
+        """A word that stores or enters: what was entered is in use from now on."""
+        self.words |= self.entered
+        self.entered.clear()
         if (address, value) in self.face.stores and not self.is_locked:
             if self.habits.stores:
                 self._keep()

@@ -22,7 +22,6 @@ from commissioner.records import RunningRecording
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis, diagnose
 from commissioner.running.playback import play
-from commissioner.running.rules import RULES
 from commissioner.running.search import Found, Named, Search
 from sim.motoring.machine import Scenario
 from tests.running_effects.cases import SAME_CLASS, Case, elsewhere, taken, true_size
@@ -100,7 +99,7 @@ def _told(found: Found, true: list[str]) -> Fit:
     wanted = [name for name in alike.values() if name in CATALOGUE]
     if sorted(wanted) == sorted(named):
         return found.fit
-    seeking = Search(found.problem, found.nominal, frozenset(), RULES, lambda _: None, lambda: True)
+    seeking = Search(found.problem, found.nominal, frozenset(), lambda _: None, lambda: True)
     needless = {number: 0.0 for one in found.accepted if one.cause not in wanted for number in one.form.numbers}
     best, causes = seeking.fitted(found.fit.machine.with_values(needless), (), found.fit), ()
     for name in wanted:

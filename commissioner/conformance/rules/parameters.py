@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 
 from commissioner.conformance import pdu
@@ -22,7 +23,7 @@ CHANGE = 1.01
 def staged_values_are_held(drive: Drive) -> Steps[None]:
     """Staged values read back bit by bit, and staging alone changes nothing in use."""
     before = yield from _held(drive, "")
-    target = _changed(before, CHANGE)
+    target = _changed(before)
     yield from _stage(drive, target)
     seen = yield from _held(drive, "staged_")
     if seen != target:
@@ -35,7 +36,7 @@ def a_wrong_check_sum_is_refused(drive: Drive) -> Steps[None]:
     """A commit whose check sum misses by one bit ends with result 3 and changes nothing in use."""
     before = yield from _held(drive, "")
     for flipped in (0x0001, 0x8000):
-        yield from _stage(drive, _changed(before, CHANGE), spoil=flipped)
+        yield from _stage(drive, _changed(before), spoil=flipped)
         result = yield from _carried_out(drive, "commit")
         yield from _must_hold(drive, "", before, "a commit with a wrong check sum")
         if result != WRONG_CHECK_SUM:
@@ -48,7 +49,7 @@ def the_check_sum_covers_every_value(drive: Drive) -> Steps[None]:
     before = yield from _held(drive, "")
     for name in _order(drive):
         yield from _stage(drive, before)
-        changed = _changed({name: before[name]}, CHANGE)[name]
+        changed = _changed({name: before[name]})[name]
         yield from pdu.write(drive.item(f"staged_{name}").address, changed)
         result = yield from _carried_out(drive, "commit")
         yield from _must_hold(drive, "", before, f"a commit with another {name} than summed")
@@ -77,7 +78,7 @@ def a_commit_brings_into_use_and_does_not_store(drive: Drive) -> Steps[None]:
     """A right commit ends with result 2; the staged values are in use, the stored ones and their counter unchanged."""
     before, stored = (yield from _held(drive, "")), (yield from _held(drive, "stored_"))
     count = yield from drive.number("store_count")
-    target = _changed(before, CHANGE)
+    target = _changed(before)
     yield from _stage(drive, target)
     result = yield from _carried_out(drive, "commit")
     seen = yield from _held(drive, "")
@@ -99,7 +100,7 @@ def a_commit_brings_into_use_and_does_not_store(drive: Drive) -> Steps[None]:
 def only_the_command_word_commits(drive: Drive) -> Steps[None]:
     """Another word than the command changes nothing in use and stores nothing."""
     before, count = (yield from _held(drive, "")), (yield from drive.number("store_count"))
-    yield from _stage(drive, _changed(before, CHANGE))
+    yield from _stage(drive, _changed(before))
     for name in ("commit", "store"):
         yield from drive.put_words(name, [drive.profile.commands[name] ^ 0x0001])
         yield Wait(0.1)
@@ -113,7 +114,7 @@ def only_the_command_word_commits(drive: Drive) -> Steps[None]:
 def a_store_writes_once(drive: Drive) -> Steps[None]:
     """A store ends with result 2, the memory holds what is in use, and its counter has grown by one."""
     before, count = (yield from _held(drive, "")), (yield from drive.number("store_count"))
-    target = _changed(before, CHANGE)
+    target = _changed(before)
     result, stored, after = yield from _stored(drive, target)
     back, _, _ = yield from _stored(drive, before)
     yield from _must_hold(drive, "stored_", before, "storing the old values again")
@@ -153,13 +154,12 @@ def _must_hold(drive: Drive, prefix: str, wanted: Mapping[str, Words], after: st
         raise Broken(f"after {after} {prefix}{name} is {seen[name]}, wanted {wanted[name]}")
 
 
-def _changed(words: Mapping[str, Words], factor: float) -> dict[str, Words]:
-    """The same floats times `factor`, as words (the wire's unit: no scale in between)."""
-    import struct
+def _changed(words: Mapping[str, Words]) -> dict[str, Words]:
+    """The same floats times `CHANGE`, as words (the wire's unit: no scale in between)."""
 
     def times(pair: Words) -> Words:
         (value,) = struct.unpack(">f", struct.pack(">2H", *pair))
-        return struct.unpack(">2H", struct.pack(">f", value * factor))
+        return struct.unpack(">2H", struct.pack(">f", value * CHANGE))
 
     return {name: times(pair) for name, pair in words.items()}
 

@@ -48,7 +48,6 @@ class Audit:
     step_a: tuple[float, ...] = ()
     holes: tuple[tuple[int, float, int], ...] = ()
     excited_hz: tuple[float, ...] = ()
-    axes_deg: tuple[float, ...] = ()
     refusal: DataRefused | None = None
 
 
@@ -93,7 +92,6 @@ def prepare(recordings: Sequence[StandstillRecording]) -> tuple[Record, Audit]:
         steps,
         tuple(holes),
         tuple(tones),
-        tuple(sorted({s.axis_deg for s in kept})),
         refusal,
     )
 

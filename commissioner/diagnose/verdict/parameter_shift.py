@@ -24,11 +24,6 @@ class ParameterShift:
     with_causes: float
     cause: str
 
-    @property
-    def relative(self) -> float:
-        """How far the four-parameter value is off, as a fraction of the better one."""
-        return self.four_parameters / self.with_causes - 1.0
-
 
 def parameter_shifts(nominal: Fit, extended: Fit, layout: Layout) -> tuple[ParameterShift, ...]:
     """Parameters of slow currents that the accepted causes moved, largest first."""

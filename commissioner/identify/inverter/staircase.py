@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 
 from commissioner.errors import DataRefused
 from commissioner.motor.circuit import Quantity
-from commissioner.motor.nameplate import Nameplate, prior, rated_flux
+from commissioner.motor.nameplate import Nameplate, prior
 from commissioner.motor.space_vector import phase_cosines
 from commissioner.motor.standstill import poles_per_s
 from commissioner.records import Signal, peak
@@ -275,8 +275,3 @@ def _staircase_start(voltage: Signal, current: Signal, largest: float) -> tuple[
     scale = np.array([resistance, top_v, 0.02 * largest, 0.01 * largest])
     lower = np.array([0.0, -np.inf, 1e-5 * largest, -np.inf])
     return start, scale, lower
-
-
-def flux_limit_wb(nameplate: Nameplate, fraction: float) -> float:
-    """`fraction` of the rated stator-flux peak, with the typical resistance while none is measured."""
-    return fraction * rated_flux(nameplate, prior(nameplate).typical.stator_resistance_ohm).stator_peak_wb

@@ -311,10 +311,6 @@ class ParallelObserver:
         low, high = self.prior.lower.as_tuple(), self.prior.upper.as_tuple()
         return InverseGamma(*(float(min(max(v, 0.5 * a), 2.0 * b)) for v, a, b in zip(values, low, high, strict=True)))
 
-    @property
-    def samples(self) -> int:
-        return self._samples
-
     def covariance(self) -> Matrix:
         """(4, 4) of (R_s, R_R, L_sigma, L_M); for the Lyapunov law, which has none, zeros."""
         return _covariance(self.law, self._shell, self._filter, self.sample_period_s)

@@ -60,8 +60,3 @@ class Claim:
         if self._items.profile.has_claim:
             self._items.write({"owner_token": 0})
         self._values = {}
-
-    @property
-    def token(self) -> int:
-        """Ours; 0 where none was put."""
-        return int(str(self._values.get("owner_token", 0)))

@@ -62,8 +62,7 @@ class Watched:
 
     def forget_parameters(self) -> None:
         """They change by our own doing now."""
-        names = self._profile.parameters.order if self._profile.parameters else ()
-        for name in names:
+        for name in self._profile.parameter_names:
             for prefix in ("", "stored_"):
                 self._ours.pop(prefix + name, None)
         self._count = None
@@ -96,7 +95,7 @@ class Watched:
         self._count = None
 
     def _watched_names(self) -> list[str]:
-        parameters = self._profile.parameters.order if self._profile.parameters else ()
+        parameters = self._profile.parameter_names
         names = (*GUARDED, *parameters, *(f"{p}{name}" for p in ("staged_", "stored_") for name in parameters))
         return [name for name in names if name in self._ours and name in self._profile.items]
 

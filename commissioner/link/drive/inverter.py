@@ -33,7 +33,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot
 from commissioner.registers.codec import Value
 from commissioner.registers.convention import drive_values, parameter_limits
-from commissioner.registers.profile import DriveProfile, WindowLayout
+from commissioner.registers.profile import DriveProfile, Watchdog, WindowLayout
 from commissioner.registers.status import DriveState
 from commissioner.registers.tuning import Tuning
 from commissioner.registers.window import (
@@ -116,8 +116,7 @@ class Inverter:
             raise self._no_watchdog(self.profile.unknown.get("watchdog", "the drive file describes none"), time_ms)
         if not watchdog.min_ms <= time_ms <= watchdog.max_ms:
             raise self._no_watchdog(f"{watchdog.min_ms:g} ... {watchdog.max_ms:g} ms", time_ms)
-        unit_ms = 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
-        values: dict[str, Value] = {watchdog.register: time_ms / unit_ms}
+        values: dict[str, Value] = {watchdog.register: time_ms / self._unit_ms(watchdog)}
         self.journal(Intent(Action.PREPARE, values))
         try:
             self._items.write_verified(values, "arm the watchdog")
@@ -288,8 +287,7 @@ class Inverter:
         """What the drive's own supervision of the link is set to."""
         watchdog = self.profile.watchdog
         assert watchdog is not None
-        unit_ms = 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
-        return unit_ms * self._items.read_number(watchdog.register)
+        return self._unit_ms(watchdog) * self._items.read_number(watchdog.register)
 
     def read_kept_samples(self) -> int:
         """How many samples its memory keeps of a session; 0 where its file has no register for it."""
@@ -394,6 +392,10 @@ class Inverter:
         self.profile.require("stream")
         assert self.profile.window is not None
         return self.profile.window
+
+    def _unit_ms(self, watchdog: Watchdog) -> float:
+        """Milliseconds in the unit of its register."""
+        return 1000.0 if self.profile.item(watchdog.register).unit == "s" else 1.0
 
     def _no_watchdog(self, limit: str, time_ms: float) -> CheckFailed:
         return CheckFailed(

@@ -87,6 +87,5 @@ class ParameterSets:
                 )
 
     def _read(self, prefix: str) -> dict[str, float]:
-        order = self.profile.parameters.order if self.profile.parameters else ()
-        names = [prefix + name for name in order]
+        names = [prefix + name for name in self.profile.parameter_names]
         return {name.removeprefix(prefix): number(value) for name, value in self.items.read(names).items()}

@@ -74,7 +74,7 @@ def read_status(items: Items) -> DriveStatus:
 def read_others(items: Items) -> dict[str, Value | RequestRefused]:
     """What the drive file describes beside identity, status, plate and motor parameters, one item at a time; for an item that
     the drive refuses its refusal."""
-    order = items.profile.parameters.order if items.profile.parameters else ()
+    order = items.profile.parameter_names
     asked = {*IDENTITY_ITEMS, *STATUS_ITEMS, "settings_count", *NAMEPLATE_ITEMS, *order}
     out: dict[str, Value | RequestRefused] = {}
     for name in (n for n, item in items.profile.items.items() if "r" in item.access and n not in asked):

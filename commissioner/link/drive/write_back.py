@@ -61,7 +61,7 @@ class WriteBack:
         present = self._check_present(snapshot, snapshot.in_use, snapshot.stored)
         self._check_stopped()
         if store:
-            self._check_endurance(present.store_count, writes=1)
+            self._check_endurance(present.store_count)
         try:
             self._bring(target, store=store, always=always)
             return self._report(target, present, is_stored=store and self._sets.can_store)
@@ -150,9 +150,9 @@ class WriteBack:
                 remedy="remove the cause, reset the fault at the drive, then look at its parameters",
             )  # fmt: skip
 
-    def _check_endurance(self, count: int | None, writes: int) -> None:
+    def _check_endurance(self, count: int | None) -> None:
         store = self._profile.store
-        if count is not None and store and store.endurance_writes and count + writes > store.endurance_writes:
+        if count is not None and store and store.endurance_writes and count + 1 > store.endurance_writes:
             raise CheckFailed(
                 "the drive's parameter memory is worn out",
                 step="store",
@@ -184,7 +184,7 @@ class WriteBack:
         where what is in use will outlast a power-off, as far as the drive file can tell."""
         has_to_store = bool(snapshot.stored) and bool(self._sets.differing(snapshot.stored, self._sets.stored()))
         if has_to_store:
-            self._check_endurance(self._sets.store_count(), writes=1)
+            self._check_endurance(self._sets.store_count())
             self._bring(snapshot.stored, store=True)
         stores_while_writing = not self._sets.group.is_staged and self._sets.can_store
         self._bring(snapshot.in_use, store=stores_while_writing)

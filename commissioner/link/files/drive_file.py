@@ -189,7 +189,6 @@ def _item(name: str, table: ItemTable, link: LinkTable, file: str) -> Item:
     return Item(
         name=name,
         address=address,
-        is_volatile=table.volatile,
         minimum=table.min,
         maximum=table.max,
         word_order=table.word_order or link.word_order,

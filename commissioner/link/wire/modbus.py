@@ -1,7 +1,7 @@
 """The port over pymodbus 3.15: every reply checked, every exception mapped, no write repeated that may have arrived.
 
 A request on a closed connection opens it, once, within `connect_timeout_s`: there is no back-off and no reconnection
-behind the caller's back. What may be believed is decided in `link.trust`.
+behind the caller's back. What may be believed is decided in `link.wire.trust`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from commissioner.errors import CommissionerError, ReplyMismatch, ReplyTimeout, 
 from commissioner.link.wire.clients import SerialClient, make_client
 from commissioner.link.wire.debts import Shape
 from commissioner.link.wire.port import MAY_BE_CARRIED_OUT, LinkStats, Words
-from commissioner.link.wire.trust import MAX_FRAME_CHARACTERS, ConnectionTrust, SerialTrust, Trust
+from commissioner.link.wire.trust import ConnectionTrust, SerialTrust, Trust, longest_frames_s
 from commissioner.link.wire.unopened import unopened
 from commissioner.link.wire.url import DriveUrl, RtuUrl
 from commissioner.registers.profile import DriveProfile
@@ -295,7 +295,7 @@ class ModbusPort:
 
     # --- one transaction ----------------------------------------------------------------------------------------------
     def _transact(self, shape: Shape, what: str, send: Callable[[], ModbusPDU]) -> ModbusPDU:
-        """`shape`: by which the answer would be taken for another's, `link.debts`; the function comes first."""
+        """`shape`: by which the answer would be taken for another's, `link.wire.debts`; the function comes first."""
         self._trust.asked(shape)
         self._client.comm_params.timeout_connect = self.reply_timeout_s
         self.stats.requests += 1
@@ -410,7 +410,7 @@ def open_port(
     """
     said = url.reply_s if url.reply_s is not None else profile.link.reply_s
     reply_timeout_s = reply_timeout_s if said is None else said
-    wire_s = 2 * MAX_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
-    port = ModbusPort(url, profile, reply_timeout_s=reply_timeout_s + wire_s, connect_timeout_s=connect_timeout_s)
+    reply_timeout_s += longest_frames_s(url)
+    port = ModbusPort(url, profile, reply_timeout_s=reply_timeout_s, connect_timeout_s=connect_timeout_s)
     port.connect()
     return port

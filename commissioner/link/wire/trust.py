@@ -2,7 +2,7 @@
 
 Modbus RTU has no transaction number: after one late answer every later request would get its predecessor's. So after
 any doubt a serial line is left to fall silent, drained, and proven with a fresh token before the next request. For
-`WATCH_S` after that, and as long as an answer of the same shape is owed (`link.debts`), an answer counts only when it
+`WATCH_S` after that, and as long as an answer of the same shape is owed (`link.wire.debts`), an answer counts only when it
 was alone on the line and another token came back in step. On TCP doubt costs the connection: a new one carries no old
 answer.
 """
@@ -18,11 +18,16 @@ from commissioner.link.wire.clients import SerialClient, TcpClient, TlsClient
 from commissioner.link.wire.debts import Debts, Shape
 from commissioner.link.wire.port import LinkStats
 from commissioner.link.wire.rtu import SHORTEST_FRAME, find_answers
-from commissioner.link.wire.url import RtuUrl
+from commissioner.link.wire.url import DriveUrl, RtuUrl
 
 MAX_FRAME_CHARACTERS = 256
 WATCH_S = 2.0
 ATTEMPTS = 4
+
+
+def longest_frames_s(url: DriveUrl) -> float:
+    """What a request and an answer of full length take on a serial line; elsewhere they take none."""
+    return 2 * MAX_FRAME_CHARACTERS * url.character_s if isinstance(url, RtuUrl) else 0.0
 
 
 class Trust(Protocol):

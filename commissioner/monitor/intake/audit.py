@@ -17,7 +17,7 @@ from commissioner.monitor.signals.supply import (
     Vector,
     dominant_frequency_hz,
     follow_supply,
-    harmonic_phasor,
+    fundamental_phasor,
     phase_voltages,
     space_vector,
 )
@@ -37,7 +37,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
     findings = [Finding(note.code, "note", note.what) for note in recording.notes]
     recording, exchanged = columns.sort_by_kind(recording, plate)
     recording, completed = columns.complete(recording)
-    findings += [Finding(*entry) for entry in (*exchanged, *completed)]
+    findings += [*exchanged, *completed]
     low, high = clock.whole_stretch(recording, findings)
     period = clock.sample_clock(recording, slice(low, high), findings)
     clock.fast_enough(period, plate, findings)
@@ -59,7 +59,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         recording.voltages_are_line_to_line,
         lag_deg,
     )
-    findings += [Finding(*entry) for entry in pairing.findings]
+    findings += pairing.findings
     if pairing.is_refused:
         return Audited(low, 0.0, period, empty, empty, None, None, tuple(findings), pairing.channel_map)
     straight_i = [sign * currents[k] for k, sign in zip(pairing.current_order, pairing.current_sign, strict=True)]
@@ -125,8 +125,8 @@ def _phasors(
     count = min(currents[0].size, max(int(2.0 / period), int(5 / (frequency_hz * period))))
     angle = 2 * np.pi * frequency_hz * np.arange(count) * period
     return (
-        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
-        [harmonic_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
+        [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in currents],
+        [fundamental_phasor(signal[:count] - signal[:count].mean(), angle) for signal in voltages],
     )
 
 

@@ -30,7 +30,7 @@ MOST_PERIODS = 8
 
 @dataclass(frozen=True)
 class Carrier:
-    """Frequency, share of the power above the slow part that lies at its multiples, and the window of whole periods."""
+    """Mean frequency, how far it is spread beyond its side bands, and the samples in a window of whole periods."""
 
     frequency_hz: float
     spread_hz: float

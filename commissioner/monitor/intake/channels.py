@@ -13,10 +13,10 @@ from itertools import product
 
 import numpy as np
 
+from commissioner.monitor.intake.findings import Finding
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
 
-Entry = tuple[str, str, str, float | str | None, float | str | None, str]
 Order = tuple[int, int, int]
 Sign = tuple[int, int, int]
 Option = tuple[Order, Sign, float]
@@ -37,7 +37,7 @@ THIRD = 2 * np.pi / 3
 
 @dataclass(frozen=True)
 class Pairing:
-    """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity; findings as plain entries."""
+    """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity."""
 
     current_order: Order
     voltage_order: Order
@@ -46,12 +46,12 @@ class Pairing:
     runs_backwards: bool
     lag_deg: float
     rivals_deg: tuple[float, ...]
-    findings: tuple[Entry, ...]
+    findings: tuple[Finding, ...]
     channel_map: Mapping[str, str]
 
     @property
     def is_refused(self) -> bool:
-        return any(kind == "refused" for _, kind, *_ in self.findings)
+        return any(finding.stops for finding in self.findings)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def pair(
     lag_deg: float | None = None,
 ) -> Pairing:
     """The order and polarity of all channels, or findings that refuse; with `lag_deg` the order of that lag."""
-    findings: list[Entry] = []
+    findings: list[Finding] = []
     v, i = read_triple(voltages), read_triple(currents)
     _spacing("voltage", v, SPACING_TOLERANCE_DEG, findings)
     voltage_order, turned = _voltage_order(v.sequence, line_to_line)
@@ -97,7 +97,7 @@ def pair(
     )
     if v.sequence < 0:
         findings.append(
-            (
+            Finding(
                 "phase_order",
                 "corrected",
                 "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
@@ -110,7 +110,7 @@ def pair(
     if v.sign != (1, 1, 1):
         flipped = [name for name, sign in zip("uvw", v.sign, strict=True) if sign < 0]
         findings.append(
-            (
+            Finding(
                 "polarity",
                 "corrected",
                 "voltage channel " + ", ".join(flipped) + " is inverted",
@@ -179,10 +179,10 @@ def _explained_deg(currents: list[complex], star: list[complex], start: TCircuit
     return float(np.degrees(np.arcsin(min(share, 1.0))))
 
 
-def _spacing(name: str, triple: Triple, limit_deg: float, findings: list[Entry]) -> None:
+def _spacing(name: str, triple: Triple, limit_deg: float, findings: list[Finding]) -> None:
     if triple.deviation_deg > limit_deg:
         findings.append(
-            (
+            Finding(
                 "phase_spacing",
                 "refused",
                 f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
@@ -220,7 +220,7 @@ def _choose(
     options: list[Option],
     expected_deg: float,
     backwards: bool,
-    findings: list[Entry],
+    findings: list[Finding],
 ) -> Option:
     """The simplest plausible assignment; refused where none is."""
     plausible = [
@@ -229,7 +229,7 @@ def _choose(
     if not plausible:
         order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))
         findings.append(
-            (
+            Finding(
                 "pairing",
                 "refused",
                 "no order of the current channels makes a motor: the current's lag is "
@@ -248,7 +248,7 @@ def _choose(
     return min(plausible, key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
 
 
-def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: list[Entry]) -> None:
+def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: list[Finding]) -> None:
     """One sentence per kind of mistake."""
     if order != voltage_order or any(s < 0 for s in sign):
         names = ", ".join(
@@ -256,7 +256,7 @@ def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: l
         )
         crossed = order != voltage_order
         findings.append(
-            (
+            Finding(
                 "crossed_channels" if crossed else "polarity",
                 "corrected",
                 (

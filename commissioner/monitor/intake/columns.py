@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from commissioner.monitor.intake.channels import Entry
+from commissioner.monitor.intake.findings import Finding
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
@@ -20,7 +20,7 @@ APART = 2.0
 """Factor between the smallest of one kind and the largest of the other, or the columns stay as they are named."""
 
 
-def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[RunningRecording, list[Entry]]:
+def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[RunningRecording, list[Finding]]:
     """Currents and voltages by their size where the columns as named cannot be what they are named; else as it is.
 
     Absent columns (nothing in them) have no kind: where both groups are exchanged, the hole goes along.
@@ -39,7 +39,7 @@ def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[Running
     for i, v in zip(wrong_i, wrong_v, strict=True):
         signals[i], signals[3 + v] = signals[3 + v], signals[i]
     names = ", ".join(f"current {'uvw'[i]} and voltage {'uvw'[v]}" for i, v in zip(wrong_i, wrong_v, strict=True))
-    entry: Entry = (
+    exchanged = Finding(
         "crossed_channels",
         "corrected",
         f"columns of currents and voltages are exchanged: {names}",
@@ -48,7 +48,7 @@ def sort_by_kind(recording: RunningRecording, plate: Nameplate) -> tuple[Running
         "correct the column names",
     )
     a, b, c, d, e, f = signals
-    return replace(recording, currents_a=(a, b, c), voltages_v=(d, e, f)), [entry]
+    return replace(recording, currents_a=(a, b, c), voltages_v=(d, e, f)), [exchanged]
 
 
 def _is_plausible(size: Signal, voltages: tuple[int, ...], plate: Nameplate) -> bool:
@@ -74,18 +74,18 @@ def _is_computed(group: list[Signal], kind: str, line_to_line: bool) -> bool:
     return (kind == "current" or line_to_line) and is_negative_sum(group[0], group[1], group[2])
 
 
-def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]]:
+def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Finding]]:
     """A recording of two currents, or of two line-to-line voltages, with the third as minus their sum; else as it is.
 
     Without a neutral the three sum to zero. A phase voltage's missing third is not known: the star point may move.
     """
-    entries: list[Entry] = []
+    findings: list[Finding] = []
     groups = [list(recording.currents_a), list(recording.voltages_v)]
     for group, kind in zip(groups, ("current", "voltage"), strict=True):
         if is_computed := _is_computed(group, kind, recording.voltages_are_line_to_line):
             group[2] = -(group[0] + group[1])
-            entries.append(
-                (
+            findings.append(
+                Finding(
                     f"computed_{kind}",
                     "note",
                     f"third {kind} computed from two: not used as a sensor. Which of the three was computed cannot be told from the sum: the "
@@ -100,10 +100,9 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]
             continue
         k = absent[0]
         group[k] = -(group[k - 1] + group[k - 2])
-        name = f"third_{kind}"
-        entries.append(
-            (
-                name,
+        findings.append(
+            Finding(
+                f"third_{kind}",
                 "corrected",
                 f"one {kind} was not recorded: taken as minus the sum of the other two",
                 k + 1,
@@ -112,4 +111,4 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Entry]
             )
         )
     i, v = groups
-    return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), entries
+    return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), findings

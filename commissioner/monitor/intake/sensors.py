@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commissioner.monitor.signals.supply import SupplyAngle, Vector, harmonic_phasor
+from commissioner.monitor.signals.supply import SupplyAngle, Vector, fundamental_phasor
 from commissioner.records import Signal
 
 GAIN_STD = 0.005
@@ -64,7 +64,7 @@ def evened(group: Sequence[Signal], sums_to_zero: bool, supply: SupplyAngle, per
     if np.ptp(total) < 1e-9 * np.ptp(group[0]):
         return unknown
     angle = supply.angle_rad(np.arange(group[0].size) * period_s)
-    own = np.array([harmonic_phasor(signal - signal.mean(), angle) for signal in group])
+    own = np.array([fundamental_phasor(signal - signal.mean(), angle) for signal in group])
     share = float(abs(own.sum()) / max(np.abs(own).sum(), 1e-12))
     if not sums_to_zero or share > LARGEST_ASYMMETRY:
         return replace(unknown, unlike=share, odd=_odd_one(own) if sums_to_zero and share > OPEN_SUM else None)

@@ -64,10 +64,10 @@ def flux_lines(
     return FluxLines(stator, rotor, 1j * rate_rad_per_s * rotor + circuit.rotor_resistance_ohm * rotor_current)
 
 
-def torus(lines: Lines, points_per_comb: int = 8) -> Torus:
-    """Instants enough for `points_per_comb` times the lines; one comb: one period, several: a golden lattice."""
+def torus(lines: Lines) -> Torus:
+    """Instants enough for eight times the lines; one comb: one period, several: a golden lattice."""
     combs = sorted({int(p) for p in lines.comb} - {-1})
-    count = max(64, points_per_comb * lines.comb.size)
+    count = max(64, 8 * lines.comb.size)
     place = np.arange(count)
     if len(combs) <= 1:
         phases = dict.fromkeys(combs, 2 * np.pi * place / count)

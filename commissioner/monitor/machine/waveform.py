@@ -15,15 +15,12 @@ from commissioner.monitor.machine.fit import Fitted, Problem, circuit_at, steps
 from commissioner.monitor.machine.inversion import (
     RotorState,
     SpeedLines,
-    Torus,
     basis_of,
     complex_speed,
     rotor_state,
     speed_noise,
-    speed_on,
     torque_of,
 )
-from commissioner.monitor.signals.averaging import Lines
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.running import TCircuit
 from commissioner.records import Signal
@@ -207,6 +204,3 @@ def mean_torque_nm(problem: Problem, solved: Solved) -> tuple[float, float, floa
     moved = [mean(circuit, flux, current) - value for circuit, _, flux, current in solved.changes]
     sensors = moved[len(moved) - solved.sensor_changes :]
     return value, float(np.sqrt(np.sum(np.square(moved)))), float(np.sqrt(np.sum(np.square(sensors))))
-
-
-__all__ = ["Lines", "Solved", "Torus", "Waveform", "evaluate", "mean_torque_nm", "solve", "speed_on"]

@@ -25,8 +25,8 @@ SAME_LEVEL, SAME_LEVEL_OF_APPARENT = 0.02, 0.004
 SAME_VARIATION = 1.3
 
 
-def quietest(frame: TurningFrame, length_s: float = SEGMENT_S) -> slice:
-    """The stretch of `length_s` with the least rms variation of instantaneous power, grown while it stays as quiet.
+def quietest(frame: TurningFrame) -> slice:
+    """The stretch of `SEGMENT_S` with the least rms variation of instantaneous power, grown while it stays as quiet.
 
     Where the power's level moves in it, the longest shorter stretch (`SHORTER`) in which it does not. It grows second by second
     on either side while the level stays and the variation is within `SAME_VARIATION`, up to `LONGEST_SEGMENT_S`.
@@ -36,7 +36,7 @@ def quietest(frame: TurningFrame, length_s: float = SEGMENT_S) -> slice:
     level = _level(power, hop)
     apparent = 1.5 * abs(np.mean(frame.voltage_v)) * float(np.mean(np.abs(frame.current_a)))
     allowed = float(SAME_LEVEL * np.mean(np.abs(power)) + SAME_LEVEL_OF_APPARENT * apparent)
-    first, count = _steady(power, level, hop, min(int(length_s / frame.sample_period_s), power.size), allowed, frame)
+    first, count = _steady(power, level, hop, min(int(SEGMENT_S / frame.sample_period_s), power.size), allowed, frame)
     spread = float(power[first : first + count].std())
     inside = level[first // hop : (first + count) // hop]
     middle = float(np.median(inside)) if inside.size else 0.0

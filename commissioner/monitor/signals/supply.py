@@ -20,9 +20,9 @@ Vector = NDArray[np.complex128]
 Instants = NDArray[np.floating[Any]]
 
 KNOT_SPACING_S = 1.5
+"""Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 LEAST_SAMPLES = 64
 """For a first look at the supply, however far the samples are apart."""
-"""Slower than any load modulation the method resolves, faster than a grid's frequency wander."""
 BAND_IN_SUPPLY_FREQUENCIES = 14.0
 """Kept either side of the supply frequency: shaft harmonics up to 28 of a four-pole motor, supply lines up to 13."""
 
@@ -110,10 +110,10 @@ def follow_supply(voltage: Vector, sample_period_s: float, frequency_hz: float) 
     return SupplyAngle(carrier, make_lsq_spline(centre, phase, knots, k=order))
 
 
-def harmonic_phasor(signal: Instants, angle_rad: Instants, order: int = 1) -> complex:
-    """Complex amplitude of the line `order` of a real signal, over a Hann window (leakage of neighbours below 1e-4)."""
+def fundamental_phasor(signal: Instants, angle_rad: Instants) -> complex:
+    """Complex amplitude of the line at the angle's own rate in a real signal, over a Hann window (leakage of neighbours below 1e-4)."""
     window = np.hanning(signal.size + 2)[1:-1]
-    return complex(2.0 * np.sum(window * signal * np.exp(-1j * order * angle_rad)) / window.sum())
+    return complex(2.0 * np.sum(window * signal * np.exp(-1j * angle_rad)) / window.sum())
 
 
 def resample_band(vector: Vector, sample_period_s: float, band_hz: float) -> tuple[Vector, float]:

@@ -66,7 +66,7 @@ def refine(demodulated: Demodulated, half_range_hz: float) -> tuple[float, float
 
 
 def _parabola_peak(demodulated: Demodulated, centre: Signal, low: float, high: float) -> float:
-    """Three golden-section-like shrinkings, then a parabola: the peak is smooth on this scale."""
+    """Four golden-section-like shrinkings, then a parabola: the peak is smooth on this scale."""
     for _ in range(4):
         grid = np.linspace(low, high, 7)
         power = [captured(demodulated, 2 * np.pi * shift * centre) for shift in grid]

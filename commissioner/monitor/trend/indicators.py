@@ -67,7 +67,7 @@ def pulses(observation: Observation) -> Pulses | None:
         return None
     start = _trough(value, count)
     made = [_compare(curve, count, start) for curve in curves]
-    noise = _noise_count(observation)
+    noise = int(observation.lines.current_influence.shape[0])
     chance = _chance(observation, value)
     area = np.array([area for _, area, _ in made])
     shape = np.array([shape for _, _, shape in made])
@@ -79,10 +79,6 @@ def pulses(observation: Observation) -> Pulses | None:
         Quantity(float(area[0]), _spread(area)),
         float(np.hypot(_spread(area[: noise + 1]), chance / np.sqrt(count))),
     )
-
-
-def _noise_count(observation: Observation) -> int:
-    return int(observation.lines.current_influence.shape[0])
 
 
 def _chance(observation: Observation, torque: Signal) -> float:

@@ -7,7 +7,7 @@ each recording claims, so that three recordings do not pretend to know what thir
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -76,9 +76,12 @@ class Verdict:
     compared_with: int
     watched: tuple[Watched, ...] = ()
     left_out_alarms: int = 0
-    false_alarm: float = FALSE_ALARM
     other_operating_points: int = 0
-    names: tuple[str, ...] = field(default=())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the indicators that alarm."""
+        return tuple(w.name for w in self.watched if w.alarms)
 
 
 def judge(entry: Entry, history: History) -> Verdict:
@@ -92,9 +95,7 @@ def judge(entry: Entry, history: History) -> Verdict:
         any(w.alarms for w in compare(healthy, [*alike[:k], *alike[k + 1 :]])) for k, healthy in enumerate(alike)
     )
     state = State.ALARM if any(w.alarms for w in watched) else State.NORMAL
-    return Verdict(
-        state, len(alike), watched, left_out, FALSE_ALARM, elsewhere, tuple(w.name for w in watched if w.alarms)
-    )
+    return Verdict(state, len(alike), watched, left_out, elsewhere)
 
 
 def is_same_point(one: Entry, other: Entry) -> bool:

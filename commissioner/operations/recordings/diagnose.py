@@ -120,7 +120,7 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     if is_computed and (seen.verdict.value == "unexplained" or len(seen.causes) > 1):
         seen, said = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
         remarks = [*said, *remarks]
-    document = as_document(seen, None)
+    document = as_document(seen)
     decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
     remarks = [*decided, *remarks]
     document["audit"] = [*remarks, *copies, *document["audit"]]

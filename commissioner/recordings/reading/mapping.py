@@ -40,7 +40,6 @@ class ChannelMap:
 
     columns: Mapping[str, Target] = field(default_factory=dict)
     metadata: Mapping[str, float | str] = field(default_factory=dict)
-    source: str = ""
 
 
 def read_mapping(path: Path) -> ChannelMap:
@@ -58,7 +57,7 @@ def read_mapping(path: Path) -> ChannelMap:
             )
     columns = {name: _target(str(path), name, text) for name, text in raw.get("columns", {}).items()}
     metadata = {k: _plain(str(path), k, v) for k, v in raw.get("metadata", {}).items()}
-    return ChannelMap(columns, metadata, str(path))
+    return ChannelMap(columns, metadata)
 
 
 def _plain(file: str, name: str, value: object) -> float | str:

@@ -9,9 +9,10 @@ from commissioner.diagnose.verdict.collinearity import Alike
 from commissioner.diagnose.verdict.residuals import Residuals
 from commissioner.report.diagnosis import figures
 from commissioner.report.diagnosis.names import class_name, spoken
-from commissioner.report.diagnosis.words import Document, first_capital
+from commissioner.report.diagnosis.words import Document
 from commissioner.report.folded import folded
 from commissioner.report.page import Picture, Section, picture
+from commissioner.report.sheet.marks import capitalised
 
 
 def where(document: Document, left: Residuals, has_causes: bool) -> Section:
@@ -81,7 +82,7 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
         *_levels(document),
     ]
     shown = [
-        f"{first_capital(class_name(c))}: {CATALOGUE[c['name']].signature}. Source: {CATALOGUE[c['name']].source}."
+        f"{capitalised(class_name(c))}: {CATALOGUE[c['name']].signature}. Source: {CATALOGUE[c['name']].source}."
         for c in document["causes"]
     ]
     never = "; ".join(s.replace(" | ", ", or ") for s in document["cannot_tell"])

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-INTERVAL = 1.96
-"""Standard errors on each side that hold the true value in 95 % of cases (normal distribution)."""
+from commissioner.report.sheet.numbers import QUANTILE
+
 PLUS_MINUS = "± holds the true value in 19 of 20 cases."
 PLAIN_NUMBERS = frozenset({"exponent", "samples", "without_gap_in_time"})
 UNITS = {"us": "µs", "ohm": "Ω", "1/min": "per minute"}
@@ -55,7 +55,7 @@ def with_spread(value: float, std: float | None, unit: str) -> str:
     tail = f" {UNITS.get(unit, unit)}" if unit else ""
     if not std or not math.isfinite(std):
         return f"{number(value)}{tail}"
-    spread = INTERVAL * std
+    spread = QUANTILE * std
     places = min(1 - math.floor(math.log10(spread)), 8)
     if max(abs(value), spread) < 1e-4 or abs(value) >= 1e6 or places > 6:
         return f"{value:.3g} ± {spread:.2g}{tail}"

@@ -20,17 +20,14 @@ from commissioner.report.diagnosis.words import (
     remarks,
     tone,
 )
-from commissioner.report.folded import coded, hinted
-from commissioner.report.page import Section, Table, Tone
+from commissioner.report.folded import hinted
+from commissioner.report.page import MACHINE, Section, Table, Tone
+from commissioner.report.sheet.marks import coded
 
 SURE = 0.8
 """Names below this probability are marked."""
 NAMES = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
-    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
-    ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
-    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
+    *MACHINE,
     ("stator_inductance_h", "stator inductance L_s", 1e3, "mH"),
     ("total_resistance_ohm", "total resistance", 1.0, "Ω"),
     ("loss_at_highest_voltage_w", "loss at the highest voltage", 1.0, "W"),

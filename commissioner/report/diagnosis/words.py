@@ -21,6 +21,7 @@ from commissioner.report.diagnosis.names import (
 )
 from commissioner.report.diagnosis.numbers import number, percent
 from commissioner.report.page import Tone
+from commissioner.report.sheet.marks import capitalised
 
 Document = Mapping[str, Any]
 UNFINISHED, HIDDEN = "The time allowed was over", "Helps the fit, but"
@@ -151,12 +152,7 @@ def _left_over(document: Document) -> str:
 
 def of_cause(cause: Cause) -> str:
     """What one cause means for the motor, after its name."""
-    return f"{first_capital(class_name(cause))}: {plain_of(cause).motor}"
-
-
-def first_capital(text: str) -> str:
-    """`DC link sag` stays, `dead time` becomes `Dead time`."""
-    return text[:1].upper() + text[1:]
+    return f"{capitalised(class_name(cause))}: {plain_of(cause).motor}"
 
 
 def _of_points(document: Document) -> str:

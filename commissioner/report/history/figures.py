@@ -9,6 +9,7 @@ import numpy as np
 
 from commissioner.history.motor import Trend, Trends
 from commissioner.report.page import BLUE, INK, MUTED, ORANGE, PLOT_STYLE, RED
+from commissioner.report.sheet.numbers import QUANTILE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,8 +18,6 @@ LABELS = {
     "stator_resistance_ohm": ("R_s / Ω", 1.0), "rotor_resistance_ohm": ("R_R / Ω", 1.0),
     "leakage_inductance_h": ("L_σ / mH", 1e3), "magnetizing_inductance_h": ("L_M / mH", 1e3),
 }  # fmt: skip
-INTERVAL = 1.96
-"""Standard errors of a 95 % interval."""
 
 
 def over_years(title: str, found: Trends) -> Figure:
@@ -51,7 +50,7 @@ def _panel(panel: Any, trend: Trend) -> None:
     time = np.array([point.time_s for point in trend.points])
     shown: Any = (time * 1e6).astype("datetime64[us]") if has_dates else time
     value = factor * np.array([point.value for point in trend.points])
-    error = INTERVAL * factor * np.array([point.std for point in trend.points])
+    error = QUANTILE * factor * np.array([point.std for point in trend.points])
     edges = [
         0,
         *(k for k, point in enumerate(trend.points) if any(step.run == point.run for step in trend.steps)),

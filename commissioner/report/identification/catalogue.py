@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from commissioner.report.page import Page, Section, Table
-from commissioner.report.sheet.numbers import digits
+from commissioner.report.sheet.numbers import QUANTILE, digits
 
-INTERVAL = 1.96
 NAMES = (
     ("stator_resistance_ohm", "stator resistance R_s, warm", 1.0, "Ω"), ("rotor_resistance_ohm", "rotor resistance R_R at rated slip", 1.0, "Ω"),
     ("leakage_inductance_h", "leakage inductance L_σ", 1e3, "mH"), ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
@@ -58,5 +57,5 @@ def catalogue_page(document: Mapping[str, Any], name: str) -> Page:
 def _row(label: str, q: Mapping[str, Any], factor: float, unit: str) -> tuple[str, ...]:
     value, parts = q["value"], q["from"]
     shares = (f"{parts[k] / value:.1%}" for k in ("rounding", "assumptions", "tolerances"))
-    half = (f"{digits(INTERVAL * factor * q[k], 2)} {unit}" for k in ("std", "std_of_type"))
+    half = (f"{digits(QUANTILE * factor * q[k], 2)} {unit}" for k in ("std", "std_of_type"))
     return label, f"{digits(factor * value, 4)} {unit}", *half, *shares

@@ -12,26 +12,21 @@ from commissioner.monitor.periods.periods import SIGNIFICANT, VISIBLE
 from commissioner.monitor.trend.indicators import Indicator, Pulses
 from commissioner.monitor.trend.trend import History, Verdict
 from commissioner.records import RPM, Signal
-from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PLOT_STYLE, PURPLE, RED
+from commissioner.report.page import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, RED, RULE, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED, INK)
-MOST_POINTS = 1500
+MOST_POINTS, MOST_LINES = 1500, 2500
 MOST_NAMED = 12
 
 
 def _panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Figure, Any]:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure as Canvas
-
-    with mpl.rc_context(PLOT_STYLE):
-        figure = Canvas(figsize=(9.2, height), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False, **options)
-    for panel in panels.flat:
-        panel.grid(True, color="#d8dde5", linewidth=0.6)
-    return figure, panels
+    figure, drawn = figure_of(rows, columns, height, **options)
+    for panel in drawn.flat:
+        panel.grid(True, color=RULE, linewidth=0.6)
+    return figure, drawn
 
 
 def _thin(*signals: Signal) -> tuple[Signal, ...]:
@@ -148,9 +143,9 @@ def spectrum(seen: Observation) -> Figure:
     return figure
 
 
-def _envelope(x: Signal, y: Signal, points: int = 2500) -> tuple[Signal, Signal]:
+def _envelope(x: Signal, y: Signal) -> tuple[Signal, Signal]:
     """The largest of each group of points, so that narrow lines survive."""
-    step = max(1, x.size // points)
+    step = max(1, x.size // MOST_LINES)
     count = x.size // step
     return x[: count * step : step], y[: count * step].reshape(count, step).max(axis=1)
 

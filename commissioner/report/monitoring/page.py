@@ -9,7 +9,7 @@ from commissioner.monitor.chain import Observation
 from commissioner.monitor.intake.findings import miswired
 from commissioner.monitor.result import why_no_load_torque
 from commissioner.monitor.trend.indicators import Indicator, Pulses
-from commissioner.monitor.trend.trend import History, Verdict
+from commissioner.monitor.trend.trend import FALSE_ALARM, History, Verdict
 from commissioner.records import RPM
 from commissioner.report import band
 from commissioner.report.monitoring import figures
@@ -205,7 +205,7 @@ def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) 
     note = (
         f"{verdict.compared_with} healthy recordings at this operating point, {verdict.other_operating_points} at others. "
         f"{verdict.left_out_alarms} of them would alarm against the rest; the threshold is set for one false alarm in "
-        f"{1 / verdict.false_alarm:,.0f} recordings and indicator."
+        f"{1 / FALSE_ALARM:,.0f} recordings and indicator."
     )
     return Section(
         "Against this machine's past",

@@ -122,7 +122,7 @@ def _event(line: Record) -> tuple[Text, ...]:
         told = _TOLD[line["kind"]](line["record"])
     except (KeyError, TypeError, IndexError):  # of an older archive, or damaged
         told = str(line["kind"]).replace("_", " ")
-    return str(line["utc"])[11:23], f"{told[:1].upper()}{told[1:]}"
+    return str(line["utc"])[11:23], marks.capitalised(told)
 
 
 def _on_axis(record: Record) -> str:
@@ -221,7 +221,7 @@ def uncertainty(subject: Subject) -> Markup:
         parts.append(marks.paragraph("Each test at the flux that it reached itself.", kind="small"))
     remarks = [*finding_sentences(subject.result), *(str(remark) for remark in subject.result.get("remarks") or ())]
     if remarks:
-        lines = Markup("").join(Markup("<li>{}</li>").format(f"{r[:1].upper()}{r[1:]}.") for r in remarks)
+        lines = Markup("").join(Markup("<li>{}</li>").format(f"{marks.capitalised(r)}.") for r in remarks)
         parts.append(Markup('<h3>Remarks of the estimator</h3><ul class="lines">{}</ul>').format(lines))
     return Markup("\n").join(parts)
 

@@ -451,7 +451,7 @@ def _bold(value: object) -> Markup:
 def sentence(text: str) -> str:
     """Begun with a capital, ended with a mark."""
     text = text.strip()
-    return f"{text[:1].upper()}{text[1:]}" + ("" if text.endswith((".", "!", "?")) else ".")
+    return marks.capitalised(text) + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def _counted(number: int) -> str:

@@ -61,9 +61,6 @@ def plain_simulation(subject: Subject) -> Markup:
 
 
 _FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
-
-
-_FINISH = "`commissioner diagnose` on the run’s recording.parquet finishes it."
 _REST = (
     "The result on page 1 does not rest on this: the run measured the inverter’s loss, the delay and the iron itself."
 )
@@ -75,7 +72,7 @@ def _lead(diagnosis: Record) -> Text:
     gain = diagnosis.get("gain") or {}
     before, after, noise = (gain.get(key) for key in ("rmse_before_a", "rmse_after_a", "noise_floor_a"))
     if not (before and after):
-        return f"{diagnosis['reason'][:1].upper()}{diagnosis['reason'][1:]}. {_REST}"
+        return f"{marks.capitalised(diagnosis['reason'])}. {_REST}"
     number = len(diagnosis["causes"])
     added = f"with {number} cause{'s' if number != 1 else ''} added, by {digits(1e3 * after, 3)} mA"
     of_noise = f", and the sensors’ noise is {digits(1e3 * noise, 3)} mA" if noise else ""
@@ -160,7 +157,7 @@ def _cannot_tell(diagnosis: Record) -> Markup:
     if not lines:
         return Markup("")
     items = Markup("").join(
-        Markup("<li>{}</li>").format(f"{line[:1].upper()}{line[1:]}".replace(" | ", ", ")) for line in lines
+        Markup("<li>{}</li>").format(marks.capitalised(line).replace(" | ", ", ")) for line in lines
     )
     return marks.section("What these data cannot tell", Markup('<ul class="lines">{}</ul>').format(items), level=3)
 
@@ -216,8 +213,7 @@ def _limits(diagnosis: Record) -> Markup | None:
         size = next(iter(limit.values())) if limit and isinstance(next(iter(limit.values())), dict) else limit
         if {"value", "unit"} <= set(size):
             factor, unit = _scale(size["value"], str(size["unit"]))
-            words = _words(name)
-            shown = (f"{words[:1].upper()}{words[1:]}", digits(factor * size["value"], 2), unit)
+            shown = (marks.capitalised(_words(name)), digits(factor * size["value"], 2), unit)
             rows.append(Markup("<div><dt>{}</dt><dd>{} {}</dd></div>").format(*shown))
     if not rows:
         return None

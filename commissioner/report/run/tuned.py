@@ -70,4 +70,4 @@ def _row(row: Record) -> tuple[Text, ...]:
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{marks.capitalised(text)}."

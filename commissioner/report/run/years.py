@@ -34,10 +34,7 @@ def years_sheet(years: Trends | None) -> Markup:
         [
             marks.figure("The motor over the years", marks.multiples(panels, 2), caption),
             marks.table(_COLUMNS, [_row(trend, q) for trend, q in _shown(years)]),
-            *(
-                marks.paragraph(f"{said[:1].upper()}{said[1:]}.")
-                for said in (*years.sentences, *years.common.sentences)
-            ),
+            *(marks.paragraph(f"{marks.capitalised(said)}.") for said in (*years.sentences, *years.common.sentences)),
         ]
     )
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from commissioner.estimation.fit import residuals, simulate
 from commissioner.estimation.record import STATES
-from commissioner.report.page import BLUE, GREEN, MUTED, ORANGE, PLOT_STYLE, RED
+from commissioner.report.page import BLUE, GREEN, MUTED, ORANGE, RED, figure_of
 from commissioner.running.search import Found
 
 if TYPE_CHECKING:
@@ -18,20 +18,9 @@ SHOWN_S = 0.16
 BAND_S = 0.02
 
 
-def panels(rows: int, columns: int, height: float) -> tuple[Figure, Any]:
-    """Axes in the pages' style, `(rows, columns)`."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure as Canvas
-
-    with mpl.rc_context(PLOT_STYLE):
-        figure = Canvas(figsize=(9.2, height), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False)
-    return figure, panels
-
-
 def over_each_other(found: Found) -> Figure:
     """Phase u: the first periods and the last ones, measured, plain simulation, extended one; below, what each leaves."""
-    figure, drawn = panels(2, 2, 5.2)
+    figure, drawn = figure_of(2, 2, 5.2)
     window = found.problem.record.windows[0]
     plain, extended = (simulate(found.problem, m)[0][0][:, 0] for m in (found.nominal.machine, found.fit.machine))
     count = round(SHOWN_S / found.problem.period)
@@ -53,7 +42,7 @@ def over_each_other(found: Found) -> Figure:
 
 def over_time(found: Found) -> Figure:
     """Residual over noise in blocks of 20 ms, before and after; states shaded, the held-out part marked."""
-    figure, drawn = panels(1, 1, 3.0)
+    figure, drawn = figure_of(1, 1, 3.0)
     panel = drawn[0, 0]
     window, until = found.problem.record.windows[0], found.problem.until[0]
     block = max(round(BAND_S / found.problem.period), 4)
@@ -87,7 +76,7 @@ def over_time(found: Found) -> Figure:
 
 def over_frequency(found: Found) -> Figure:
     """Spectrum of the whitened residual vector, negative sequence left, before and after."""
-    figure, drawn = panels(1, 1, 3.0)
+    figure, drawn = figure_of(1, 1, 3.0)
     panel = drawn[0, 0]
     for machine, colour, label in (
         (found.nominal.machine, ORANGE, "plain simulation"),

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from commissioner.estimation.fit import problem_of, simulate
 from commissioner.records import RPM
-from commissioner.report.page import BLUE, MUTED, Page, Section, Table, picture
-from commissioner.report.running.figures import SHOWN_S, panels
+from commissioner.report.page import BLUE, MUTED, Page, Section, Table, figure_of, picture
+from commissioner.report.running.figures import SHOWN_S
 from commissioner.report.running.page import NAMES
-from commissioner.report.running.words import INTERVAL, Document, number
+from commissioner.report.running.words import Document, number
+from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.identification import Identified
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def page_of(seen: Identified, document: Document, name: str) -> Page:
 def _row(label: str, measured: Any, factor: float, unit: str) -> tuple[str, str, str]:
     if measured is None:
         return label, "not in these data", ""
-    half = INTERVAL * factor * measured["std"] if measured["std"] else None
+    half = QUANTILE * factor * measured["std"] if measured["std"] else None
     return label, f"{number(factor * measured['value'], 4)} {unit}", f"± {number(half, 2)} {unit}" if half else "–"
 
 
@@ -54,7 +55,7 @@ def _drawn(seen: Identified) -> Figure:
     problem = problem_of(seen.record, 0.0)
     window, (current, shaft) = problem.record.windows[0], simulate(problem, seen.fit.machine)[0]
     count = min(round(SHOWN_S / problem.period), window.count)
-    figure, drawn = panels(3, 2, 6.4)
+    figure, drawn = figure_of(3, 2, 6.4)
     for column, part in enumerate((slice(0, count), slice(window.count - count, window.count))):
         time, measured = window.time_s[part], window.current[part, 0]
         drawn[0, column].plot(time, measured, color=MUTED, linewidth=2.2, label="measured")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from commissioner.report.page import Page, Section, Table, Tone, picture
+from commissioner.report.page import MACHINE, Page, Section, Table, Tone, picture
 from commissioner.report.running import figures
 from commissioner.report.running.words import (
     Document,
@@ -18,15 +18,12 @@ from commissioner.report.running.words import (
     spoken,
     tone,
 )
+from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 from commissioner.running.diagnosis import Diagnosis
 
 NAMES = (
-    ("stator_resistance_ohm", "stator resistance R_s", 1.0, "Ω"),
-    ("rotor_resistance_ohm", "rotor resistance R_R", 1.0, "Ω"),
-    ("leakage_inductance_h", "leakage inductance L_sigma", 1e3, "mH"),
-    ("magnetizing_inductance_h", "magnetizing inductance L_M", 1e3, "mH"),
-    ("rotor_time_constant_s", "rotor time constant", 1.0, "s"),
+    *MACHINE,
     ("inertia_kg_m2", "inertia", 1.0, "kg m²"),
 )
 
@@ -155,7 +152,7 @@ def _parameters(document: Document) -> Section:
         before, after = document["parameters_before"].get(key), document["parameters_after"].get(key)
         if before and after:
             values = [
-                f"{number(x['value'] * scale, 4)} ± {number(1.96 * x['std'] * scale, 2)} {unit}"
+                f"{number(x['value'] * scale, 4)} ± {number(QUANTILE * x['std'] * scale, 2)} {unit}"
                 for x in (before, after)
             ]
             rows.append((title, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from commissioner.report.page import Tone
+from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 
 Document = Mapping[str, Any]
-INTERVAL = 1.96
 UNITS = {"us": "µs", "ohm": "Ω"}
 
 
@@ -27,8 +28,6 @@ def number(value: float, digits: int = 3) -> str:
     """So many significant digits without an exponent where that is readable."""
     if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits}g}"
-    import math
-
     places = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     return f"{round(value, places):.{places}f}"
 
@@ -39,7 +38,7 @@ def quantity(entry: Mapping[str, Any], *, short: bool = False) -> str:
     factor, tail = (100.0, " %") if unit == "" else (1.0, f" {UNITS.get(unit, unit)}")
     if short or not std:
         return f"{number(value * factor)}{tail}"
-    return f"{number(value * factor)} ± {number(INTERVAL * std * factor, 2)}{tail}"
+    return f"{number(value * factor)} ± {number(QUANTILE * std * factor, 2)}{tail}"
 
 
 def main_size(cause: Mapping[str, Any]) -> str:

@@ -124,10 +124,10 @@ class Panel:
         )
         return self
 
-    def area(self, x: Range, kind: str = "none") -> Panel:
+    def area(self, x: Range) -> Panel:
         """The whole height between two places."""
         a, b = sorted(self.at_x(min(max(v, self.x[0]), self.x[1])) for v in x)
-        return self.path(kind, f"M{a:.2f} {self.top:g}H{b:.2f}V{self.height - self.bottom:g}H{a:.2f}Z")
+        return self.path("none", f"M{a:.2f} {self.top:g}H{b:.2f}V{self.height - self.bottom:g}H{a:.2f}Z")
 
     def named(self, x: float, y: float, text: str, kind: str = "k", anchor: str = "start") -> Panel:
         """A text at a place of the scale."""

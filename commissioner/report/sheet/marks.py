@@ -44,6 +44,11 @@ class Column:
     label: str = ""
 
 
+def capitalised(text: str) -> str:
+    """Begun with a capital: `DC link sag` stays, `dead time` becomes `Dead time`."""
+    return text[:1].upper() + text[1:]
+
+
 def coded(text: str) -> Markup:
     """What stands between back quotes is set as a command or a key."""
     parts = text.split("`")

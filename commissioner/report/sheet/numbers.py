@@ -58,9 +58,9 @@ def signed(value: float, count: int = 3) -> str:
     return text if value < 0.0 else f"+{text}"
 
 
-def percent(share: float, count: int = 2) -> str:
+def percent(share: float) -> str:
     """A share of one as per cent."""
-    return f"{digits(100.0 * share, count)} %"
+    return f"{digits(100.0 * share, 2)} %"
 
 
 def held(value: float) -> str:

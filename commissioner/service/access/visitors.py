@@ -5,14 +5,16 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from fastapi import Depends
 from starlette.requests import HTTPConnection, Request
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import SAFE
 from commissioner.service.access.sessions import Session
 from commissioner.service.problems import Refusal
+from commissioner.service.runs.control import Party
 
 if TYPE_CHECKING:
     from commissioner.service.parts import Parts
@@ -30,6 +32,11 @@ class Visitor:
     role: Role | None
     address: str
     session: Session | None
+
+    @property
+    def party(self) -> Party:
+        """As who can hold control of a drive."""
+        return Party(self.session.id if self.session else "", self.person)
 
     def may(self, role: Role) -> bool:
         return self.role is not None and self.role >= role
@@ -69,6 +76,12 @@ def require(role: Role) -> Callable[[Request], Visitor]:
         return who
 
     return visitor
+
+
+Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
+Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
+Administrator = Annotated[Visitor, Depends(require(Role.ADMINISTRATOR))]
+"""Who may call a route of the API."""
 
 
 def check_role(who: Visitor, role: Role) -> None:

@@ -12,7 +12,7 @@ from commissioner.service.library import Drive
 from commissioner.service.page.texts import NBSP, Texts
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.control import Control, Party
+from commissioner.service.runs.control import Control
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.watch import Seen
 
@@ -61,7 +61,7 @@ PARTS = {"levels": "DC levels", "look": "first look", "tones": "five tones", "bi
 def band_of(parts: Parts, who: Visitor, place: Place, t: Texts) -> Band:
     """The band of a page, now. A page that shows a drive wants to know of it: its watch goes on."""
     run = _run_of(parts, place)
-    drive = _drive_of(parts, place.drive or (run.drive if run else ""))
+    drive = parts.library.known_drive(place.drive or (run.drive if run else ""))
     live = run if run is not None and not run.is_over and not run.has_freed_drive else None
     seen = Seen()
     if drive is not None and drive.url and live is None:
@@ -85,7 +85,7 @@ def band_of(parts: Parts, who: Visitor, place: Place, t: Texts) -> Band:
         run.id if run else "",
         run.feed.state.phase if run else "",
         asking,
-        held is not None and held.is_held_by(_party(who)),
+        held is not None and held.is_held_by(who.party),
         held is not None and held.holder is not None,
     )
 
@@ -98,14 +98,6 @@ def _run_of(parts: Parts, place: Place) -> LiveRun | None:
     if place.drive:
         return parts.desk.live_on(place.drive)
     return next((run for run in parts.desk.live() if not run.has_freed_drive), None)
-
-
-def _drive_of(parts: Parts, identifier: str) -> Drive | None:
-    return next((drive for drive in parts.library.drives() if drive.id == identifier), None)
-
-
-def _party(who: Visitor) -> Party:
-    return Party(who.session.id if who.session else "", who.person)
 
 
 # --- a run goes on ------------------------------------------------------------------------------------------------
@@ -316,7 +308,7 @@ def _control(parts: Parts, who: Visitor, drive: Drive | None, live: LiveRun | No
             if by_command
             else (t.gettext("free"), t.gettext("nobody controls"))
         )
-    if held.is_held_by(_party(who)):
+    if held.is_held_by(who.party):
         others = max(0, (live.feed.watchers if live else 1) - 1)
         watching = t.gettext("nobody watching") if not others else t.say("%(n)s watching", n=others)
         return t.gettext("you"), watching

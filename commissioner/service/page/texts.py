@@ -18,8 +18,6 @@ from commissioner.service.problems import Refusal
 LANGUAGES = ("en", "de")
 UNIT_SIGNS = {"ohm": "Ω", "degC": "°C", "us": "µs", "1": ""}
 NBSP = "\u00a0"
-
-
 CORE = "core"
 """Context of the catalogue's sentences that come from the core; their %(names)s stand for what the core filled in."""
 

@@ -125,7 +125,7 @@ def tuning_page(request: Request, run: LiveRun) -> Response | None:
 
 
 def _profile_of(parts: Parts, run: LiveRun) -> Tuning | None:
-    drive = next((drive for drive in parts.library.drives() if drive.id == run.drive), None)
+    drive = parts.library.known_drive(run.drive)
     return tuning_of(drive) if drive is not None else None
 
 

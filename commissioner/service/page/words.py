@@ -63,6 +63,12 @@ def _named(text: str) -> str:
     return text
 
 
+def _plain(check: str) -> str:
+    """A check's name without the units in it."""
+    plain = re.sub(r", deg[A-Z]$", "", check)
+    return re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
+
+
 def with_symbols(text: str) -> Markup:
     """`L_M` as it is set; everything else escaped."""
     marked = re.sub(r"\b([RLT])_(s|R|M|sigma)\b", r"\1<sub>\2</sub>", str(escape(text)))
@@ -79,9 +85,7 @@ class Words:
 
     def check_name(self, name: str) -> str:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
-        plain = re.sub(r", deg[A-Z]$", "", name)
-        plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        return sentence(self._t.tell(plain))
+        return sentence(self._t.tell(_plain(name)))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -135,9 +139,7 @@ class Words:
         return self._t.with_error(value, 1.96 * std, unit)
 
     def _unit(self, check: Mapping[str, Any]) -> tuple[str, int]:
-        plain = re.sub(r", deg[A-Z]$", "", str(check["name"]))
-        plain = re.sub(r"rated_(\w+)_(w|v|hz|a|rpm) in", r"rated \1 in", plain).replace("_", " ")
-        return UNITS.get(plain, ("", 1))
+        return UNITS.get(_plain(str(check["name"])), ("", 1))
 
     def _localised(self, text: str) -> str:
         """`at most 120 degC` with marks, units and no-break spaces of the language."""

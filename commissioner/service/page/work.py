@@ -15,16 +15,9 @@ from pydantic import ValidationError
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
-from commissioner.service.archive import Entry
 from commissioner.service.configuration import DriveTable
 from commissioner.service.contract.plates import JudgedPlate, SaidPlate
-from commissioner.service.library import (
-    PLATE_FIELDS,
-    SIMULATOR,
-    Drive,
-    Motor,
-    judge_plate,
-)
+from commissioner.service.library import PLATE_FIELDS, SIMULATOR, Drive, Motor, judge_plate, number_of
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
 from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
@@ -37,6 +30,7 @@ from commissioner.service.routes.library import start_simulator
 from commissioner.service.routes.runs import RunWish, start_run
 from commissioner.service.routes.write import Act, act, drive_of, plan
 from commissioner.service.runs.control import Party
+from commissioner.service.runs.feed import whole
 from commissioner.service.runs.live import live_document
 from commissioner.service.simulator import SCENARIOS
 from commissioner.settings import MotorFile
@@ -94,7 +88,7 @@ async def add_drive(request: Request) -> Response:
     name = fields.get("name", "").strip()
     table = _drive_table(parts, name, fields)
     parts.library.add_drive(table)
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, "added a drive", drive=table.id)
+    await parts.note(who, "added a drive", drive=table.id)
     return go(f"/drives/{table.id}")
 
 
@@ -203,7 +197,7 @@ async def take_motor(request: Request, drive: str) -> Response:
     if not judged["ok"]:
         return _motor_page(request, known, None, values, judged, name, 422)
     chosen = _kept(parts, fields.get("known", ""), name, values)
-    return await _checked(request, parts, known, chosen, Party(who.session.id if who.session else "", who.person))
+    return await _checked(request, parts, known, chosen, who.party)
 
 
 def _si(values: dict[str, str]) -> dict[str, Any]:
@@ -219,9 +213,7 @@ def _si(values: dict[str, str]) -> dict[str, Any]:
 
 def _kept(parts: Parts, known: str, name: str, values: dict[str, str]) -> Motor:
     """The motor of the form: a known one where nothing differs, else kept under its name."""
-    from commissioner.service.library import _number
-
-    table = MotorFile.model_validate({key: _number(value) for key, value in _si(values).items()} | {"name": name})
+    table = MotorFile.model_validate({key: number_of(value) for key, value in _si(values).items()} | {"name": name})
     found = next((m for m in parts.library.motors() if m.id == known), None)
     plate = table.model_dump(exclude={"name"})
     if found is not None and plate == asdict(found.plate) and name in ("", found.name):
@@ -249,8 +241,7 @@ async def check_again(request: Request, drive: str) -> Response:
     who, fields = await enter_form(request)
     parts = parts_of(request)
     motor = parts.library.motor(fields.get("motor", ""))
-    party = Party(who.session.id if who.session else "", who.person)
-    return await _checked(request, parts, parts.library.drive(drive), motor, party)
+    return await _checked(request, parts, parts.library.drive(drive), motor, who.party)
 
 
 @router.get("/drives/{drive}/checks")
@@ -329,7 +320,7 @@ async def run(request: Request, run: str) -> Response:
     asked = parts.archive.request(run)
     result: Mapping[str, Any] = parts.archive.result(run)
     place = Place(run=run, drive=str((asked.get("origin") or {}).get("drive", "")))
-    state = live.feed.state if live is not None else _told(entry)
+    state = live.feed.state if live is not None else whole(entry.folder).state
     is_over = live is None or live.is_over
     facts: dict[str, Any] = {
         "entry": entry,
@@ -347,16 +338,6 @@ async def run(request: Request, run: str) -> Response:
         is_written = entry.standing == "commissioned"
         return render(request, DONE if is_written else RESULT, place, **facts)
     return render(request, ENDED, place, **facts)
-
-
-def _told(entry: Entry) -> Any:
-    """An archived run's state, folded again from its journal."""
-    from commissioner.service.runs.feed import Feed
-
-    feed = Feed(entry.folder)
-    while feed.poll():
-        pass
-    return feed.state
 
 
 @router.get("/runs/{run}/write-back")

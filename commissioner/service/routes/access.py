@@ -5,12 +5,20 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.sessions import Session
-from commissioner.service.access.visitors import COOKIE, Visitor, check_token, parts_of, require, visitor_of
+from commissioner.service.access.visitors import (
+    COOKIE,
+    Administrator,
+    Operator,
+    Visitor,
+    check_token,
+    parts_of,
+    visitor_of,
+)
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.people import (
     AccountDocument,
@@ -25,8 +33,6 @@ from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
-Administrator = Annotated[Visitor, Depends(require(Role.ADMINISTRATOR))]
 
 
 class Credentials(BaseModel):
@@ -105,7 +111,7 @@ async def log_out(parts: Parts, who: Visitor) -> None:
     if who.session is not None:
         parts.sessions.end(who.session.id)
         if who.session.is_logged_in:
-            await asyncio.to_thread(parts.audit.write, who.person, who.address, "logged out")
+            await parts.note(who, "logged out")
 
 
 @router.get("/api/accounts")
@@ -120,9 +126,7 @@ async def add_account(request: Request, wish: NewAccount, who: Administrator) ->
     """Who may log in. The first one is added at the computer: `commissioner accounts add`."""
     parts = parts_of(request)
     await asyncio.to_thread(parts.accounts.add, wish.name, Role[wish.role.upper()], wish.password)
-    await asyncio.to_thread(
-        parts.audit.write, who.person, who.address, "added an account", name=wish.name, role=wish.role
-    )
+    await parts.note(who, "added an account", name=wish.name, role=wish.role)
     return {"name": wish.name, "role": wish.role}
 
 
@@ -132,7 +136,7 @@ async def remove_account(request: Request, name: str, who: Administrator) -> Rem
     parts = parts_of(request)
     await asyncio.to_thread(parts.accounts.remove, name)
     parts.sessions.end_all_of(name)
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, "removed an account", name=name)
+    await parts.note(who, "removed an account", name=name)
     return {"removed": name}
 
 

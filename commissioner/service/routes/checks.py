@@ -6,20 +6,18 @@ import asyncio
 import datetime as dt
 from typing import Annotated, cast
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import CheckedDocument
-from commissioner.service.library import Drive, Motor
+from commissioner.service.library import Drive, Motor, must_be_there
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.child import ask, refusal_from
+from commissioner.service.runs.child import ask_for
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
 
 class CheckWish(BaseModel):
@@ -39,15 +37,7 @@ async def checks(request: Request, wish: CheckWish, _who: Operator) -> CheckedDo
 
 async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> CheckedDocument:
     """The document of `commissioner check`, with the time it was made. Refusal: a run has the drive, or it is silent."""
-    if not drive.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="check",
-            value=drive.id,
-            limit="a drive with an address",
-            remedy="start the simulator first",
-        )
+    must_be_there(drive, "check")
     live = parts.desk.live_on(drive.id)
     if live is not None or parts.desk.is_starting(drive.id):
         raise Refusal(
@@ -59,19 +49,14 @@ async def make_checks(parts: Parts, drive: Drive, motor: Motor) -> CheckedDocume
             remedy="wait for its end, or stop it",
         )
     axes = ",".join(f"{axis:g}" for axis in parts.settings.file.service.axes_deg)
+    call = ["check", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source]
     more = ["--axes", axes] if axes else []
-    watch, log = parts.desk.watch(drive), parts.desk.log("check", drive.id)
+    watch = parts.desk.watch(drive)
     await asyncio.to_thread(watch.pause)
     try:
-        code, document = await ask(
-            ["check", "--drive", drive.url, "--profile", drive.profile, "--motor", motor.source, *more, "--json"], log
-        )
+        document = await ask_for("checks", [*call, *more, "--json"], parts.desk.log("check", drive.id))
     finally:
         watch.resume()
-    if "checks" not in document:
-        import json
-
-        raise refusal_from(code, json.dumps(document).encode(), log)
     document["checked_utc"] = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
     checked = cast("CheckedDocument", document)
     parts.checks[f"{drive.id} {motor.id}"] = checked

@@ -10,14 +10,14 @@ from dataclasses import asdict
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
-from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Form, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.requests import HTTPConnection
 
 from commissioner.encoding import JsonObject
 from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require, visitor_of
+from commissioner.service.access.visitors import Operator, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import ControlDocument
 from commissioner.service.contract.runs import Stopped, StopsDocument
@@ -30,7 +30,6 @@ from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.feed import Feed, Message
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
 """The band is sent anew so often: its age must not be older than a second, and a page hears of its service by it where no run's numbers
 come."""
@@ -126,7 +125,7 @@ async def control(request: Request, drive: str, wish: ControlWish, who: Operator
     """Ask for control of a drive, or answer who asks."""
     parts = parts_of(request)
     parts.library.drive(drive)
-    return change_control(parts, drive, wish.do, Party(who.session.id if who.session else "", who.person))
+    return change_control(parts, drive, wish.do, who.party)
 
 
 def change_control(parts: Parts, drive: str, do: str, party: Party) -> ControlDocument:
@@ -230,8 +229,7 @@ class _Socket:
         live = self._parts.desk.runs.get(self._run)
         drive = self._drive or (live.drive if live else "")
         if self._who.may(Role.OPERATOR) and drive and do in ("ask", "grant", "refuse", "release"):
-            party = Party(self._who.session.id if self._who.session else "", self._who.person)
-            await self._send({"control": change_control(self._parts, drive, do, party)})
+            await self._send({"control": change_control(self._parts, drive, do, self._who.party)})
 
     async def _send(self, document: Mapping[str, object] | str) -> None:
         text = document if isinstance(document, str) else json.dumps(document, separators=(",", ":"))

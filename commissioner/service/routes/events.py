@@ -6,17 +6,15 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Request
+from fastapi import APIRouter, Header, Request
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Viewer, parts_of
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.parts import Parts
-from commissioner.service.runs.feed import Feed, Message
+from commissioner.service.runs.feed import Feed, Message, whole
 
 router = APIRouter(route_class=Typed)
-Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 
 
 @router.get("/api/runs/{run}/events", response_class=EventSourceResponse, responses=sends("text/event-stream"))
@@ -27,16 +25,8 @@ async def events(
     parts = parts_of(request)
     after = int(last_event_id) if last_event_id.isascii() and last_event_id.isdigit() else -1
     live = parts.desk.runs.get(run)
-    feed = live.feed if live is not None else _archived(parts, run)
+    feed = live.feed if live is not None else whole(parts.archive.find(run).folder)
     return EventSourceResponse(_stream(parts, feed, after), ping=5)
-
-
-def _archived(parts: Parts, run: str) -> Feed:
-    feed = Feed(parts.archive.find(run).folder)
-    while feed.poll():
-        pass
-    feed.close()
-    return feed
 
 
 async def _stream(parts: Parts, feed: Feed, after: int) -> AsyncIterator[bytes]:

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Mapping
 from typing import Annotated, cast
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Query, Request
 
 from commissioner.identify.contract import Measured
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Viewer, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.history import ComparedDocument, TrendChange, TrendDocument, TrendPoint
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.child import ask, refusal_from
+from commissioner.service.runs.child import ask_for
 
 router = APIRouter(route_class=Typed)
-Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
 Run = Annotated[str, Query(min_length=1, max_length=200)]
 _compared: dict[tuple[str, str], ComparedDocument] = {}
 
@@ -45,11 +42,8 @@ async def compared(parts: Parts, a: str, b: str) -> ComparedDocument:
             remedy="choose another one",
         )
     if (first, second) not in _compared:
-        log = parts.desk.log("compare")
         arguments = ["runs", "compare", first, second, "--runs", str(parts.archive.root), "--json"]
-        code, document = await ask(arguments, log)
-        if "comparison" not in document:
-            raise refusal_from(code, json.dumps(document).encode(), log)
+        document = await ask_for("comparison", arguments, parts.desk.log("compare"))
         if len(_compared) > 500:
             _compared.clear()
         _compared[first, second] = cast("ComparedDocument", document)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.operations.history.share import Moved
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.incoming import KeptPiece, OfferedRun
 from commissioner.service.parts import Parts
@@ -18,7 +17,6 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.incoming import FILE, LARGEST, MOST_FILES, RUN
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Run = Annotated[str, Path(pattern=RUN)]
 File = Annotated[str, Path(pattern=FILE)]
 
@@ -54,9 +52,7 @@ async def arrived(request: Request, run: Run, arrival: Arrival, who: Operator) -
     parts = parts_of(request)
     _check_at_rest(parts, run)
     moved = await asyncio.to_thread(parts.incoming.arrive, run, arrival.files)
-    await asyncio.to_thread(
-        parts.audit.write, who.person, who.address, "took in a pushed run", run=run, reason=moved.what
-    )
+    await parts.note(who, "took in a pushed run", run=run, reason=moved.what)
     return moved
 
 

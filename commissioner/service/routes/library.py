@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import replace
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Depends, Request
+from fastapi import APIRouter, Body, Request
 from pydantic import BaseModel, ConfigDict
 
 from commissioner.encoding import JsonObject
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
 from commissioner.service.configuration import DriveTable, Identifier
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import (
@@ -22,15 +20,13 @@ from commissioner.service.contract.drives import (
     ProceduresDocument,
 )
 from commissioner.service.contract.plates import JudgedPlate
-from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate
+from commissioner.service.library import SIMULATOR, Drive, Library, Motor, judge_plate, must_be_there
 from commissioner.service.problems import Refusal
 from commissioner.service.runs.watch import describe
 from commissioner.service.simulator import SCENARIOS
 from commissioner.settings import CONFIG_FOLDER, MotorFile, read_toml
 
 router = APIRouter(route_class=Typed)
-Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
 
 class NewMotor(MotorFile):
@@ -61,7 +57,7 @@ async def add_drive(request: Request, table: DriveTable, who: Operator) -> Drive
     """Check and keep a drive. It is not asked for yet: POST /api/checks does."""
     parts = parts_of(request)
     drive = parts.library.add_drive(table)
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, "added a drive", drive=drive.id)
+    await parts.note(who, "added a drive", drive=drive.id)
     return drive
 
 
@@ -70,15 +66,7 @@ async def drive_state(request: Request, drive: str, _who: Viewer) -> DriveStateD
     """The drive's own word while no run has it, and how old that is. The first call begins to look."""
     parts = parts_of(request)
     found = _drive(parts.library, drive)
-    if not found.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="drive",
-            value=drive,
-            limit="a drive with an address",
-            remedy="POST /api/simulator starts it",
-        )
+    must_be_there(found, "drive", "POST /api/simulator starts it")
     watch = parts.desk.watch(found)
     watch.want()
     live = parts.desk.live_on(found.id)
@@ -145,7 +133,7 @@ async def start_simulator(request: Request, scenario: str, who: Visitor) -> Driv
     is_new = not parts.simulator.is_running or parts.simulator.scenario != scenario
     await parts.simulator.start(scenario)
     if is_new:
-        await asyncio.to_thread(parts.audit.write, who.person, who.address, "started the simulator", scenario=scenario)
+        await parts.note(who, "started the simulator", scenario=scenario)
     return parts.library.drive(SIMULATOR)
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, File, Form, Request, UploadFile
+from fastapi import APIRouter, File, Form, Request, UploadFile
 from fastapi.responses import FileResponse, Response
 
-from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, Viewer, parts_of
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.recordings import RecordingDocument
 from commissioner.service.parts import Parts
@@ -18,8 +17,6 @@ from commissioner.service.problems import Refusal
 from commissioner.service.recordings import Job
 
 router = APIRouter(route_class=Typed)
-Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 PIECE = 1 << 20
 
 

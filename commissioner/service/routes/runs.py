@@ -6,27 +6,22 @@ import asyncio
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import REPORT_CSP
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, Viewer, Visitor, parts_of
 from commissioner.service.archive import Entry
 from commissioner.service.contract.description import Typed, sends
 from commissioner.service.contract.runs import Begun, RunAnswer, RunRow, RunsDocument
-from commissioner.service.library import Drive, Motor
+from commissioner.service.library import Drive, Motor, must_be_there
 from commissioner.service.parts import Parts
-from commissioner.service.problems import Refusal
-from commissioner.service.runs.child import ask, refusal_from
-from commissioner.service.runs.control import Party
+from commissioner.service.runs.child import ask_for, succeed
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.live import live_document
 
 router = APIRouter(route_class=Typed)
-Viewer = Annotated[Visitor, Depends(require(Role.VIEWER))]
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 
 
@@ -57,20 +52,11 @@ async def start_run(parts: Parts, wish: RunWish, who: Visitor) -> LiveRun:
 
 async def begin(parts: Parts, drive: Drive, motor: Motor, verb: list[str], who: Visitor, **told: Any) -> LiveRun:
     """The run of this verb, begun; the audit says so before anything moves."""
-    if not drive.url:
-        raise Refusal(
-            409,
-            "the simulator is not running",
-            step="start a run",
-            value=drive.id,
-            limit="a drive with an address",
-            remedy="start the simulator first",
-        )
-    party = Party(who.session.id if who.session else "", who.person)
+    must_be_there(drive, "start a run")
     facts = {"drive": drive.id, "motor": motor.id, **told}
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, "asked to energise", **facts)
-    run = await parts.desk.start(drive, motor, verb, party)
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, "run begun", run=run.id)
+    await parts.note(who, "asked to energise", **facts)
+    run = await parts.desk.start(drive, motor, verb, who.party)
+    await parts.note(who, "run begun", run=run.id)
     return run
 
 
@@ -109,11 +95,7 @@ async def report(request: Request, run: str, _who: Viewer) -> Response:
     entry = parts.archive.find(run)
     if not (entry.folder / "report.html").is_file():
         arguments = ["runs", "report", entry.run, "--runs", str(parts.archive.root), "--json"]
-        code, document = await ask(arguments, parts.desk.log("report"))
-        if "report" not in document:
-            import json
-
-            raise refusal_from(code, json.dumps(document).encode(), parts.desk.log("report"))
+        await ask_for("report", arguments, parts.desk.log("report"))
     return FileResponse(
         parts.archive.file(run, "report.html"), media_type="text/html", headers={"content-security-policy": REPORT_CSP}
     )
@@ -143,11 +125,7 @@ async def _exported(parts: Parts, entry: Entry, ending: str) -> Path:
         return target
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     arguments = ["runs", "export", entry.run, str(target), "--runs", str(parts.archive.root), "--json"]
-    code, document = await ask(arguments, parts.desk.log("export"))
-    if code != 0:
-        import json
-
-        raise refusal_from(code, json.dumps(document).encode(), parts.desk.log("export"))
+    await succeed(arguments, parts.desk.log("export"))
     return target
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.registers.tuning import MOST_REPEATS, REPEATS
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, Visitor, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.runs import Answered, Begun
 from commissioner.service.parts import Parts
@@ -19,7 +17,6 @@ from commissioner.service.routes.runs import begin
 from commissioner.service.runs.desk import LiveRun
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 
 
 class TuneWish(BaseModel):
@@ -81,5 +78,5 @@ async def give_answer(parts: Parts, run: str, said: Answer, who: Visitor) -> Non
             remedy="look at the run's page",
         )
     what = "done at the drive" if said.done else "not done at the drive"
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, what, run=run, reason=str(asked["text"]))
+    await parts.note(who, what, run=run, reason=str(asked["text"]))
     live.child.answer(said.number, is_done=said.done)

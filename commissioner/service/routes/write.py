@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from typing import Annotated, Literal, cast
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from commissioner.encoding import JsonObject
 from commissioner.report.run.contract import WritePlan
-from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Visitor, parts_of, require
+from commissioner.service.access.visitors import Operator, Visitor, parts_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.writing import RestoredDocument, WrittenDocument
 from commissioner.service.library import Drive
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
-from commissioner.service.runs.child import ask, refusal_from
+from commissioner.service.runs.child import succeed
 
 router = APIRouter(route_class=Typed)
-Operator = Annotated[Visitor, Depends(require(Role.OPERATOR))]
 Act = Literal["write-back", "restore"]
 PLAN_S, ACT_S = 120.0, 1800.0
 """A restore proves first that the run's samples lead to its decisions: minutes on a slow computer; and what writes is not to be killed."""
@@ -71,11 +68,11 @@ async def act(parts: Parts, run: str, what: Act, token: str, who: Visitor) -> Wr
     """Write what the table of `token` showed; the audit has it before and after."""
     entry = parts.archive.find(run)
     drive = drive_of(parts, run)
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, f"asked to {what}", run=run, table=token)
+    await parts.note(who, f"asked to {what}", run=run, table=token)
     arguments = [what, entry.run, *_address(drive), "--yes", f"--token={token}", *_runs(parts), "--json"]
     done = await _with_drive(parts, drive, arguments, ACT_S)
     rows = (done.get("report") or done).get("written") or []
-    await asyncio.to_thread(parts.audit.write, who.person, who.address, DONE[what], run=run, registers=len(rows))
+    await parts.note(who, DONE[what], run=run, registers=len(rows))
     return cast("WrittenDocument | RestoredDocument", done)
 
 
@@ -90,17 +87,13 @@ async def _with_drive(parts: Parts, drive: Drive | None, arguments: list[str], w
             remedy="wait for its end, or stop it",
         )
     watch = parts.desk.watch(drive) if drive is not None else None
-    log = parts.desk.log(arguments[0])
     if watch is not None:
         await asyncio.to_thread(watch.pause)
     try:
-        code, document = await ask(arguments, log, within_s)
+        return await succeed(arguments, parts.desk.log(arguments[0]), within_s)
     finally:
         if watch is not None:
             watch.resume()
-    if code != 0:
-        raise refusal_from(code, json.dumps(document).encode(), log)
-    return document
 
 
 def drive_of(parts: Parts, run: str) -> Drive | None:

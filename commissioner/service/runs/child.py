@@ -31,7 +31,6 @@ class Child:
     def __init__(self, process: asyncio.subprocess.Process, log: Path) -> None:
         self._process, self._log = process, log
         self._beating = asyncio.create_task(self._beat())
-        self.said: dict[str, Any] = {}
 
     @classmethod
     async def start(cls, arguments: Sequence[str], log: Path) -> Child:
@@ -54,10 +53,9 @@ class Child:
             self.kill()
             raise Refusal(503, "the run did not begin", step="start a run", value=f"nothing within {BEGIN_S:g} s",
                           limit="a run folder", remedy="look at the computer's load and disk, then try again") from None  # fmt: skip
-        with contextlib.suppress(ValueError):
-            said = json.loads(line)
-            if isinstance(said, dict) and "folder" in said:
-                return Path(said["folder"])
+        said = _document(line)
+        if "folder" in said:
+            return Path(said["folder"])
         rest = line + await self._process.stdout.read()
         raise await self._failure(rest)
 
@@ -69,24 +67,16 @@ class Child:
         """To what the run's journal asks the person at the drive."""
         self._say("answer", {"number": number, "done": is_done})
 
-    async def wait(self) -> int:
-        """The exit code; what the run said at its end is in `said`."""
+    async def wait(self) -> None:
+        """Until it has ended. What it says then is in its folder as well."""
         assert self._process.stdout is not None
-        text = await self._process.stdout.read()
-        code = await self._process.wait()
+        await self._process.stdout.read()
+        await self._process.wait()
         self._beating.cancel()
-        with contextlib.suppress(ValueError):
-            said = json.loads(text)
-            self.said = said if isinstance(said, dict) else {}
-        return code
 
     @property
     def is_alive(self) -> bool:
         return self._process.returncode is None
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
 
     def kill(self) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -114,7 +104,7 @@ class Child:
     async def _failure(self, text: bytes) -> Refusal:
         code = await self._process.wait()
         self._beating.cancel()
-        return refusal_from(code, text, self._log)
+        return _refusal(code, _document(text), self._log)
 
 
 async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> tuple[int, JsonObject]:
@@ -139,16 +129,37 @@ async def ask(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> 
     try:
         document = json.loads(text)
     except ValueError:
-        raise refusal_from(code, text, log) from None
+        raise _refusal(code, {}, log) from None
     return code, document if isinstance(document, dict) else {}
 
 
-def refusal_from(code: int, text: bytes, log: Path) -> Refusal:
-    """What a verb says under `error`, as a refusal."""
-    document: JsonObject = {}
+async def ask_for(wanted: str, arguments: Sequence[str], log: Path) -> JsonObject:
+    """The verb's document. Refusal in the verb's own words where `wanted` is not in it."""
+    code, document = await ask(arguments, log)
+    if wanted not in document:
+        raise _refusal(code, document, log)
+    return document
+
+
+async def succeed(arguments: Sequence[str], log: Path, timeout_s: float = 120.0) -> JsonObject:
+    """The verb's document. Refusal in the verb's own words where it failed."""
+    code, document = await ask(arguments, log, timeout_s)
+    if code != 0:
+        raise _refusal(code, document, log)
+    return document
+
+
+def _document(text: bytes) -> JsonObject:
+    """Empty where it is none."""
     with contextlib.suppress(ValueError):
         read = json.loads(text)
-        document = read if isinstance(read, dict) else {}
+        if isinstance(read, dict):
+            return read
+    return {}
+
+
+def _refusal(code: int, document: JsonObject, log: Path) -> Refusal:
+    """What a verb says under `error`, as a refusal."""
     error = document.get("error") or {}
     if not error:
         said = log.read_text("utf-8", "replace").strip().splitlines() if log.is_file() else []

@@ -44,7 +44,6 @@ class LiveRun:
     feed: Feed
     party: Party | None
     child: Child | None = None
-    exit_code: int | None = None
     stop_asked_by: str = ""
     has_freed_drive: bool = False
     is_over: bool = False
@@ -113,7 +112,7 @@ class Desk:
         self._check_free(drive)
         self.control(drive.id).take(party)
         watch = self.watch(drive)
-        child = await Child.start(self._arguments(drive, motor, verb), self._log("run", drive.id))
+        child = await Child.start(self._arguments(drive, motor, verb), self.log("run", drive.id))
         self._pending[drive.id] = _Pending(party, child)
         try:
             await asyncio.to_thread(watch.pause)
@@ -149,12 +148,9 @@ class Desk:
             str(self.settings.runs), "--dead-man", "--json",
         ]  # fmt: skip
 
-    def _log(self, *names: str) -> Path:
-        return self.settings.data / "logs" / ("-".join(names) + ".txt")
-
     def log(self, *names: str) -> Path:
         """Where a child's words of distress go."""
-        return self._log(*names)
+        return self.settings.data / "logs" / ("-".join(names) + ".txt")
 
     def _add(self, run: LiveRun) -> None:
         self.runs[run.id] = run
@@ -176,13 +172,12 @@ class Desk:
             await asyncio.sleep(POLL_S)
         while run.feed.poll():
             pass
-        run.exit_code = waiting.result() if waiting else None
         run.is_over = True
         self._free_drive(run)
         await asyncio.to_thread(self._write_end, run)
         run.feed.close()
 
-    def _has_gone(self, run: LiveRun, waiting: asyncio.Task[int] | None) -> bool:
+    def _has_gone(self, run: LiveRun, waiting: asyncio.Task[None] | None) -> bool:
         if waiting is not None:
             return waiting.done()
         return run.feed.age_s > GONE_S and run.id not in self._holding

@@ -83,11 +83,6 @@ class Feed:
     def watchers(self) -> int:
         return len(self._watchers)
 
-    @property
-    def blocks(self) -> int:
-        """Whole blocks read so far."""
-        return self._envelope.blocks
-
     def poll(self) -> bool:
         """Read what is new; whether there was anything."""
         blocks = self._blocks.new(500)  # before the journal: a block belongs to the state it was taken in
@@ -152,3 +147,12 @@ class Feed:
         for watcher in self._watchers:
             if message is None or message.event == "samples" or watcher.is_page == (message.event == "live"):
                 watcher.send(message)
+
+
+def whole(folder: Path) -> Feed:
+    """The feed of a run that is over, read to its end."""
+    feed = Feed(folder)
+    while feed.poll():
+        pass
+    feed.close()
+    return feed

@@ -22,7 +22,6 @@ class AxisTest:
     energised_s: float = 0.0
     parameters: list[float] | None = None
     std: list[float] | None = None
-    peak_flux_fraction: float | None = None
 
 
 @dataclass
@@ -45,31 +44,25 @@ class RunState:
     is_confirmed: bool = True
     records: int = 0
     utc: str = ""
-    begun_utc: str = ""
     tests: list[AxisTest] = field(default_factory=list)
     part: str = ""
     has_touched: bool = False
     planned_test_s: float = 0.0
     acceptance: dict[str, float] = field(default_factory=dict)
-    nameplate: dict[str, Any] = field(default_factory=dict)
     current_limit_a: float | None = None
     flux_limit_wb: float | None = None
     current_high_a: float = 0.0
     flux_now_wb: float | None = None
     flux_high_wb: float = 0.0
     drive: dict[str, Any] = field(default_factory=dict)
-    checks: list[dict[str, Any]] = field(default_factory=list)
     history: list[list[float]] = field(default_factory=list)
-    guard: dict[str, Any] | None = None
     stop: dict[str, Any] | None = None
     error: dict[str, Any] | None = None
     end: dict[str, Any] | None = None
     written: list[dict[str, Any]] = field(default_factory=list)
-    verdict: dict[str, Any] | None = None
     link: dict[str, Any] | None = None
     diagnosis_s: float = 0.0
     tuning: OwnTuning | None = None
-    is_restored: bool = False
 
     @property
     def current(self) -> int | None:
@@ -102,7 +95,6 @@ class RunState:
         record = line["record"] if isinstance(line.get("record"), dict) else {}
         self.records = int(line.get("n", self.records)) + 1
         self.utc = str(line.get("utc", ""))
-        self.begun_utc = self.begun_utc or self.utc
         fold = _FOLDS.get(str(line["kind"]))
         if fold is not None:
             fold(self, record)
@@ -120,7 +112,6 @@ def _job(state: RunState, record: dict[str, Any]) -> None:
     state.tests = [AxisTest(float(axis)) for axis in axes]
     state.planned_test_s = plan["excitation"]["seconds"] + plan["excitation"]["staircase_seconds"]
     state.acceptance = dict(plan["acceptance"])
-    state.nameplate = dict(plate)
     state.current_limit_a = plan["limits"]["trip_fraction"] * 2**0.5 * plate["rated_current_a"]
     state.phase = "connecting"
 
@@ -180,7 +171,6 @@ def _axis_done(state: RunState, record: dict[str, Any]) -> None:
     k = state.current
     if k is not None and not record.get("is_look"):
         state.tests[k].state = "done"
-        state.tests[k].peak_flux_fraction = record.get("peak_flux_fraction")
 
 
 def _ended(state: RunState, record: dict[str, Any]) -> None:
@@ -200,19 +190,20 @@ def _identified(state: RunState, record: dict[str, Any]) -> None:
         state.current_limit_a = min(state.current_limit_a, 2**0.5 * rated_a)
 
 
-def _put(name: str, key: str | None = None) -> Any:
-    def fold(state: RunState, record: dict[str, Any]) -> None:
-        setattr(state, name, record if key is None else record.get(key, []))
+def _error(state: RunState, record: dict[str, Any]) -> None:
+    state.error = record
 
-    return fold
+
+def _link(state: RunState, record: dict[str, Any]) -> None:
+    state.link = record
+
+
+def _written(state: RunState, record: dict[str, Any]) -> None:
+    state.written = record.get("written", [])
 
 
 def _diagnosed(state: RunState, _record: dict[str, Any]) -> None:
     state.phase = "ended"
-
-
-def _restored(state: RunState, _record: dict[str, Any]) -> None:
-    state.is_restored = True
 
 
 def _tuning_began(state: RunState, _record: dict[str, Any]) -> None:
@@ -252,8 +243,6 @@ _FOLDS = {
     "warming_up": _warming, "job": _job, "state_entered": _entered, "about_to": _intent, "disarmed": _disarmed,
     "excitation_chosen": _chosen, "bias_chosen": _bias, "estimate_updated": _estimate, "axis_finished": _axis_done,
     "run_ended": _ended, "diagnosing": _diagnosing, "diagnosed": _diagnosed, "drive_identified": _identified,
-    "checks_judged": _put("checks", "results"), "guard_acted": _put("guard"), "verdict_reached": _put("verdict"),
-    "error": _put("error"), "link": _put("link"), "parameters_written": _put("written", "written"),
-    "snapshot_restored": _restored, "stop_asked": _stopped, "tuned_once": _tuned_once,
+    "error": _error, "link": _link, "parameters_written": _written, "stop_asked": _stopped, "tuned_once": _tuned_once,
     "tuning_began": _tuning_began, "tunings_judged": _tunings_judged, "tuning_ended": _at_rest, "asked_at_drive": _asked, "answered_at_drive": _answered,
 }  # fmt: skip

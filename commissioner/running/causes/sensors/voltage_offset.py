@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from commissioner.estimation.numbers import Scales
 from commissioner.running.causes.cause import Cause, Form, Sizes, Values
 
 
 def _sizes(v: Values, s: Scales) -> Sizes:
-    import math
-
     return {"offset_v": (s.voltage_v * math.hypot(v["voltage_offset_re"], v["voltage_offset_im"]), "V")}
 
 

@@ -65,7 +65,7 @@ def test_a_search_given_up_says_so_and_names_nothing(with_legs, when):
         report=steps.append,
         go_on=lambda: not any(isinstance(step, when) for step in steps),
     )
-    document = as_document(seen, None)
+    document = as_document(seen)
     assert isinstance(steps[-1], when) and list(seen.steps) == steps
     assert seen.verdict is Verdict.UNEXPLAINED and not document["is_complete"] and document["causes"] == []
     assert document["reason"].startswith("Not finished") and document["parameters_after"] == {}
