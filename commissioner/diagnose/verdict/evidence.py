@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,10 @@ UNKNOWN, INSTANTS_PER_NUMBER = 1e-9, 4
 """Information, of the best known number of a course, that any has; and instants at which a course is read, per number."""
 ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
 """Of a cause's gain: so well is a model without it fitted, and a rival that cannot lose less is not fitted to the last digit."""
+
+
+SHORTER_STEPS = 12
+"""Halvings after which a border between two ways to say a size counts as reached."""
 
 
 @dataclass(frozen=True)
@@ -187,14 +192,11 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
     slopes: dict[str, list[float]] = {key: [] for key in sizes}
     for row in rows:
         h = 0.5 * float(np.sqrt(max(covariance[row, row], 1e-20)))
-        theta = found.model.theta.copy()
-        theta[row] += h
-        moved = _sizes(found.model.moved(theta), name, setting)
-        for key in sizes:
-            slopes[key].append((moved[key][0] - sizes[key][0]) / h)
+        for key, slope in slopes_of(sizes, partial(_sizes_at, found.model, name, setting, row), h).items():
+            slopes[key].append(slope)
     for key, (value, unit) in sizes.items():
-        slope = np.array(slopes[key])
-        variance = float(slope @ covariance[np.ix_(rows, rows)] @ slope)
+        gradient = np.array(slopes[key])
+        variance = float(gradient @ covariance[np.ix_(rows, rows)] @ gradient)
         out[key] = (float(value), float(np.sqrt(max(variance, 0.0))), unit)
     for key, more in CATALOGUE[name].unknown_form(found.model, setting.layout).items():
         value, spread, unit = out[key]
@@ -203,6 +205,22 @@ def sizes_with_spread(found: Fit, name: str, setting: Setting) -> dict[str, tupl
         first = next(iter(sizes))
         out[first] = (*_rms_of_course(found, name, setting), sizes[first][1])
     return out
+
+
+def _sizes_at(model: Model, name: str, setting: Setting, row: int, step: float) -> Sizes:
+    theta = model.theta.copy()
+    theta[row] += step
+    return _sizes(model.moved(theta), name, setting)
+
+
+def slopes_of(sizes: Sizes, sizes_at: Callable[[float], Sizes], h: float) -> dict[str, float]:
+    """How fast each size moves. Some causes say another size on the other side of a border: then a step that does not cross it,
+    backward or shorter; none where even the shortest does."""
+    for step in (h, -h, *(sign * h / 2**k for k in range(1, SHORTER_STEPS) for sign in (1, -1))):
+        moved = sizes_at(step)
+        if sizes.keys() <= moved.keys():
+            return {key: (moved[key][0] - sizes[key][0]) / step for key in sizes}
+    return dict.fromkeys(sizes, 0.0)
 
 
 def _rms_of_course(found: Fit, name: str, setting: Setting) -> tuple[float, float]:

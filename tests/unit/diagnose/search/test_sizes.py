@@ -12,7 +12,7 @@ from commissioner.diagnose.intake.noise import Noise
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.search.refinement import leakage_side, without_idle_numbers
-from commissioner.diagnose.verdict.evidence import sizes_with_spread
+from commissioner.diagnose.verdict.evidence import sizes_with_spread, slopes_of
 
 SIGMA_A = 0.01
 WHITE = Noise(np.full(3, SIGMA_A), np.array([1.0, 1000.0]), np.ones((3, 2)), "given", True, 0.0, True)
@@ -85,3 +85,17 @@ def test_a_path_that_began_on_the_wrong_side_is_put_right(setting, looped):
     assert seen.chi2 <= stuck.chi2
     assert seen.chi2 - best.chi2 < 30.0
     assert seen.model.total(truth.terms[-1].kind) > 0.3
+
+
+@pytest.mark.parametrize(("border", "wanted"), [(1.0, 2.0), (0.1, 2.0), (1e-3, 2.0)])
+def test_a_size_that_is_said_otherwise_across_a_border_has_the_slope_of_its_own_side(border, wanted):
+    """A sag on a recorded link is said at rated power, or as a part of the recorded swing."""
+
+    def sizes_at(x):
+        return {"part": (0.9 + 2.0 * x, "1")} if border - x > -1e-9 and x > -border / 2 else {"sag": (0.1, "1")}
+
+    assert slopes_of(sizes_at(0.0), sizes_at, 0.3)["part"] == pytest.approx(wanted)
+
+
+def test_a_size_that_no_step_keeps_has_no_slope():
+    assert slopes_of({"part": (0.9, "1")}, lambda _: {"sag": (0.1, "1")}, 0.3) == {"part": 0.0}
