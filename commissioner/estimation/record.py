@@ -222,7 +222,7 @@ def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
 
 def _for_monitor(one: RunningRecording, per_period: float) -> str:
     """What else reads this recording, as the end of a remedy; empty where its rate or length is too little there too."""
-    if per_period < MONITORED_RATE or one.time_s.size * one.sample_period_s < MONITORED_S:
+    if per_period < MONITORED_RATE or (one.time_s.size + 1) * one.sample_period_s < MONITORED_S:
         return ""
     return "; this recording of a running motor is for `commissioner monitor`: speed, torque and parameters of a steady load"
 
