@@ -27,6 +27,10 @@ SMOOTH_S, SLOPE_S = 4e-3, 8e-3
 """Over which the measured speed and its derivative are smoothed (quadratic, no phase shift)."""
 LEAST_S, LEAST_RATE = 0.2, 40.0
 """Shortest window; fewest samples a period of the supply."""
+MONITORED_S, MONITORED_RATE = 2.0, 10.0
+"""Shortest steady stretch and fewest samples a period that `monitor` reads: it asks for less than a fit of the current's own course."""
+FAST_HZ = 5000.0
+"""Rate that shows a start's first milliseconds at the supplies of 50 and 60 Hz."""
 MOST_SAMPLES = 60_000
 """Of all windows together; longer ones end there. A start and its load steps are in the first seconds."""
 NOISY_VOLTAGE = 0.15
@@ -199,18 +203,27 @@ def _vector(x: Array) -> Array:
 def _check(one: RunningRecording, voltage: Array, scales: Scales) -> None:
     per_period = 2 * np.pi / scales.frequency_rad_per_s / one.sample_period_s
     if per_period < LEAST_RATE:
+        least = LEAST_RATE * scales.frequency_rad_per_s / (2 * np.pi)
         raise _refused(
             f"{one.source}: {per_period:.0f} samples a period of the supply are too few",
             1.0 / one.sample_period_s,
-            f"{LEAST_RATE * scales.frequency_rad_per_s / 6.283:.0f} samples a second",
-            "record faster: 5 kHz or more",
+            f"{least:.0f} samples a second",
+            f"record faster: {max(least, FAST_HZ) / 1e3:g} kHz or more{_for_monitor(one, per_period)}",
         )
     sigma = max(noise_of(voltage[:, 0]), noise_of(voltage[:, 1]))
     if sigma > NOISY_VOLTAGE * scales.voltage_v:
         raise _refused(
             f"{one.source}: the voltages are pulses of an inverter, not their means", sigma, NOISY_VOLTAGE * scales.voltage_v,
-            "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages",
+            "record through a sine filter or with averaging over whole carrier periods, or use the commanded voltages"
+            f"{_for_monitor(one, per_period)}",
         )  # fmt: skip
+
+
+def _for_monitor(one: RunningRecording, per_period: float) -> str:
+    """What else reads this recording, as the end of a remedy; empty where its rate or length is too little there too."""
+    if per_period < MONITORED_RATE or (one.time_s.size + 1) * one.sample_period_s < MONITORED_S:
+        return ""
+    return "; this recording of a running motor is for `commissioner monitor`: speed, torque and parameters of a steady load"
 
 
 def _turns_backwards(voltage: Array) -> bool:

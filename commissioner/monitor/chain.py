@@ -11,6 +11,7 @@ from commissioner.monitor.intake.against_plate import (
     doubt_of,
     of_contradiction,
     over_currents,
+    unscaled_order_deg,
     volts_per_hertz,
 )
 from commissioner.monitor.intake.audit import inspect
@@ -137,6 +138,9 @@ def observe(
     if said is not None:
         audited = replace(audited, findings=(*audited.findings, said))
     if against is not None:
+        other = unscaled_order_deg(audited, shaft_hz, plate)
+        if lag_deg is None and other is not None:
+            return observe(recording, plate, wishes, other)
         if wishes.trust == "plate" and against.likely is not None:
             return observe(over_currents(recording, against.likely), plate, replace(wishes, trust=None), lag_deg)
         finding = of_contradiction(against, stops=wishes.trust != "data")

@@ -135,6 +135,8 @@ in the table at rated slip (1.33 but for two whose stated speed or current is no
 factor that two readings differ by, is 1.73."""
 USUAL = (0.80, 1.25)
 """Of the same mean: 99 % of 1500 honest points of tests/campaigns/intake/plate lie within, and of those off by sqrt 2 a tenth."""
+ALIKE = 0.03
+"""Relative: of the current's ratio and the mean one, up to which one number says both."""
 FACTORS = (
     (math.sqrt(3.0), "star and delta, or line and phase values, mixed up"),
     (2.0, "a probe, a turns or a terminal factor"),
@@ -206,7 +208,7 @@ def contradiction(seen: OperatingPoint, plate: Nameplate) -> Contradiction | Non
     likely, why = _usual(factor)
     return Contradiction(
         f"the data do not belong to this plate: at {seen.voltage_v * math.sqrt(3.0):.4g} V, {seen.frequency_hz:.4g} Hz and a slip "
-        f"of {seen.slip:.3g} they give {factor:.3g} times the plate's current and power{why}",
+        f"of {seen.slip:.3g} they give {_times(seen, said, factor)}{why}",
         seen.current_a, said.current_a, "A", factor, likely, f"{SCALE[0]:g} ... {SCALE[1]:g} times the plate's",
         "check the current sensors' scale (and the voltages'), and that the plate is this motor's, in its connection, with its "
         "frequency and pole pairs; say which is right by --trust plate or --trust data",
@@ -226,10 +228,34 @@ def doubt(seen: OperatingPoint, plate: Nameplate) -> str:
 
 def _factor(seen: OperatingPoint, said: OperatingPoint) -> float | None:
     """Geometric mean of current, active and reactive power over the plate's; None where one of them is not positive."""
+    ratios = _ratios(seen, said)
+    return None if ratios is None else math.prod(ratios) ** (1.0 / 3.0)
+
+
+def _ratios(seen: OperatingPoint, said: OperatingPoint) -> tuple[float, float, float] | None:
+    """Current, active and reactive power over the plate's."""
     pairs = ((seen.current_a, said.current_a), (seen.power_w, said.power_w), (seen.reactive_var, said.reactive_var))
     if any(not (a > 0.0 and b > 0.0) for a, b in pairs):
         return None
-    return math.prod(a / b for a, b in pairs) ** (1.0 / 3.0)
+    current, active, reactive = (a / b for a, b in pairs)
+    return current, active, reactive
+
+
+def disagreement(seen: OperatingPoint, plate: Nameplate) -> float:
+    """Logarithm of the largest over the smallest of the three ratios: 0 where one factor explains them all."""
+    ratios = _ratios(seen, plate_point(plate, seen))
+    return math.inf if ratios is None else math.log(max(ratios) / min(ratios))
+
+
+def _times(seen: OperatingPoint, said: OperatingPoint, factor: float) -> str:
+    """One number where current and powers have it in common, else each with its own."""
+    current, active, reactive = _ratios(seen, said) or (factor, factor, factor)
+    if abs(math.log(current / factor)) < ALIKE:
+        return f"{factor:.3g} times the plate's current and power"
+    return (
+        f"{current:.3g} times the plate's current, {active:.3g} times its active and {reactive:.3g} times its reactive power, "
+        f"{factor:.3g} times in the geometric mean"
+    )
 
 
 def _usual(factor: float) -> tuple[float | None, str]:

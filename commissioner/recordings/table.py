@@ -12,7 +12,7 @@ import math
 import re
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ import pyarrow.parquet as pa_parquet
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.motor.computed import without_computed_third
+from commissioner.motor.computed import COMPUTED, without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
@@ -167,6 +167,7 @@ def _write_matlab(path: Path, columns: Mapping[str, Signal], metadata: Mapping[s
 
 def to_standstill(table: Table) -> StandstillRecording:
     """The table as a standstill recording; refuses missing columns, NaN, and time that does not lie on a grid."""
+    table = _with_third_current(table)
     columns = table.columns
     needed = ("time_s", "segment", "axis_deg", "voltage_axis_v", "current_u_a", "current_v_a")
     running = [name for name in ("voltage_u_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s") if name in columns]
@@ -223,6 +224,18 @@ def _averaged(table: Table, segment: Signal) -> NDArray[np.int64] | None:
             "give of how many control periods each row is the mean, or leave the column out",
         )  # fmt: skip
     return column.astype(np.int64)
+
+
+def _with_third_current(table: Table) -> Table:
+    """With the current of u or v that two others leave for it, where it is the one that is not there: no sensor, so w tells no more."""
+    names = ("current_u_a", "current_v_a", "current_w_a")
+    missing = [name for name in names if name not in table.columns]
+    if len(missing) != 1 or missing == ["current_w_a"]:
+        return table
+    a, b = (name for name in names if name in table.columns)
+    note = ReadingNote(COMPUTED, f"{missing[0]} is not there: taken as the negative sum of {a} and {b}")
+    columns = {**table.columns, missing[0]: -(table.columns[a] + table.columns[b])}
+    return replace(table, columns={k: v for k, v in columns.items() if k != "current_w_a"}, notes=(*table.notes, note))
 
 
 def to_running(table: Table) -> RunningRecording:

@@ -65,7 +65,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")
         raise DataRefused(
             f"the recording says nothing about the {worst}", step="identify", value=float(np.sqrt(covariance.diagonal().max())),
-            limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque",
+            limit="a relative standard deviation below 1", remedy="record a direct start, or two loads that differ by half of rated torque; one steady load is for `commissioner monitor`",
         )  # fmt: skip
     left = lack_of_fit(problem, fit.machine)
     inertia, load = _shaft(problem, fit, covariance)

@@ -37,6 +37,8 @@ MAINS_HZ, LOBE_BINS, AROUND_BINS = (50.0, 60.0), 5, 16
 """Mains lines, and bins next to one: those that its skirts fill, and those that tell what is noise there."""
 STANDS_OUT, ONCE_IN = 1.5, 1e-6
 """A line is none of the noise where its bins hold so many times what chance makes of them once in so many recordings."""
+FOLLOWS = 25.0
+"""Variance ratio (F) from which the sum of the currents follows the currents: five standard deviations of each number."""
 SPIKE, RARE = 12.0, 1e-3
 """Of the median deviation, and of the samples: fewer than these beyond that are spikes, not noise."""
 WHITE_WITHIN = 0.12
@@ -248,14 +250,41 @@ def resting_share(record: Record) -> float:
 
 
 def _from_zero_sequence(record: Record) -> list[Array]:
-    """Sum of three independent sensors / sqrt(3): motor currents cancel. Not when the third was computed."""
+    """Sum of three independent sensors / sqrt(3): motor currents cancel, but for unlike gains. Not when the third was computed."""
     if record.facts.phases < 3:
         return []
-    sums = [s.currents_a.sum(axis=0) for s in record.segments]
+    sums = _without_unlike_gains(record, [s.currents_a.sum(axis=0) for s in record.segments])
     scale = record.facts.current_peak_a
     if max(float(np.std(x)) for x in sums) < 1e-6 * scale:
         return []
     return [np.repeat(x[None, :] / np.sqrt(3.0), 3, axis=0) for x in sums]
+
+
+def _without_unlike_gains(record: Record, sums: list[Array]) -> list[Array]:
+    """The sums without what of them follows the current vector and its rate of change: sensors of unlike gain and lag leave that.
+
+    The vector's own noise is orthogonal to that of the sum, of which two numbers of a gain and two of a lag take nothing.
+    """
+    design, target = [], []
+    for segment, total in zip(record.segments, sums, strict=True):
+        u, v, w = segment.currents_a
+        vector = np.stack([2.0 * u - v - w, v - w])
+        shapes = np.concatenate([vector, np.gradient(vector, axis=1)])
+        design.append(_centred(shapes, segment.is_good).T)
+        target.append(_centred(total[None, :], segment.is_good)[0])
+    rows, wanted = np.concatenate(design), np.concatenate(target)
+    solved, *_ = np.linalg.lstsq(rows, wanted, rcond=None)
+    left = wanted - rows @ solved
+    gained = float(wanted @ wanted - left @ left)
+    if gained < FOLLOWS * rows.shape[1] * float(left @ left) / max(wanted.size - rows.shape[1], 1):
+        return sums
+    return [total - shapes @ solved for total, shapes in zip(sums, design, strict=True)]
+
+
+def _centred(values: Array, is_good: NDArray[np.bool_]) -> Array:
+    """Rows less their mean over the good samples, zero at the others."""
+    mean = values @ is_good / max(int(is_good.sum()), 1)
+    return np.where(is_good, values - mean[:, None], 0.0)
 
 
 def _quiet(record: Record) -> list[Array]:

@@ -18,9 +18,8 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from commissioner.diagnose.intake.points import Array, Points
+from commissioner.diagnose.points.magnetizing import SPREAD, main_over_leakage
 
-MAIN_OVER_LEAKAGE = (14.9, 0.5)
-"""L_M over L_sigma and the spread of its logarithm, of 35 published machines (tests/data/motors)."""
 FAST_HZ = (40.0, 1.0)
 """Frequency at which the current is displaced by half, and the spread of its logarithm."""
 DISPERSED = (0.3, 1.0)
@@ -95,10 +94,11 @@ class _Fit:
         self.stator = points.resistance_ohm if points.resistance_ohm is not None else np.zeros(points.count)
         self.size = np.abs(z + self.stator) * scatter
         leak = float(np.median(z.imag / points.omega))
+        self.main_over_leakage = main_over_leakage(points)
         start = [
             float(np.log(max(np.min(z.real), 1e-9))),
             float(np.log(leak)),
-            float(np.log(MAIN_OVER_LEAKAGE[0] * leak)),
+            float(np.log(self.main_over_leakage * leak)),
             0.0,
         ]
         if family == "cages":
@@ -117,7 +117,7 @@ class _Fit:
         self.log_evidence = -0.5 * float(found.fun @ found.fun) - 0.5 * float(size if sign > 0 else 0.0)
 
     def _prior(self, x: Array) -> Array:
-        out = [(x[2] - x[1] - np.log(MAIN_OVER_LEAKAGE[0])) / MAIN_OVER_LEAKAGE[1], x[3] / SATURATION_STD]
+        out = [(x[2] - x[1] - np.log(self.main_over_leakage)) / SPREAD, x[3] / SATURATION_STD]
         if self.family == "cages":
             out.append((x[4] - x[1] - np.log(DISPERSED[0])) / DISPERSED[1])
         elif self.family == "bar":
@@ -195,7 +195,7 @@ class _Fit:
     def tied(self) -> tuple[str, ...]:
         """Numbers that the points fix no better than what was taken for them."""
         names = ("R_R", "L_sigma", "L_M", "saturation", "displaced part", "frequency of displacement")
-        priors = (np.inf, np.inf, MAIN_OVER_LEAKAGE[1], SATURATION_STD, DISPERSED[1], FAST_HZ[1])
+        priors = (np.inf, np.inf, SPREAD, SATURATION_STD, DISPERSED[1], FAST_HZ[1])
         spread = np.sqrt(np.diag(self.covariance))
         return tuple(n for n, s, p in zip(names, spread, priors, strict=False) if s > 0.5 * p and n != "saturation")
 
@@ -217,5 +217,5 @@ def remark_of(slow: SlowRotor | None, frequencies: Sequence[float]) -> str:
     return (
         f"R_R is that at running slip, extrapolated from {frequencies[0]:g} ... {frequencies[-1]:g} Hz, where the rotor's part is "
         f"{slow.measured_ohm[0]:.4g} ... {slow.measured_ohm[1]:.4g} ohm, by constant bars, a deep bar and two cages; its error holds what "
-        f"these differ by.{tied}"
+        f"these differ by. L_sigma is that of the test.{tied}"
     )

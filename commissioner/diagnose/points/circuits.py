@@ -11,10 +11,14 @@ from scipy.optimize import least_squares
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.causes.in_points import InPoints
 from commissioner.diagnose.intake.points import Array, Points
+from commissioner.diagnose.points.magnetizing import ROTOR_SHARE, SPREAD, main_over_leakage
 
 Factor = Callable[[str, Array], Array]
 LEAST_SCATTER = 0.002
 """No instrument of such a test is trusted beyond two parts in a thousand."""
+
+LEAST_VARIANCE = 1.0
+"""Of errors over their scatter: points on a circuit to the last digit else name what no instrument shows, and sharpen the prior."""
 
 ROUNDS = 9
 """Fixed-point rounds from the measured current; each takes off nine tenths of the error and more."""
@@ -22,6 +26,11 @@ ROUNDS = 9
 
 FARTHEST = 50.0
 """From its start, of the logarithm of a resistance (or loss) or inductance: a trial step beyond overflows."""
+
+
+def own_numbers(points: Points) -> int:
+    """Of the circuit without extensions: (ln R, ln L), and ln L_M / L_sigma of a locked rotor, which a prior ties."""
+    return 3 if points.is_locked else 2
 
 
 @dataclass(frozen=True)
@@ -39,7 +48,7 @@ def candidates_for(points: Points) -> list[Extension]:
 
 
 def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Array, Array]:
-    """Start, lower and upper bounds: (ln R, ln L) and zero for every extension's numbers."""
+    """Start, lower and upper bounds: the circuit's own numbers and zero for every extension's."""
     resistance = points.power_w / (3.0 * points.current_line_a**2)
     size = points.phase_voltage_v / points.current_line_a
     reactance = np.sqrt(np.maximum(size**2 - resistance**2, 1e-6 * size**2))
@@ -48,6 +57,8 @@ def _start(points: Points, extensions: Sequence[Extension]) -> tuple[Array, Arra
         np.median(np.maximum(resistance - known, 0.05 * resistance)) if points.is_locked else np.median(points.power_w)
     )
     start = [float(np.log(first)), float(np.log(np.median(reactance / points.omega)))]
+    if points.is_locked:
+        start.append(float(np.log(main_over_leakage(points))))
     low, high = [x - FARTHEST for x in start], [x + FARTHEST for x in start]
     for extension in extensions:
         start += extension.does.start
@@ -61,7 +72,7 @@ def _predicted(
 ) -> tuple[Array, Array]:
     """Current (A rms) and power (W) at the points' voltage and frequency."""
     acting: dict[str, tuple[Extension, Array]] = {}
-    at = 2
+    at = own_numbers(points)
     for extension in extensions:
         acting[extension.does.acts_on] = extension, x[at : at + extension.does.numbers]
         at += extension.does.numbers
@@ -77,16 +88,22 @@ def _predicted(
 
 
 def _locked(x: Array, points: Points, factor: Factor, scale: Mapping[str, float]) -> tuple[Array, Array]:
-    """Z = R_s + R_R (1 + c ((f/f_0)^2 - 1)) + j w L_0 / (1 + s I / I_0): skin effect c, leakage saturation s.
+    """Z = R_s + j w L_0 / (1 + s I / I_0) + (j w L_M parallel R_R (1 + c ((f/f_0)^2 - 1))): skin effect c, leakage saturation s.
 
-    The iteration on I converges because L falls slowly (Lipo & Consoli, IEEE Trans. Ind. Appl. IA-20(1), 1984).
+    The iteration on I converges because L falls slowly (Lipo & Consoli, IEEE Trans. Ind. Appl. IA-20(1), 1984). Without the stator's
+    resistance the first number is R_s + R_R.
     """
-    stator = np.zeros(points.count) if points.resistance_ohm is None else points.resistance_ohm
     current = points.current_line_a.copy()
-    resistance = stator + np.exp(x[0]) * factor("resistance", current)
+    rotor = np.exp(x[0]) * factor("resistance", current)
+    stator = points.resistance_ohm
+    if stator is None:
+        stator, rotor = (1.0 - ROTOR_SHARE) * rotor, ROTOR_SHARE * rotor
+    over_main = rotor / (points.omega * np.exp(x[1] + x[2]))
+    seen = rotor / (1.0 + over_main**2)
+    resistance = stator + seen
     for _ in range(ROUNDS):
         reactance = points.omega * np.exp(x[1]) / factor("leakage", current / scale["current_a"])
-        current = points.phase_voltage_v / np.hypot(resistance, reactance)
+        current = points.phase_voltage_v / np.hypot(resistance, reactance + seen * over_main)
     return current, 3.0 * resistance * current**2
 
 
@@ -120,21 +137,28 @@ def scales(points: Points) -> dict[str, float]:
         "frequency_hz": float(points.frequency_hz.min()),
         "current_a": float(np.median(points.current_line_a)),
         "flux_wb": float(np.max(points.phase_voltage_v / points.omega)),
-        "current_scatter": 1.0,
-        "power_scatter": 1.0,
+        "current_scatter": LEAST_SCATTER,
+        "power_scatter": LEAST_SCATTER,
     }
-    left = fit_points(points, candidates_for(points), scale)[2]
-    n = points.count
-    scale["current_scatter"] = max(float(np.sqrt(np.mean(left[:n] ** 2))), LEAST_SCATTER)
-    scale["power_scatter"] = max(float(np.sqrt(np.mean(left[n:] ** 2))), LEAST_SCATTER)
+    left = LEAST_SCATTER * errors_of(points, fit_points(points, candidates_for(points), scale)[2])
+    scale["current_scatter"], scale["power_scatter"] = (
+        max(float(x), LEAST_SCATTER) for x in np.sqrt(np.mean(left**2, axis=0))
+    )
     return scale
+
+
+def errors_of(points: Points, left: Array) -> Array:
+    """`(n, 2)` of what `fit_points` leaves, without the prior's part."""
+    return np.asarray(left[: 2 * points.count].reshape(2, -1).T)
 
 
 def fit_points(
     points: Points, extensions: Sequence[Extension], scale: Mapping[str, float], near: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """Estimate, covariance and relative errors (current, power) over their scatter at the optimum, searched from `near`."""
+    """Estimate, covariance and relative errors (current, power) over their scatter at the optimum, searched from `near`; of a locked
+    rotor the prior's error stands last."""
     start, low, high = _start(points, extensions)
+    usual = start[2:3] if points.is_locked else start[:0]
     start = start if near is None else near
 
     def errors(x: Array) -> Array:
@@ -143,12 +167,15 @@ def fit_points(
             [
                 (current / points.current_line_a - 1.0) / scale["current_scatter"],
                 (power / points.power_w - 1.0) / scale["power_scatter"],
+                (x[2 : 2 + usual.size] - usual) / SPREAD,
             ]
         )
 
     solution = least_squares(errors, start, bounds=(low, high), x_scale="jac", max_nfev=100)
-    freedom = max(2 * points.count - start.shape[0], 1)
-    variance = float(solution.fun @ solution.fun) / freedom
+    freedom = max(solution.fun.size - start.shape[0], 1)
+    variance = max(
+        float(solution.fun @ solution.fun) / freedom, 1.0
+    )  # the scatter is no less, and the prior no sharper
     covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
     return solution.x, covariance, solution.fun
 

@@ -14,7 +14,16 @@ from scipy.special import fdtrc
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.points.bars import SlowRotor, remark_of, slow_rotor
-from commissioner.diagnose.points.circuits import Extension, candidates_for, fit_points, held_out, scales
+from commissioner.diagnose.points.circuits import (
+    LEAST_VARIANCE,
+    Extension,
+    candidates_for,
+    errors_of,
+    fit_points,
+    held_out,
+    own_numbers,
+    scales,
+)
 from commissioner.motor.circuit import Quantity
 
 SIGNIFICANCE = 1e-3
@@ -93,11 +102,10 @@ def _compare(
     before = float((fit_points(points, accepted, scale)[2] ** 2).sum())
     x, _, left = fit_points(points, [*accepted, candidate], scale)
     after = float((left**2).sum())
-    numbers = 2 + sum(e.does.numbers for e in accepted) + candidate.does.numbers
-    freedom = 2 * points.count - numbers
+    freedom = left.size - x.size
     if freedom < 2 or not _has_right_sign(x, candidate):
         return 1.0, 0.0
-    ratio = (before - after) / candidate.does.numbers / max(after / freedom, 1e-300)
+    ratio = (before - after) / candidate.does.numbers / max(after / freedom, LEAST_VARIANCE)
     p_value = float(fdtrc(candidate.does.numbers, freedom, max(ratio, 0.0)))
     if p_value > SIGNIFICANCE:
         return p_value, 0.0
@@ -122,9 +130,9 @@ def _conclude(
     causes = []
     x, covariance, left = fit_points(points, accepted, scale)
     unit = np.array([scale["current_scatter"], scale["power_scatter"]])
-    after = PointErrors(held_after * unit, left.reshape(2, -1).T * unit)
+    after = PointErrors(held_after * unit, errors_of(points, left) * unit)
     missed = _missed(after, x.size)
-    at = 2
+    at = own_numbers(points)
     for extension in accepted:
         others = [e for e in accepted if e.name != extension.name]
         share = float((held_out(points, others, scale) ** 2).sum() - (held_after**2).sum()) / max(total, 1e-300)
@@ -142,7 +150,7 @@ def _conclude(
         points = replace(points, remarks=(*points.remarks, remark))
     verdict, reason = _verdict(points, causes, tested, missed)
     plain = fit_points(points, [], scale)
-    before = PointErrors(held_before * unit, plain[2].reshape(2, -1).T * unit)
+    before = PointErrors(held_before * unit, errors_of(points, plain[2]) * unit)
     rms = [float(np.sqrt(np.mean((e.left_out[:, 0] * points.current_line_a) ** 2))) for e in (before, after)]
     relative = [float(np.sqrt(np.mean(e.left_out**2))) for e in (before, after)]
     gain = 1.0 - (relative[1] / relative[0]) ** 2 if relative[0] > 0 else 0.0

@@ -25,6 +25,8 @@ from commissioner.diagnose.verdict.lack_of_fit import LackOfFit
 Array = NDArray[np.float64]
 UNKNOWN, INSTANTS_PER_NUMBER = 1e-9, 4
 """Information, of the best known number of a course, that any has; and instants at which a course is read, per number."""
+MEASURED_MARGIN = 2.0
+"""Power of a measured noise over what is left, beyond which it is none: its slowest part is extrapolated with a margin of 1.6."""
 ROUGHLY, NEARLY_A_TIE = 0.01, 0.03
 """Of a cause's gain: so well is a model without it fitted, and a rival that cannot lose less is not fitted to the last digit."""
 
@@ -37,8 +39,8 @@ SHORTER_STEPS = 12
 class HeldOut:
     """Error on segments the fit did not see, and noise, rms over phases and samples, A; `share` of the structured error power
 
-    removed there. `is_measured` False with a single segment: then these are in-sample figures. `noise_a` None: taken from quiet
-    frequencies, where slow parts of the test itself count as noise, it would be more than all that is left.
+    removed there. `is_measured` False with a single segment: then these are in-sample figures. `noise_a` None: it would be more than
+    all that is left, as where slow parts of the test itself count as noise at quiet frequencies.
     """
 
     rmse_before_a: float
@@ -63,7 +65,7 @@ def hold_out(before: Fit, after: Fit, record: Record, layout: Layout, noise: Noi
     table = np.array(each_segment(of_segment, record))
     period = record.facts.sample_period_s
     floor = np.array([noise.rms_a(s.count, period) ** 2 for s in record.segments]) * table[:, 2]
-    is_contradicted = not noise.is_known and floor.sum() > table[:, 1].sum()
+    is_contradicted = floor.sum() > (MEASURED_MARGIN if noise.is_known else 1.0) * table[:, 1].sum()
     floor = np.minimum(floor, table[:, 1]) if is_contradicted else floor
     removed = table[:, 0] - table[:, 1]
     mean = table.sum(axis=0)

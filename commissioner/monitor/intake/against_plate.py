@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 
-from commissioner.monitor.intake.findings import Audited, Finding
+from commissioner.monitor.intake.findings import Audited, Finding, miswired
 from commissioner.motor.nameplate import Nameplate
-from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, doubt
+from commissioner.motor.plate_match import Contradiction, OperatingPoint, contradiction, disagreement, doubt
 from commissioner.records import ReadingNote, RunningRecording
 
 VOLTS_PER_HERTZ = (0.1, 4.0)
@@ -18,6 +19,22 @@ def against_plate(audited: Audited, shaft_hz: float | None, plate: Nameplate) ->
     """The contradiction between what was measured at the shaft's slip and the plate; None where there is none to be seen."""
     point = _point(audited, shaft_hz, plate)
     return None if point is None else contradiction(point, plate)
+
+
+def unscaled_order_deg(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> float | None:
+    """The lag in the order that one factor of the currents explains best, where another one was taken that the columns do not name: it
+    was taken by the currents' size, which is in doubt."""
+    taken = _point(audited, shaft_hz, plate)
+    if taken is None or not audited.others_deg or not miswired(audited.findings):
+        return None
+    apparent = math.hypot(taken.power_w, taken.reactive_var)
+
+    def unlike(lag_deg: float) -> float:
+        power = cmath.rect(apparent, math.radians(lag_deg))
+        return disagreement(replace(taken, power_w=power.real, reactive_var=power.imag), plate)
+
+    best = min(audited.others_deg, key=unlike)
+    return best if unlike(best) < disagreement(taken, plate) else None
 
 
 def doubt_of(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Finding | None:

@@ -91,6 +91,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
         trust_of(even_i, even_v, supply),
         pairing.lag_deg,
         pairing.rivals_deg,
+        pairing.others_deg,
     )
 
 

@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
 
@@ -37,7 +38,10 @@ THIRD = 2 * np.pi / 3
 
 @dataclass(frozen=True)
 class Pairing:
-    """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity."""
+    """`*_order[k]` is the channel that carries phase k, `*_sign[k]` its polarity.
+
+    `others_deg`: the lags in the other orders that a motor has too, if not at this size of the currents.
+    """
 
     current_order: Order
     voltage_order: Order
@@ -48,6 +52,7 @@ class Pairing:
     rivals_deg: tuple[float, ...]
     findings: tuple[Finding, ...]
     channel_map: Mapping[str, str]
+    others_deg: tuple[float, ...] = ()
 
     @property
     def is_refused(self) -> bool:
@@ -84,12 +89,15 @@ def pair(
     explained = _explained_deg(currents, star, start, frequency_hz)
     _spacing("current", i, min(SPACING_TOLERANCE_DEG + explained, LARGEST_SPACING_DEG), findings)
     options = _options(currents, i, reference)
-    expected = _expected_lag_deg(currents, star, start, frequency_hz)
+    rated_lag = float(np.degrees(np.arccos(plate.power_factor)))
+    is_of_plate = LEAST_CURRENT < float(np.mean(np.abs(currents))) / plate.rated_current_peak_a < LARGEST_CURRENT
+    expected = _expected_lag_deg(currents, star, start, frequency_hz) if is_of_plate else rated_lag
+    tolerance = LAG_TOLERANCE_DEG if is_of_plate else 90.0
     if lag_deg is None:
-        current_order, current_sign, lag = _choose(options, expected, v.sequence < 0, findings)
+        current_order, current_sign, lag = _choose(options, expected, tolerance, v.sequence < 0, findings)
     else:
         current_order, current_sign, lag = min(options, key=lambda option: abs(option[2] - lag_deg))
-    least = float(np.degrees(np.arccos(plate.power_factor))) - BELOW_RATED_DEG
+    least = rated_lag - BELOW_RATED_DEG
     rivals = tuple(
         o[2]
         for o in options
@@ -125,8 +133,9 @@ def pair(
         for k, name in enumerate("uvw")
     }
     return Pairing(
-        current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, rivals, tuple(findings), mapping
-    )
+        current_order, voltage_order, current_sign, voltage_sign, v.sequence < 0, lag, rivals, tuple(findings), mapping,
+        tuple(o[2] for o in options if max(least, 0.0) < o[2] < 90.0 and o[2] != lag),
+    )  # fmt: skip
 
 
 def _voltage_order(sequence: int, line_to_line: bool) -> tuple[Order, int]:
@@ -219,12 +228,14 @@ def _expected_lag_deg(currents: list[complex], star: list[complex], start: TCirc
 def _choose(
     options: list[Option],
     expected_deg: float,
+    tolerance_deg: float,
     backwards: bool,
     findings: list[Finding],
 ) -> Option:
-    """The simplest plausible assignment; refused where none is."""
+    """The simplest plausible assignment; refused where none is. Currents of foreign size say nothing of the lag, so any is plausible
+    then: it is their scale that is refused."""
     plausible = [
-        option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < LAG_TOLERANCE_DEG
+        option for option in options if 0.0 < option[2] < 90.0 and abs(option[2] - expected_deg) < tolerance_deg
     ]
     if not plausible:
         order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))

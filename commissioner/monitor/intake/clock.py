@@ -16,6 +16,7 @@ SLOWEST_RATE = 10.0
 """Samples per rated period: the inversion needs side bands on either side of the fundamental."""
 SHORTEST_S = 2.0
 """Below this the shaft line (2 Hz resolution at best) cannot be told from the mains."""
+ROUNDED = 1.0 - 1e-9
 LARGEST_JITTER = 0.05
 """rms deviation of the time stamps from a straight line, in sample periods."""
 NOTED_JITTER = 0.01
@@ -79,13 +80,13 @@ def whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tuple
                 "record without gaps",
             )
         )
-    if (high - low) * period < SHORTEST_S:
+    if (high - low + 1) * period < SHORTEST_S * ROUNDED:  # to a sample, and the digits of printed times
         reason = "missing samples leave" if lost else "the recording holds"
         findings.append(
             Finding(
                 "too_short" if not lost else "missing_samples",
                 "refused",
-                f"{reason} {(high - low) * period:.3g} s without a break: too few load periods",
+                f"{reason} {(high - low) * period:.4g} s without a break: too few load periods",
                 (high - low) * period,
                 f"at least {SHORTEST_S:g} s, better 30-60 s",
                 RECORD_LONGER,

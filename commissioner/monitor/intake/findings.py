@@ -64,7 +64,8 @@ class Fundamental:
 class Audited:
     """The stretch that may be used, as space vectors in the right order, and everything that was found.
 
-    `lag_deg` is the current's behind its voltage in the order taken, `rivals_deg` in the other orders that make a motor.
+    `lag_deg` is the current's behind its voltage in the order taken, `rivals_deg` in the other orders that make a motor; `others_deg`
+    as in `Pairing`.
     """
 
     first_sample: int
@@ -79,6 +80,7 @@ class Audited:
     sensors: Trust = field(default_factory=Trust)
     lag_deg: float = 0.0
     rivals_deg: tuple[float, ...] = ()
+    others_deg: tuple[float, ...] = ()
 
     @property
     def refusal(self) -> Finding | None:

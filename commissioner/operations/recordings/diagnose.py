@@ -50,6 +50,10 @@ VERDICTS = ("unexplained", "explained", "nothing_significant", "refused")
 """Of several tables the first of these that one has is the verdict of all."""
 
 
+OWN_PHASES = "uvw"
+"""Of a diagnosis, where none of the recording's currents was taken for a computed one but w."""
+
+
 @dataclass(frozen=True)
 class DiagnoseRequest:
     """`motor` overrides the recordings' metadata. `out`: a folder for `report.html`, `model.json` and `diagnosis.json`.
@@ -117,10 +121,13 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
     recordings, copies = without_copies(recordings)
     seen = analyse(recordings, excluded=request.excluded, report=observe, go_on=go_on)
     is_computed = all(any(n.code == COMPUTED for n in r.notes) for r in recordings)
+    phases = OWN_PHASES
     if is_computed and (seen.verdict.value == "unexplained" or len(seen.causes) > 1):
-        seen, said = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
+        seen, said, phases = _of_another_pair(recordings, seen, request.excluded, observe, go_on)
         remarks = [*said, *remarks]
     document = as_document(seen)
+    for cause in document["causes"]:
+        cause["parameters"] = {_named_by(phases, key): value for key, value in cause["parameters"].items()}
     decided = _against_plate(document, {**recordings[0].metadata}, trust_from(request.trust))
     remarks = [*decided, *remarks]
     document["audit"] = [*remarks, *copies, *document["audit"]]
@@ -133,21 +140,27 @@ def _recordings(tables: Sequence[Table], request: DiagnoseRequest, observe: Obse
 
 def _of_another_pair(
     recordings: Sequence[StandstillRecording], seen: Diagnosis, excluded: tuple[str, ...], observe: Observe, go_on: GoOn
-) -> tuple[Diagnosis, list[str]]:
-    """The diagnosis with the computed current in another column, where that explains the data by fewer causes."""
+) -> tuple[Diagnosis, list[str], str]:
+    """The diagnosis with the computed current in another column, where that explains the data by fewer causes, and which phases of the
+    recording its u, v and w are."""
     choices = [other_pairs(r) for r in recordings]
-    best, said = seen, []
+    best, said, phases = seen, [], OWN_PHASES
     fewest = len(seen.causes) if seen.verdict.value == "explained" else len(CATALOGUE)
     for k, (name, _) in enumerate(choices[0]):
         other = analyse([c[k][1] for c in choices], excluded=excluded, report=observe, go_on=go_on)
         if other.verdict.value == "explained" and len(other.causes) < fewest:
             pair = {"u": ("v", "w"), "v": ("w", "u")}[name]
-            best, fewest = other, len(other.causes)
+            best, fewest, phases = other, len(other.causes), "".join((*pair, name))
             said = [
                 f"Explained by the fewest causes where current {name} is the computed one: phases u and v of this diagnosis are {pair[0]} "
-                f"and {pair[1]} of the recording, axes are counted from there."
+                f"and {pair[1]} of the recording, axes are counted from there; the sizes of causes are named by the recording's phases."
             ]
-    return best, said
+    return best, said, phases
+
+
+def _named_by(phases: str, key: str) -> str:
+    """A size's name with the recording's phases: gain_v_over_u is gain_w_over_v where u and v are the recording's v and w."""
+    return "_".join(phases[OWN_PHASES.index(word)] if word in tuple(OWN_PHASES) else word for word in key.split("_"))
 
 
 def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:

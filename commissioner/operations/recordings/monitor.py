@@ -144,7 +144,7 @@ def _of_currents(table: Table, request: MonitorRequest, observe: Observe) -> Mon
     stretches = states(recording, plate)
     part, used = longest_steady(recording, stretches)
     seen = of_currents(part, plate, Wishes(request.load_hz, None, start))
-    return _partly(seen, recording, [plain_state(s, used=s is used) for s in stretches], request)
+    return _partly(seen, recording, [plain_state(recording, s, used=s is used) for s in stretches], request)
 
 
 def _without_plate(recording: RunningRecording, request: MonitorRequest) -> PartlyMonitored | NotMonitored:
@@ -154,7 +154,7 @@ def _without_plate(recording: RunningRecording, request: MonitorRequest) -> Part
     seen = without_plate(part)
     if isinstance(seen, Finding):
         plate_of(recording.metadata, str(request.file), None)
-    return _partly(seen, recording, [plain_state(s, used=s is used) for s in stretches], request)
+    return _partly(seen, recording, [plain_state(recording, s, used=s is used) for s in stretches], request)
 
 
 def _partly(

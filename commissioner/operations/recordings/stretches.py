@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
+from commissioner.monitor.intake.clock import LEAST_SAMPLES
+from commissioner.monitor.intake.columns import complete
 from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
+from commissioner.monitor.signals.supply import dominant_frequency_hz, phase_voltages, space_vector
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
@@ -32,7 +37,8 @@ def in_its_states(
         recording = replace(recording, notes=(*recording.notes, ReadingNote(carrier.code, carrier.what)))
     stretches = states(recording, plate)
     if {s.state for s in stretches} <= {"steady", "lost"}:
-        return observe(recording, plate, wishes), recording, [_state(s, used=s.state == "steady") for s in stretches]
+        seen = observe(recording, plate, wishes)
+        return seen, recording, [plain_state(recording, s, used=s.state == "steady") for s in stretches]
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
         said = ", ".join(f"{s.state} {s.start_s:.3g} ... {s.end_s:.3g} s" for s in stretches)
@@ -72,9 +78,26 @@ def _add_own(
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
 
 
-def plain_state(stretch: Stretch, *, used: bool) -> State:
-    """A stretch as the document has it."""
+def plain_state(recording: RunningRecording, stretch: Stretch, *, used: bool) -> State:
+    """A stretch as the document has it; of a recording that is steady all along, current and frequency are measured here."""
+    if stretch.state == "steady" and stretch.current_a == 0.0:
+        stretch = _measured(recording, stretch)
     return _state(stretch, used=used)
+
+
+def _measured(recording: RunningRecording, stretch: Stretch) -> Stretch:
+    """With the rms current, and the frequency of the voltages, or of the currents where there are none; as it is where neither turns."""
+    part, _ = complete(cut_out(recording, stretch, 0.0))
+    volts = phase_voltages(*part.voltages_v) if part.voltages_are_line_to_line else part.voltages_v
+    current, voltage = (np.nan_to_num(space_vector(*x)) for x in (part.currents_a, volts))
+    if current.size < LEAST_SAMPLES or not np.any(current):
+        return stretch
+    current, voltage = current - current.mean(), voltage - voltage.mean()
+    turning = voltage if np.any(voltage) else current
+    return replace(
+        stretch, current_a=float(np.sqrt(np.mean(np.abs(current) ** 2) / 2.0)),
+        frequency_hz=abs(dominant_frequency_hz(turning, recording.sample_period_s)),
+    )  # fmt: skip
 
 
 def longest_steady(

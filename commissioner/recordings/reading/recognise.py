@@ -141,6 +141,7 @@ def _meaning(name: str, unit: str, target: Target | None, with_s: bool, source: 
             target.factor if target.factor is not None else _factor(name, unit, target.column, source)
         )
     bare = without_brackets(name)
+    bare = bare.lower() if bare.lower() in CONTRACT_COLUMNS else bare
     if bare in CONTRACT_COLUMNS:
         return bare, _factor(name, unit if unit != unit_in(bare) else "", bare, source)
     if of := turned(name):

@@ -36,7 +36,7 @@ def files(hidden, tmp_path_factory):
     write("good", lambda c: c | {"banana": c["time_s"]})
     write("short", lambda c: {k: v[:150] for k, v in c.items()})
     write("silent", lambda c: {k: 0.0 * v if k.startswith("current") else v for k, v in c.items()})
-    write("one_sensor", lambda c: {k: v for k, v in c.items() if k != "current_v_a"})
+    write("one_sensor", lambda c: {k: v for k, v in c.items() if k not in ("current_v_a", "current_w_a")})
     write("another_motor", rated_power_w=55000.0)
     running = ("time_s", "current_u_a", "current_v_a", "current_w_a")
     write("running", lambda c: {k: c[k] for k in running} | {f"voltage_{p}_v": c["voltage_axis_v"] for p in "uvw"})

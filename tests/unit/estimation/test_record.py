@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.record import STATES, between, noise_of, prepare
+from commissioner.estimation.record import MONITORED_RATE, MONITORED_S, STATES, between, noise_of, prepare
+from commissioner.monitor.intake import clock
+from commissioner.motor.nameplate import Nameplate
+from commissioner.records import RunningRecording
 from tests.running_effects.cases import Case, taken
 
 
@@ -80,3 +83,37 @@ def test_a_lost_third_current_or_line_voltages_change_nothing(start):
     two = prepare([replace(recording, currents_a=(*recording.currents_a[:2], np.full(u.size, np.nan)))], plate)
     assert not two.has_zero
     assert np.abs(two.windows[0].current[:, 2]).max() < 1e-12
+
+
+def slow(supply_hz, per_period, seconds):
+    """Balanced currents and voltages of a steady load, and a plate of this supply."""
+    step = 1.0 / (supply_hz * per_period)
+    t = np.arange(round(seconds / step)) * step
+    phases = [2 * np.pi * supply_hz * t - k * 2 * np.pi / 3 for k in range(3)]
+    plate = Nameplate(
+        rated_power_w=2200.0, rated_voltage_v=400.0, rated_frequency_hz=supply_hz, rated_current_a=4.9,
+        rated_speed_rpm=0.955 * 60.0 * supply_hz / 2, pole_pairs=2, power_factor=0.8,
+        connection="star",
+    )  # fmt: skip
+    return RunningRecording(
+        source="a.csv", time_s=t, currents_a=tuple(6.0 * np.cos(p - 0.6) for p in phases),
+        voltages_v=tuple(326.0 * np.cos(p) for p in phases), voltages_are_line_to_line=False,
+        speed_rad_per_s=None, sample_period_s=step,
+    ), plate  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("supply_hz", "per_period", "seconds", "fast", "is_for_monitor"),
+    [(50.0, 20, 3.0, "5 kHz", True), (50.0, 20, 1.0, "5 kHz", False), (50.0, 8, 3.0, "5 kHz", False),
+     (400.0, 20, 3.0, "16 kHz", True)],
+)  # fmt: skip
+def test_too_slow_for_a_fit_is_sent_to_the_verb_that_reads_it(supply_hz, per_period, seconds, fast, is_for_monitor):
+    recording, plate = slow(supply_hz, per_period, seconds)
+    with pytest.raises(DataRefused, match="too few") as refused:
+        prepare([recording], plate)
+    assert refused.value.remedy.startswith(f"record faster: {fast} or more")
+    assert ("commissioner monitor" in refused.value.remedy) == is_for_monitor
+
+
+def test_what_monitor_reads_is_what_it_reads():
+    assert (MONITORED_S, MONITORED_RATE) == (clock.SHORTEST_S, clock.SLOWEST_RATE)

@@ -9,6 +9,8 @@ import pytest
 
 from commissioner.monitor.chain import Refused, Wishes, observe
 from commissioner.monitor.intake.audit import inspect
+from commissioner.monitor.intake.clock import whole_stretch
+from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.levels import clipped_share
 from commissioner.motor.running import from_nameplate
 from commissioner.operations.recordings.stretches import in_its_states
@@ -265,3 +267,15 @@ def test_a_current_of_another_range_is_refused_by_its_name_and_factor(phase, fac
     (found,) = [f for f in audited(replace(recording, currents_a=currents)).findings if f.code == "open_sum"]
     assert found.stops and f"current {'uvw'[phase]} is" in found.what
     assert found.value == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(("samples", "is_enough"), [(1000, True), (999, True), (990, False)])
+def test_two_seconds_are_two_seconds_to_a_sample(samples: int, is_enough: bool) -> None:
+    """A period of printed times had made 1.99999999999978 s of them: "holds 2 s ... at least 2 s"."""
+    period = 2e-3 * (1.0 - 1e-13)
+    time = np.arange(samples) * period
+    waves = tuple(np.cos(314.0 * time - 2.0 * k) for k in range(3))
+    findings: list[Finding] = []
+    whole_stretch(RunningRecording(time, waves, waves, False, None, period), findings)
+    assert ([f.code for f in findings] == []) == is_enough
+    assert is_enough or "holds 1.98 s" in findings[0].what

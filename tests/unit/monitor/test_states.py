@@ -13,6 +13,7 @@ from commissioner.monitor.intake.states.stretches import cut_out, states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
+from commissioner.operations.recordings.stretches import plain_state
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
 from commissioner.records import RunningRecording
@@ -162,3 +163,19 @@ def test_a_load_that_swings_has_no_steps(swing_hz):
     seen = levels(20.0)
     seen.current_a[:] += 2.0 * np.sin(2 * np.pi * swing_hz * seen.time_s)
     assert set(named(seen, PLATE)) == {"steady"}
+
+
+@pytest.mark.parametrize("plate", [PLATE, None])
+@pytest.mark.parametrize("has_volts", [True, False])
+def test_one_steady_state_says_its_own_current_and_frequency(plate, has_volts):
+    """0 A and the plate's frequency had stood there."""
+    t = np.arange(8000) * 5e-4
+    turns = [2 * np.pi * 41.3 * t - 2 * np.pi / 3 * k for k in range(3)]
+    currents = tuple(3.2 * np.sqrt(2.0) * np.cos(x - 0.6) for x in turns)
+    volts = tuple(270.0 * np.cos(x) if has_volts else np.full(t.size, np.nan) for x in turns)
+    recording = RunningRecording(t, currents, volts, False, None, 5e-4)
+    (one,) = states(recording, plate)
+    state = plain_state(recording, one, used=True)
+    assert (state["state"], state["used"]) == ("steady", True)
+    assert state["current_a"] == pytest.approx(3.2, rel=1e-3)
+    assert state["frequency_hz"] == pytest.approx(41.3, abs=1e-3)

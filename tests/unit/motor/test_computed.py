@@ -40,6 +40,19 @@ def test_the_pair_that_explains_by_the_fewest_causes_is_taken(monkeypatch, count
     later = iter(made[1:])
     monkeypatch.setattr(operation, "analyse", lambda *_, **__: next(later))
     one = without_computed_third(recording())
-    best, said = operation._of_another_pair([one], made[0], (), lambda _: None, lambda: True)
+    best, said, phases = operation._of_another_pair([one], made[0], (), lambda _: None, lambda: True)
     assert best is (made[0] if wanted is None else made[{"u": 1, "v": 2}[wanted]])
     assert (f"current {wanted} is the computed one" in said[0]) if wanted else said == []
+    assert phases == {"u": "vwu", "v": "wuv", None: "uvw"}[wanted]
+
+
+@pytest.mark.parametrize(
+    ("phases", "key", "named"),
+    [
+        ("uvw", "gain_v_over_u", "gain_v_over_u"), ("vwu", "gain_v_over_u", "gain_w_over_v"),
+        ("wuv", "gain_v_over_u", "gain_u_over_w"), ("vwu", "offset_u_a", "offset_v_a"),
+        ("wuv", "offset_v_at_start_a", "offset_u_at_start_a"), ("vwu", "time_constant_us", "time_constant_us"),
+    ],
+)  # fmt: skip
+def test_sizes_are_named_by_the_phases_of_the_recording(phases: str, key: str, named: str) -> None:
+    assert operation._named_by(phases, key) == named

@@ -223,6 +223,7 @@ HEADS = {
     "contract": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a", 1.0),
     "names": ("Time (ms),segment,axis_deg,voltage_axis_v,Ia (mA),Ib (mA)", 1e3),
     "units": ("time_s [ms],segment,axis_deg,voltage_axis_v,current_u_a [mA],current_v_a [mA]", 1e3),
+    "other case": ("Time_S,Segment,AXIS_DEG,Voltage_Axis_V,Current_U_A,Current_V_A", 1.0),
     "unit row": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a\nms,,,V,mA,mA", 1e3),
 }
 
@@ -238,6 +239,22 @@ def test_standstill_recordings_come_from_the_same_headers(tmp_path: Path, name: 
     recording = to_standstill(contract_table(path))
     assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-6)
     np.testing.assert_allclose(recording.current_v_a, CURRENTS[1], atol=1e-4)
+
+
+@pytest.mark.parametrize("missing", ["u", "v", "w"])
+def test_two_currents_at_standstill_are_enough_whichever_they_are(tmp_path: Path, missing: str) -> None:
+    """v and w alone had been refused although u is the negative sum of theirs."""
+    path = tmp_path / "file.csv"
+    there = {p: CURRENTS[k] for k, p in enumerate("uvw") if p != missing}
+    zeros = np.zeros(TIME.size)
+    head = "time_s,segment,axis_deg,voltage_axis_v," + ",".join(f"current_{p}_a" for p in there)
+    path.write_text(lines(head) + rows(TIME, [zeros, zeros + 60, V[0], *there.values()]))
+    recording = to_standstill(contract_table(path))
+    said = any(f"current_{missing}_a is not there" in note.what for note in recording.notes)
+    assert said == (missing != "w") and recording.current_w_a is None
+    left = -sum(there.values())
+    np.testing.assert_allclose(recording.current_u_a, there.get("u", left), atol=2e-4)
+    np.testing.assert_allclose(recording.current_v_a, there.get("v", left), atol=2e-4)
 
 
 def test_a_running_recording_given_as_standstill_is_named(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from commissioner.diagnose.intake.audit import prepare
-from commissioner.diagnose.intake.noise import Noise, measure_noise
+from commissioner.diagnose.intake.noise import Noise, _without_unlike_gains, measure_noise
 from tests.unit.diagnose.conftest import recording
 
 PERIOD_S = 2e-4
@@ -48,6 +48,28 @@ def test_noise_that_rises_slowly_is_no_hum():
     rising = _resting(0.0, memory=0.97)
     at = np.searchsorted(rising.frequency_hz, [20.0, 50.0, 120.0])
     assert not rising.is_white and np.all(np.diff(rising.density[0, at]) < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("gains", "lag_us"),
+    [((1, 1, 1), 0), ((0.98, 1, 1), 0), ((1.03, 0.97, 1), 0), ((1, 1, 1), 40), ((0.95, 1, 1.04), 60)],
+)
+def test_what_unlike_sensors_leave_in_the_sum_of_the_currents_is_not_noise(gains, lag_us):
+    """A gain 2 % low had made the noise of 13 mA a coloured one of 19 mA, more than all that was left of the currents."""
+    blank = recording(axes=(0.0, 60.0, 120.0))
+    volts = blank.voltage_axis_v + 0.5
+    angles = np.deg2rad([[0.0], [120.0], [240.0]] - blank.axis_deg)
+    rows = np.array(gains)[:, None] * 0.3 * volts * np.cos(angles)
+    rows[1] -= 1e-6 * lag_us / PERIOD_S * np.gradient(rows[1])
+    rows += 0.01 * np.random.default_rng(6).standard_normal(rows.shape)
+    record, _ = prepare(
+        [replace(blank, voltage_axis_v=volts, current_u_a=rows[0], current_v_a=rows[1], current_w_a=rows[2])]
+    )
+    noise = measure_noise(record)
+    assert noise.source == "sum of the three currents" and noise.is_white
+    assert noise.sigma_a == pytest.approx(0.01, rel=0.03)
+    sums = [s.currents_a.sum(axis=0) for s in record.segments]
+    assert (_without_unlike_gains(record, sums) is sums) == (gains == (1, 1, 1) and not lag_us)
 
 
 def _resting(hum_a, memory=0.0):
