@@ -40,7 +40,7 @@ def test_straight_columns_are_straight_at_any_scale(scale: float, load: float) -
 @pytest.mark.parametrize("load", [0.8, 1.2])
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
 def test_crossed_columns_are_crossed_at_any_scale(scale: float, load: float) -> None:
-    assert [f[0] for f in paired(scale, load, turned=1).findings] == ["crossed_channels"]
+    assert [f.code for f in paired(scale, load, turned=1).findings] == ["crossed_channels"]
 
 
 @pytest.mark.parametrize("scale", [0.02, 0.001])
