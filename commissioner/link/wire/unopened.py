@@ -27,7 +27,7 @@ def _of_network(error: Exception) -> str:
     if isinstance(error, socket.gaierror):
         return "this name is not known here: give the drive's number, as tcp://192.168.0.20:502"
     if isinstance(error, ConnectionRefusedError):
-        return "nothing listens on this port there: check the port and that Modbus TCP is switched on in the drive"
+        return "nothing listens on this port there: check that Modbus TCP is switched on in the drive, the port, the address and the cable"
     return "check that the drive is powered, the cable, the address and that no other master holds it"
 
 
