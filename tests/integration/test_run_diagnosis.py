@@ -67,9 +67,7 @@ def test_it_joins_the_archive_whose_chain_stays_whole(ended):
 
 def test_a_diagnosis_whose_time_is_over_does_not_say_that_nothing_fits(ended):
     answer, folder = ended
-    document = as_document(
-        diagnose([to_standstill(read_table(folder / "recording.parquet"))], go_on=lambda: False), None
-    )
+    document = as_document(diagnose([to_standstill(read_table(folder / "recording.parquet"))], go_on=lambda: False))
     assert not document["is_complete"]
     assert document["reason"].startswith("Not finished")
     assert (
