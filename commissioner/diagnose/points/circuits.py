@@ -173,9 +173,7 @@ def fit_points(
 
     solution = least_squares(errors, start, bounds=(low, high), x_scale="jac", max_nfev=100)
     freedom = max(solution.fun.size - start.shape[0], 1)
-    variance = max(
-        float(solution.fun @ solution.fun) / freedom, 1.0
-    )  # the scatter is no less, and the prior no sharper
+    variance = max(float(solution.fun @ solution.fun) / freedom, LEAST_VARIANCE)
     covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
     return solution.x, covariance, solution.fun
 

@@ -56,9 +56,7 @@ def _sheets(path: Path) -> dict[str, Cells]:
             path, "is locked by a password", str(error), "an open file", "save it without a password"
         ) from error
     except (CalamineError, OSError, ValueError) as error:
-        raise _refused(
-            path, "is no workbook that can be read", str(error)[:120], "a whole file", "save it again, or as CSV"
-        ) from error
+        raise _unreadable(path, error) from error
 
 
 def _opened(path: Path) -> CalamineWorkbook:
@@ -85,9 +83,7 @@ def _require_bounded(path: Path) -> None:
                         if size > limit:
                             raise too_large(path, f"> {limit}", limit)
     except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, NotImplementedError) as error:
-        raise _refused(
-            path, "is no workbook that can be read", str(error)[:120], "a whole file", "save it again, or as CSV"
-        ) from error
+        raise _unreadable(path, error) from error
 
 
 def _is_table(cells: Cells) -> bool:
@@ -104,6 +100,12 @@ def _shown(cell: object) -> str:
     if isinstance(cell, dt.timedelta):
         return f"{cell.total_seconds():.15g}"
     return f"{cell:.15g}" if isinstance(cell, int | float) else ""
+
+
+def _unreadable(path: Path, error: Exception) -> DataRefused:
+    return _refused(
+        path, "is no workbook that can be read", str(error)[:120], "a whole file", "save it again, or as CSV"
+    )
 
 
 def _refused(path: Path, what: str, value: str, limit: str, remedy: str) -> DataRefused:

@@ -52,10 +52,9 @@ def verify(folder: Path, key: bytes | None = None) -> Verified:
     """What became of the run in `folder`. With a `key`, a run that its seal does not prove counts as changed."""
     lines, is_torn = read_lines(folder / "journal.jsonl")
     whole = _whole_records(lines)
+    is_chained, is_over = _is_chained(whole), _is_over(whole)
     damage: list[BlockDamage] = []
     counts = _count(folder / "blocks.bin", damage)
-    is_chained = any("previous" in record for record in whole)
-    is_over = any(record["kind"] == "run_ended" for record in whole)
     closed = _closings(whole)
     losses = [
         *_journal_losses(lines, is_chained=is_chained),
@@ -78,13 +77,19 @@ def losses_at_sight(folder: Path) -> tuple[Loss, ...]:
     """What is lost or changed of the journal and of the files it covers, without looking into the samples: for whoever shows a run."""
     lines, _ = read_lines(folder / "journal.jsonl")
     whole = _whole_records(lines)
-    is_chained = any("previous" in record for record in whole)
-    is_over = any(record["kind"] == "run_ended" for record in whole)
     return (
-        *_journal_losses(lines, is_chained=is_chained),
-        *_end_losses(folder, whole, is_over=is_over),
+        *_journal_losses(lines, is_chained=_is_chained(whole)),
+        *_end_losses(folder, whole, is_over=_is_over(whole)),
         *_file_losses(folder, _closings(whole)),
     )
+
+
+def _is_chained(whole: list[Record]) -> bool:
+    return any("previous" in record for record in whole)
+
+
+def _is_over(whole: list[Record]) -> bool:
+    return any(record["kind"] == "run_ended" for record in whole)
 
 
 def _closings(whole: list[Record]) -> list[Record]:
