@@ -67,7 +67,7 @@ def document(result: Identification) -> contract.IdentificationDocument:
         "stator_resistance_20degc_ohm": None
         if result.stator_resistance_20degc_ohm is None
         else quantity(Quantity(*result.stator_resistance_20degc_ohm)),
-        "gaps": {"count": result.gaps, "lost_samples": result.lost_samples},
+        "gaps": contract.Gaps(count=result.gaps, lost_samples=result.lost_samples),
         "duration_s": result.duration_s,
         "remarks": list(result.remarks),
     }

@@ -10,15 +10,6 @@ from commissioner.diagnose.causes.cause import Confounder
 from commissioner.running.causes import CATALOGUE as RUNNING
 
 ROOT = Path(__file__).parents[2] / "commissioner"
-OTHER_MEANING = {
-    ("identify/document.py", "lost_samples"),
-    ("cli/screens/identification.py", "lost_samples"),
-    ("monitor/intake/levels.py", "clipping"),
-    ("report/run/appendix.py", "lost_samples"),
-    ("report/run/certificate.py", "lost_samples"),
-    ("report/identification/page.py", "lost_samples"),
-}
-"""Counts of an identification's own audit, and a level of the monitor's: no diagnosis has a part in them."""
 
 
 def literals(path):
@@ -30,8 +21,7 @@ def test_no_cause_is_named_outside_the_catalogue():
     rooms = {ROOT / "diagnose/causes", ROOT / "running/causes"}
     files = [p for p in ROOT.rglob("*.py") if not rooms & set(p.parents)]
     names = {*CATALOGUE, *RUNNING}
-    named = {(p.relative_to(ROOT).as_posix(), word) for p in files for word in literals(p) if word in names}
-    assert named == OTHER_MEANING
+    assert not [(p.relative_to(ROOT).as_posix(), word) for p in files for word in literals(p) if word in names]
 
 
 def test_the_rooms_of_the_catalogue_name_none_either():

@@ -40,7 +40,7 @@ def show(document: Mapping[str, Any], sources: Sequence[str]) -> None:
     white = [a["whiteness"]["is_white"] for a in document["axes"]]
     console.print(
         f"{len(white)} axis test(s), {document['duration_s']:.1f} s energised, residual white in {sum(white)}; "
-        f"{document['gaps']['lost_samples']} samples lost in {document['gaps']['count']} gaps."
+        + "{lost_samples} samples lost in {count} gaps.".format(**document["gaps"])
     )
     for finding in document["findings"]:
         console.print(f"- {finding['sentence']}: {finding['relative_size']:+.2%} (std {finding['relative_std']:.2%})")

@@ -46,7 +46,7 @@ def channel_levels(currents: list[Signal], voltages: list[Signal], findings: lis
             if share > LARGEST_CLIPPED:
                 findings.append(
                     Finding(
-                        "clipping",
+                        "clipped_channel",
                         "refused",
                         f"{kind} channel {name} is clipped: {share:.1%} of its samples sit on a limit",
                         share,

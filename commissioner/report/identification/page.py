@@ -102,7 +102,7 @@ def _conditions(subject: Subject) -> Iterator[tuple[Text, Text]]:
 
 
 def _strip(subject: Subject, total_s: float) -> Iterator[tuple[Text, str, str]]:
-    tests, gaps = len(subject.tests), subject.result.get("gaps") or {}
+    tests, gaps = len(subject.tests), subject.gaps
     yield "Tests", str(tests), f"energised {total_s:.1f} s"
     peak_a = subject.peak_current_a
     yield "Highest current", f"{digits(peak_a, 3)} A" if peak_a else "none", "along the axis"
@@ -111,7 +111,7 @@ def _strip(subject: Subject, total_s: float) -> Iterator[tuple[Text, str, str]]:
     yield "Highest stator flux", f"{digits(highest, 3)} Wb", f"{100 * highest / rated:.0f} % of rated"
     noise_a = max(test.noise_a for test in subject.tests)
     yield "Left by the model", f"{digits(1e3 * noise_a, 2)} mA rms", "worst test"
-    yield "Samples lost", str(gaps.get("lost_samples", "not known")), f"in {gaps.get('count', 0)} gaps"
+    yield "Samples lost", str(gaps.lost_samples) if gaps else "not known", f"in {gaps.count if gaps else 0} gaps"
 
 
 def _rows(parameters: Record) -> Iterator[tuple[Text, ...]]:

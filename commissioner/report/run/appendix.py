@@ -31,7 +31,8 @@ _TOLD: Mapping[str, Callable[[Record], str]] = {
     ),
     "axis_finished": lambda r: (
         f"{'first look' if r['is_look'] else 'test'}{_on_axis(r)} done after {digits(r['energised_s'], 3)} s: "
-        f"flux to {100 * r['peak_flux_fraction']:.0f} % of the limit, {r['lost_samples']} samples lost; {r['why']}"
+        f"flux to {100 * r['peak_flux_fraction']:.0f} % of the limit, "
+        + "{lost_samples} samples lost; {why}".format(**r)
     ),
     "verdict_reached": lambda r: f"verdict: {r['decision']}; {r['reason']}",
     "parameters_written": lambda r: (

@@ -161,9 +161,8 @@ def _strip(subject: Subject) -> Iterator[tuple[Text, str, str]]:
         "Highest stator flux", f"{digits(flux, 3)} Wb" if flux else "none",
         f"limit {digits(limit, 3)} Wb" if limit else "",
     )  # fmt: skip
-    lost = (result.get("gaps") or {}).get("lost_samples")
     total = f"{subject.samples:,}".replace(",", " ")
-    yield "Samples lost", "not known" if lost is None else str(lost), f"of {total}"
+    yield "Samples lost", str(subject.gaps.lost_samples) if subject.gaps else "not known", f"of {total}"
 
 
 def _apart(subject: Subject) -> tuple[Text, str, str]:

@@ -36,6 +36,14 @@ class Session:
 
 
 @dataclass(frozen=True)
+class Gaps:
+    """What the recordings lack: how often, and how many samples."""
+
+    count: int
+    lost_samples: int
+
+
+@dataclass(frozen=True)
 class Test:
     """Every session of one orientation in a row."""
 
@@ -101,6 +109,11 @@ class Subject:
     @property
     def guard(self) -> Record:
         return self.result.get("flux_guard") or {}
+
+    @property
+    def gaps(self) -> Gaps | None:
+        found = self.result.get("gaps")
+        return Gaps(**found) if found else None
 
     def first(self, kind: str) -> Record:
         """The first record of a kind; empty where there is none."""

@@ -129,7 +129,7 @@ def test_clipped_channels_are_refused(group) -> None:
     signals = getattr(recording, group)
     limit = 0.97 * max(float(np.abs(s).max()) for s in signals)
     cut = tuple(np.clip(s, -0.9 * limit, 0.9 * limit) for s in signals)
-    assert refused_in(replace(recording, **{group: cut}), plate).reason.code == "clipping"
+    assert refused_in(replace(recording, **{group: cut}), plate).reason.code == "clipped_channel"
 
 
 def test_a_coarse_converter_is_not_taken_for_clipping() -> None:
