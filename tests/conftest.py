@@ -75,6 +75,17 @@ def is_short(request: pytest.FixtureRequest) -> bool:
     return request.node.get_closest_marker("campaign") is None
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Whoever asks for realtime tests alone does not import the files that hold none."""
+    asked = set(config.getoption("markexpr").split(" and "))
+    is_none = collection_path.is_file() and not _is_in(REALTIME, collection_path)
+    return True if asked & {"realtime", "alone"} and is_none else None
+
+
+def _is_in(names: tuple[str, ...], path: Path) -> bool:
+    return any(path.is_relative_to(TESTS / name) for name in names)
+
+
 def pytest_collection_finish() -> None:
     """What collecting has made is not looked through again: 0.3 s each time, with all threads of a worker standing."""
     gc.freeze()
@@ -86,10 +97,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.nodeid in at_night:
             item.add_marker(pytest.mark.campaign)
-        is_listed = any(item.path.is_relative_to(TESTS / name) for name in REALTIME)
-        if is_listed and item.name.split("[")[0] not in NOT_REALTIME:
+        if _is_in(REALTIME, item.path) and item.name.split("[")[0] not in NOT_REALTIME:
             item.add_marker(pytest.mark.realtime)
-            if any(item.path.is_relative_to(TESTS / name) for name in ALONE):
+            if _is_in(ALONE, item.path):
                 item.add_marker(pytest.mark.alone)
     if hasattr(config, "workerinput"):
         _costliest_first(items)

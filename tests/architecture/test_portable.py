@@ -4,6 +4,7 @@ import os
 import pathlib
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 
@@ -33,19 +34,22 @@ def test_every_module_imports_where_posix_is_hidden():
     assert done.stdout.strip().endswith("all imported"), done.stderr
 
 
-@pytest.mark.parametrize("platform", ["win32", "darwin"])
-def test_types_hold_on_other_systems(platform, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "mypy",
-        "--platform",
-        platform,
-        "--cache-dir",
-        str(ROOT / ".mypy_cache" / platform),
-    ]
+@cache
+def _type_errors(platform):
+    """What mypy says where it knows the standard library and us, and nothing else: a quarter of the time, the same use of the system."""
+    cache = str(ROOT / ".mypy_cache" / f"standard-{platform}")
+    options = ["--config-file=", "--no-site-packages", "--ignore-missing-imports", "--cache-dir", cache]
+    command = [sys.executable, "-m", "mypy", *options, "--platform", platform, "commissioner"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, encoding="utf-8", check=False)
-    assert done.returncode == 0, done.stdout
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    return set(done.stdout.splitlines()[:-1])
+
+
+@pytest.mark.parametrize("platform", ["win32", "darwin"])
+def test_what_is_right_here_is_right_on_other_systems(platform):
+    """`mypy` alone, as `.ci/run` calls it, finds nothing on this system; whatever only another has is named here."""
+    only_there = sorted(_type_errors(platform) - _type_errors("linux"))
+    assert not only_there
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp850", "ascii"])

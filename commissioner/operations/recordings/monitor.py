@@ -25,7 +25,7 @@ from commissioner.monitor.trend.reference import against_encoder
 from commissioner.monitor.trend.trend import Verdict
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.ranges import require_range
-from commissioner.operations.recordings.stretches import in_its_states, longest_steady, plain_state, said_by_terminals
+from commissioner.operations.recordings.stretches import as_state, in_its_states, longest_steady, said_by_terminals
 from commissioner.operations.recordings.trust import trust_from
 from commissioner.recordings.baseline import update
 from commissioner.recordings.importers import contract_table, has_currents_only, require_running
@@ -144,7 +144,7 @@ def _of_currents(table: Table, request: MonitorRequest, observe: Observe) -> Mon
     stretches = states(recording, plate)
     part, used = longest_steady(recording, stretches)
     seen = of_currents(part, plate, Wishes(request.load_hz, None, start))
-    return _partly(seen, recording, [plain_state(recording, s, used=s is used) for s in stretches], request)
+    return _partly(seen, recording, [as_state(s, used=s is used) for s in stretches], request)
 
 
 def _without_plate(recording: RunningRecording, request: MonitorRequest) -> PartlyMonitored | NotMonitored:
@@ -154,7 +154,7 @@ def _without_plate(recording: RunningRecording, request: MonitorRequest) -> Part
     seen = without_plate(part)
     if isinstance(seen, Finding):
         plate_of(recording.metadata, str(request.file), None)
-    return _partly(seen, recording, [plain_state(recording, s, used=s is used) for s in stretches], request)
+    return _partly(seen, recording, [as_state(s, used=s is used) for s in stretches], request)
 
 
 def _partly(

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
-from commissioner.monitor.intake.clock import LEAST_SAMPLES
-from commissioner.monitor.intake.columns import complete
 from commissioner.monitor.intake.findings import Finding
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
-from commissioner.monitor.signals.supply import dominant_frequency_hz, phase_voltages, space_vector
 from commissioner.motor.circuit import Quantity
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import ReadingNote, RunningRecording
@@ -38,7 +33,7 @@ def in_its_states(
     stretches = states(recording, plate)
     if {s.state for s in stretches} <= {"steady", "lost"}:
         seen = observe(recording, plate, wishes)
-        return seen, recording, [plain_state(recording, s, used=s.state == "steady") for s in stretches]
+        return seen, recording, [as_state(s, used=s.state == "steady") for s in stretches]
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
         said = ", ".join(f"{s.state} {s.start_s:.3g} ... {s.end_s:.3g} s" for s in stretches)
@@ -46,14 +41,14 @@ def in_its_states(
             "no_steady_stretch", "refused", "the motor is never in a steady state", said, "a steady stretch of a second",
             "record longer at constant supply and load",
         )  # fmt: skip
-        return _not_watched(recording, finding), recording, [_state(s, used=False) for s in stretches]
+        return _not_watched(recording, finding), recording, [as_state(s, used=False) for s in stretches]
     longest = max(steady, key=lambda s: s.duration_s)
     part = cut_out(recording, longest, MARGIN_S)
     note = ReadingNote(
         "states", f"{_listed(stretches)}: the answer is of the steady {_span(longest)}, what is beside it was not used"
     )
     seen = observe(replace(part, notes=(*part.notes, note)), plate, wishes)
-    out = [_state(s, used=s is longest) for s in stretches]
+    out = [as_state(s, used=s is longest) for s in stretches]
     for stretch, state in zip(stretches, out, strict=True):
         if stretch in steady:
             _add_own(state, recording, stretch, plate, wishes, is_watched=stretch is longest)
@@ -76,28 +71,6 @@ def _add_own(
     if terminal is not None:
         state["mean_speed_rad_per_s"] = {"value": terminal.speed_rad_per_s, "std": terminal.speed_std_rad_per_s}
         state["mean_torque_nm"] = {"value": terminal.torque_nm, "std": terminal.torque_std_nm}
-
-
-def plain_state(recording: RunningRecording, stretch: Stretch, *, used: bool) -> State:
-    """A stretch as the document has it; of a recording that is steady all along, current and frequency are measured here."""
-    if stretch.state == "steady" and stretch.current_a == 0.0:
-        stretch = _measured(recording, stretch)
-    return _state(stretch, used=used)
-
-
-def _measured(recording: RunningRecording, stretch: Stretch) -> Stretch:
-    """With the rms current, and the frequency of the voltages, or of the currents where there are none; as it is where neither turns."""
-    part, _ = complete(cut_out(recording, stretch, 0.0))
-    volts = phase_voltages(*part.voltages_v) if part.voltages_are_line_to_line else part.voltages_v
-    current, voltage = (np.nan_to_num(space_vector(*x)) for x in (part.currents_a, volts))
-    if current.size < LEAST_SAMPLES or not np.any(current):
-        return stretch
-    current, voltage = current - current.mean(), voltage - voltage.mean()
-    turning = voltage if np.any(voltage) else current
-    return replace(
-        stretch, current_a=float(np.sqrt(np.mean(np.abs(current) ** 2) / 2.0)),
-        frequency_hz=abs(dominant_frequency_hz(turning, recording.sample_period_s)),
-    )  # fmt: skip
 
 
 def longest_steady(
@@ -135,7 +108,7 @@ def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
     )  # fmt: skip
 
 
-def _state(stretch: Stretch, *, used: bool) -> State:
+def as_state(stretch: Stretch, *, used: bool) -> State:
     return {
         "state": stretch.state, "start_s": stretch.start_s, "end_s": stretch.end_s, "current_a": stretch.current_a,
         "frequency_hz": stretch.frequency_hz, "used": used,

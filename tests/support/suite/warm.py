@@ -1,6 +1,6 @@
 """Compile the kernels once, before several workers would each compile them: `python -m tests.support.suite.warm`.
 
-A process for each part, side by side. A kernel that only a few tests need is left to them.
+A process for each part, side by side, the longest first. A kernel that only a few tests need is left to them.
 """
 
 from __future__ import annotations
@@ -11,31 +11,47 @@ import sys
 from collections.abc import Callable
 
 
+def diagnosing() -> None:
+    """What a search compiles until its first cause is accepted, and each cause's part in a prediction."""
+    from commissioner.diagnose.causes import CATALOGUE
+    from commissioner.diagnose.diagnosis import diagnose
+    from commissioner.diagnose.plant.model import Model
+    from commissioner.diagnose.plant.prediction import predict
+    from commissioner.diagnose.search.journal import Accepted, Step
+    from tests.hidden_effects.generators.another_hand import Machine, recorded
+    from tests.unit.diagnose.conftest import NOMINAL, setting_of
+
+    made = recorded(Machine(leg_v=4.0, lag_s=1.2e-4), 1.0)
+    steps: list[Step] = []
+    diagnose([made], report=steps.append, go_on=lambda: not any(isinstance(s, Accepted) for s in steps))
+    nominal = Model(NOMINAL)
+    setting = setting_of(nominal)
+    for cause in CATALOGUE.values():
+        if terms := cause.terms(setting):
+            model = Model(nominal.nominal, terms, tuple(t.step for t in terms))
+            predict(model, setting.record, 1, setting.layout, wanted=terms)
+
+
+def simulating() -> None:
+    """The simulated drive and its recorder."""
+    from sim.recordings.standstill import record
+    from tests.campaigns.inverter import draw
+
+    drive = subprocess.Popen([sys.executable, "-m", "sim", "--tcp", "0"], stdout=subprocess.PIPE)
+    assert drive.stdout is not None
+    drive.stdout.readline()
+    drive.kill()
+    drive.wait()
+    scenario = draw(302, "tones")
+    record(dataclasses.replace(scenario, segments=scenario.segments[:1]), 302)
+
+
 def driving() -> None:
-    """A commissioning's steps and judgement, and the simulated drive."""
-    from commissioner.identify.analysis import identify
+    """A commissioning's steps."""
     from commissioner.procedure.energised.excite import warm_up
     from commissioner.settings import load_motor
-    from sim.recordings.standstill import record
-    from tests.campaigns.inverter import draw, to_recording
-    from tests.support.sim_process import SimProcess
 
-    with SimProcess("--scenario", "default", "--tcp", "0"):
-        pass
     warm_up(load_motor("motor_2kw2"))
-    scenario = draw(302, "tones")
-    columns, metadata, _ = record(dataclasses.replace(scenario, segments=scenario.segments[:1]), 302)
-    identify(to_recording(columns, metadata), is_final=False)
-
-
-def diagnosing() -> None:
-    """The simulator's recorder and another author's, and all that a search compiles until its first causes are accepted."""
-    from tests.hidden_effects.blind import diagnosed
-    from tests.hidden_effects.cases import Case
-    from tests.hidden_effects.generators.another_hand import Machine, recorded
-
-    recorded(Machine(), 0.1, count=1)
-    diagnosed(Case("one", 40, "dead_time", noise="white"), is_short=True)
 
 
 def observing() -> None:
@@ -50,7 +66,7 @@ def observing() -> None:
     diagnose([recording], plate)
 
 
-PARTS: dict[str, Callable[[], None]] = {"driving": driving, "diagnosing": diagnosing, "observing": observing}
+PARTS: dict[str, Callable[[], None]] = {p.__name__: p for p in (diagnosing, simulating, driving, observing)}
 
 
 def main() -> int:

@@ -86,7 +86,7 @@ def test_masked_samples_do_not_count():
 def test_a_fractional_delay_is_a_fifth_parameter():
     voltage = multitone(TONES, 6.0, PERIOD_S)
     late = np.concatenate([np.zeros(7), np.repeat(voltage, 10)[:-7]])  # 140 us
-    current = linear_response(TRUTH, late, PERIOD_S / 10)[0][::10]
+    current = linear_response(TRUTH, late, PERIOD_S / 10)[0][::10].copy()
     fit = fit_segments([Segment(voltage, current, 0.0, True)], PERIOD_S, START, ModelChoice(with_delay=True))
     assert fit.delay.value == pytest.approx(140e-6, abs=1e-6)
     assert np.max(np.abs(relative(fit))) < 5e-4
@@ -191,7 +191,7 @@ def two_late_segments():
     """Two stretches with an offset each, the current 60 us late and noisy."""
     voltage = multitone(TONES, 6.0, PERIOD_S)
     late = np.concatenate([np.zeros(3), np.repeat(voltage, 10)[:-3]])
-    current = linear_response(TRUTH, late, PERIOD_S / 10)[0][::10]
+    current = linear_response(TRUTH, late, PERIOD_S / 10)[0][::10].copy()
     current = current + 0.02 * np.random.default_rng(5).standard_normal(current.size)
     return [
         Segment(voltage[:15000], current[:15000] + 0.05, 0.0, False),

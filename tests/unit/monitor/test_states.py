@@ -13,7 +13,7 @@ from commissioner.monitor.intake.states.stretches import cut_out, states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
-from commissioner.operations.recordings.stretches import plain_state
+from commissioner.operations.recordings.stretches import as_state
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
 from commissioner.records import RunningRecording
@@ -175,7 +175,7 @@ def test_one_steady_state_says_its_own_current_and_frequency(plate, has_volts):
     volts = tuple(270.0 * np.cos(x) if has_volts else np.full(t.size, np.nan) for x in turns)
     recording = RunningRecording(t, currents, volts, False, None, 5e-4)
     (one,) = states(recording, plate)
-    state = plain_state(recording, one, used=True)
+    state = as_state(one, used=True)
     assert (state["state"], state["used"]) == ("steady", True)
     assert state["current_a"] == pytest.approx(3.2, rel=1e-3)
     assert state["frequency_hz"] == pytest.approx(41.3, abs=1e-3)

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from commissioner.monitor.intake.clock import LEAST_SAMPLES
 from commissioner.monitor.intake.columns import complete
 from commissioner.monitor.intake.states.naming import OFF_CURRENT, named
 from commissioner.monitor.intake.states.windows import WINDOW_PERIODS, Levels, cut, levels_of, plate_like
-from commissioner.monitor.signals.supply import space_vector
+from commissioner.monitor.signals.supply import dominant_frequency_hz, phase_voltages, space_vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 
@@ -58,13 +59,25 @@ def states(recording: RunningRecording, plate: Nameplate | None) -> tuple[Stretc
 
 def _of_one(recording: RunningRecording, plate: Nameplate) -> tuple[Stretch, ...]:
     levels = levels_of(recording, plate)
-    whole = (Stretch("steady", float(recording.time_s[0]), float(recording.time_s[-1]), 0.0, plate.rated_frequency_hz),)
-    if levels is None or levels.time_s.size < 8:
-        return whole
-    names = named(levels, plate)
-    if set(names) <= {"steady"}:
-        return whole
+    names = [] if levels is None or levels.time_s.size < 8 else named(levels, plate)
+    if levels is None or set(names) <= {"steady"}:
+        current_a, frequency_hz = _whole_levels(recording, plate)
+        return (Stretch("steady", float(recording.time_s[0]), float(recording.time_s[-1]), current_a, frequency_hz),)
     return tuple(_sharpened(_joined(levels, names, recording), recording, plate))
+
+
+def _whole_levels(recording: RunningRecording, plate: Nameplate) -> tuple[float, float]:
+    """Of a recording of one state: rms current, and the frequency of the voltages, or of the currents where there are none; the
+    plate's frequency where neither turns."""
+    part, _ = complete(recording)
+    volts = phase_voltages(*part.voltages_v) if part.voltages_are_line_to_line else part.voltages_v
+    current, voltage = (np.nan_to_num(space_vector(*x)) for x in (part.currents_a, volts))
+    if current.size < LEAST_SAMPLES or not np.any(current):
+        return 0.0, plate.rated_frequency_hz
+    current, voltage = current - current.mean(), voltage - voltage.mean()
+    turning = voltage if np.any(voltage) else current
+    frequency_hz = abs(dominant_frequency_hz(turning, recording.sample_period_s))
+    return float(np.sqrt(np.mean(np.abs(current) ** 2) / 2.0)), frequency_hz
 
 
 def _whole_parts(recording: RunningRecording) -> list[slice]:
