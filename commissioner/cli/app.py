@@ -9,10 +9,28 @@ from typing import Annotated
 import typer
 
 from commissioner.cli.console import degrade_output
-from commissioner.cli.drives import drives_app
 from commissioner.cli.failures import run_to_exit
+from commissioner.cli.groups.accounts import accounts_app
+from commissioner.cli.groups.drives import drives_app
+from commissioner.cli.groups.recordings import recordings_app
+from commissioner.cli.groups.runs import runs_app
 from commissioner.cli.help import Verbs, only
-from commissioner.cli.recordings import Map, recordings_app
+from commissioner.cli.options import (
+    Diagnosed,
+    Drive,
+    Json,
+    Map,
+    Motor,
+    Procedure,
+    Profile,
+    Run,
+    Runs,
+    Salvage,
+    Seal,
+    Strict,
+    Trust,
+    Waits,
+)
 from commissioner.paths import RUNS
 
 app = typer.Typer(
@@ -24,80 +42,10 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Commission an induction motor at standstill: identify it through its drive, judge the result, write it back.",
 )
-runs_app = typer.Typer(
-    cls=Verbs,
-    no_args_is_help=True,
-    help="The archive of runs: list, find, show, compare, motors, trend, report, export.",
-)
 app.add_typer(runs_app, name="runs")
 app.add_typer(drives_app, name="drives")
 app.add_typer(recordings_app, name="recordings")
-accounts_app = typer.Typer(cls=Verbs, no_args_is_help=True, help="The service's accounts: add, list, remove.")
 app.add_typer(accounts_app, name="accounts")
-
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
-Diagnosed = Annotated[
-    bool, typer.Option("--diagnosis/--no-diagnosis", help="Diagnose the run's own samples afterwards.")
-]
-Waits = Annotated[
-    bool, typer.Option("--wait", help="End only when the diagnosis is ready; otherwise it joins the archive later.")
-]
-Runs = Annotated[Path, typer.Option("--runs", envvar="COMMISSIONER_RUNS", help="Folder of the run archive.")]
-Trust = Annotated[
-    str | None,
-    typer.Option(
-        "--trust",
-        help="plate | data: which is right where the two contradict each other; of a manufacturer's sheet the word that its refusal names.",
-    ),
-]
-Motor = Annotated[str, typer.Option("--motor", help="Nameplate: a name in config/motors or a .toml file.")]
-Drive = Annotated[
-    str,
-    typer.Option(
-        "--drive", help="tcp://host:port?device=1, tls://host:802?..., rtu:///dev/ttyUSB0?baud=115200&parity=E&device=1"
-    ),
-]
-Profile = Annotated[str, typer.Option("--profile", help="Drive file: a name in config/drives or a .toml file.")]
-Procedure = Annotated[
-    Path | None, typer.Option("--procedure", help="Procedure file; config/procedure.toml if not given.")
-]
-Strict = Annotated[
-    bool,
-    typer.Option(
-        "--strict", help="Reject also where axes differ by a named cause, samples were lost or the flux guard acted."
-    ),
-]
-Seal = Annotated[
-    Path | None,
-    typer.Option(
-        "--seal",
-        envvar="COMMISSIONER_SEAL",
-        help="Key file: what is archived is sealed with it, and proved by `verify`.",
-    ),
-]
-Salvage = Annotated[
-    bool, typer.Option("--salvage", help="Go on with what is whole of a damaged run; the loss is still named.")
-]
-Database = Annotated[
-    str | None,
-    typer.Option(
-        "--archive",
-        envvar="COMMISSIONER_ARCHIVE",
-        help="Index that several computers share: postgresql+psycopg://USER@HOST/DATABASE; the password from ~/.pgpass.",
-    ),
-]
-WhichMotor = Annotated[str, typer.Option("--motor", help="Part of the motor's tag, serial number or plate.")]
-WhichDrive = Annotated[str, typer.Option("--drive", help="Part of the drive's type and number.")]
-WhichSerial = Annotated[str, typer.Option("--serial", help="Serial number of the drive or the motor.")]
-WhichPerson = Annotated[str, typer.Option("--person", help="Part of the name of who asked for the run.")]
-WhichOutcome = Annotated[str, typer.Option("--outcome", help="commissioned, rejected, aborted, faulted, cut off ...")]
-Since = Annotated[str, typer.Option("--since", help="UTC date, as 2026-11-25 or the start of one.")]
-Until = Annotated[str, typer.Option("--until", help="UTC date, included.")]
-Limit = Annotated[int | None, typer.Option("--limit", min=0, help="So many of the newest; 0: all.")]
-TableOut = Annotated[
-    Path | None, typer.Option("--out", help="Write them as a table instead: .csv or .parquet, a row a run.")
-]
-Run = Annotated[str, typer.Argument(help="Run id, or the start of one; `last` for the newest.")]
 
 
 def _say_version(asked: bool) -> None:
@@ -385,234 +333,6 @@ def simulate(
     verb(SimulateRequest(model, out, like, seconds, angles, noise_a, seed, plain), as_json=json)
 
 
-@runs_app.command("list")
-def runs_list(
-    motor: WhichMotor = "",
-    drive: WhichDrive = "",
-    serial: WhichSerial = "",
-    person: WhichPerson = "",
-    outcome: WhichOutcome = "",
-    since: Since = "",
-    until: Until = "",
-    limit: Limit = None,
-    out: TableOut = None,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Every run in the archive, newest first, also those that were cut off."""
-    runs_find([], motor, drive, serial, person, outcome, since, until, limit, out, archive, runs, json)
-
-
-@runs_app.command("find")
-def runs_find(
-    text: Annotated[
-        list[str], typer.Argument(help="Words, each anywhere in run, motor, drive, person, outcome or reason.")
-    ],
-    motor: WhichMotor = "",
-    drive: WhichDrive = "",
-    serial: WhichSerial = "",
-    person: WhichPerson = "",
-    outcome: WhichOutcome = "",
-    since: Since = "",
-    until: Until = "",
-    limit: Limit = None,
-    out: TableOut = None,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """The runs that hold all of these words."""
-    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs, write_table
-    from commissioner.operations.history.runs import Wanted
-
-    most = limit if limit is not None else 0 if json or out else SHOWN
-    wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
-    if out is not None:
-        write_table(runs, out, as_json=json, wanted=wanted, database=archive)
-        return
-    list_runs(runs, as_json=json, wanted=wanted, database=archive)
-
-
-@runs_app.command("index")
-def runs_index(
-    rebuild: Annotated[
-        bool, typer.Option("--rebuild", help="From the folders alone, whatever the index held.")
-    ] = False,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """The archive's index in step with the folders, which are the truth: it can be deleted at any time."""
-    from commissioner.cli.verbs.archived.runs import index
-
-    index(runs, rebuild=rebuild, database=archive, as_json=json)
-
-
-@runs_app.command("show")
-def runs_show(
-    run: Run = "last",
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """One run: outcome, reason, parameters, what was written, where the report is."""
-    from commissioner.cli.verbs.archived.runs import show_run
-
-    show_run(runs, run, as_json=json)
-
-
-@runs_app.command("report")
-def runs_report(run: Run = "last", runs: Runs = RUNS, json: Json = False) -> None:
-    """Where the HTML report of a run is; made again from its archive where it is missing."""
-    from commissioner.cli.verbs.archived.runs import report_run
-
-    report_run(runs, run, as_json=json)
-
-
-@runs_app.command("export")
-def runs_export(
-    run: Run,
-    out: Annotated[Path, typer.Argument(help="Target: .csv, .csv.gz, .parquet or .mat for samples.")],
-    form: Annotated[str, typer.Option("--form", help="samples, csv, json, motulator, matlab or modelica.")] = "samples",
-    salvage: Salvage = False,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """The samples of a run as one recording, or its parameters in the form of another program (--form)."""
-    from commissioner.cli.verbs.archived.runs import export_run
-
-    export_run(runs, run, out, form, as_json=json, salvage=salvage)
-
-
-@runs_app.command("compare")
-def runs_compare(
-    before: Run,
-    after: Run = "last",
-    recording: Annotated[
-        list[Path] | None, typer.Option("--recording", help="Instead of a second run: a recording; repeatable.")
-    ] = None,
-    motor: Annotated[str | None, typer.Option("--motor", help="Nameplate of the recordings.")] = None,
-    held: Annotated[
-        bool, typer.Option("--held", help="Instead of a second run: what the run's drive holds now.")
-    ] = False,
-    drive: Annotated[
-        str | None, typer.Option("--drive", help="Drive URL for --held; the run's own if not given.")
-    ] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Two runs, or a run and recordings, or a run and its drive: which parameter moved, how surely, what explains it."""
-    from commissioner.cli.verbs.archived.comparing import compare_drive, compare_runs
-
-    if held:
-        compare_drive(runs, before, drive, as_json=json)
-    else:
-        compare_runs(runs, before, after, as_json=json, recordings=tuple(recording or ()), motor=motor)
-
-
-@runs_app.command("motors")
-def runs_motors(
-    run: Annotated[
-        str | None, typer.Argument(help="Run id: on which of the known motors can it have been made?")
-    ] = None,
-    tag: Annotated[str, typer.Option("--tag", help="The run was made on the motor with this tag.")] = "",
-    motor_serial: Annotated[str, typer.Option("--motor-serial", help="The motor's serial number.")] = "",
-    confirm: Annotated[
-        bool, typer.Option("--confirm", help="It is the same motor, though its parameters say another.")
-    ] = False,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """The motors of the archive; which of them a run was made on, by its parameters; or saying so."""
-    from commissioner.cli.verbs.archived.motors import motors
-    from commissioner.operations.history.runs import Archive
-
-    motors(Archive(runs, archive), run, tag=tag, serial=motor_serial, confirm=confirm, as_json=json)
-
-
-@runs_app.command("trend")
-def runs_trend(
-    motor: Annotated[str | None, typer.Argument(help="The motor's tag or serial number.")] = None,
-    baseline: Annotated[
-        Path | None, typer.Option("--baseline", help="Indicators of this baseline of `monitor`.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .svg or .png.")] = None,
-    archive: Database = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """A motor over the years at one flux and temperature: intervals, drift, steps, alarms at a stated false-alarm rate."""
-    from commissioner.cli.verbs.archived.motors import show_trend
-    from commissioner.operations.history.runs import Archive
-
-    show_trend(Archive(runs, archive), motor, baseline, out, as_json=json)
-
-
-@runs_app.command("push")
-def runs_push(
-    target: Annotated[
-        str,
-        typer.Argument(help="Folder of another archive, also on a mounted share; or http(s)://HOST:PORT of a service."),
-    ],
-    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
-    account: Annotated[str, typer.Option(help="Name of an account of the service, an operator's.")] = "",
-    password_file: Annotated[
-        Path | None, typer.Option(help="Read its password from this file; asked for if not given.")
-    ] = None,
-    ca: Annotated[Path | None, typer.Option(help="PEM file of who vouches for the service's certificate.")] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Run folders to another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import push
-
-    push(runs, target, run or (), account=account, password_file=password_file, ca=ca, as_json=json)
-
-
-@runs_app.command("pull")
-def runs_pull(
-    source: Annotated[str, typer.Argument(help="Folder of another archive, also on a mounted share.")],
-    run: Annotated[list[str] | None, typer.Argument(help="Runs; all if not given.")] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Run folders from another archive, proved by their chain; goes on where it broke off."""
-    from commissioner.cli.verbs.archived.moving import pull
-
-    pull(runs, source, run or (), as_json=json)
-
-
-@runs_app.command("diagnose")
-def runs_diagnose(
-    run: Run = "last",
-    seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Given up, unfinished, after so long; 600 if not given.")
-    ] = None,
-    seal: Seal = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """What a plain simulation gets wrong about a run's own samples: into its result and report. `run` begins this by itself."""
-    from commissioner.cli.verbs.archived.deciding import diagnose_run
-
-    diagnose_run(runs, run, seconds, seal=seal, as_json=json)
-
-
-@runs_app.command("verify")
-def runs_verify(
-    run: Annotated[str | None, typer.Argument(help="Run id, or the start of one; `last` for the newest.")] = None,
-    everything: Annotated[bool, typer.Option("--all", help="Every run in the archive.")] = False,
-    seal: Seal = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Files and hash chain: exit 0 intact (a run that was killed is cut off, not damaged), 3 something lost or changed."""
-    from commissioner.cli.verbs.archived.verify import verify_runs
-
-    verify_runs(runs, run, everything=everything, seal=seal, as_json=json)
-
-
 @app.command()
 def restore(
     run: Run,
@@ -690,48 +410,6 @@ def ports(json: Json = False) -> None:
     from commissioner.cli.verbs.ports import ports as verb
 
     verb(as_json=json)
-
-
-@accounts_app.command("add")
-def accounts_add(
-    name: Annotated[str, typer.Argument(help="Name to log in with.")],
-    role: Annotated[str, typer.Option(help="viewer | operator | administrator")] = "operator",
-    password_file: Annotated[
-        Path | None, typer.Option(help="Read the password from this file; asked for if not given.")
-    ] = None,
-    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """A new account. The password comes from a prompt or a file, never from the command line."""
-    from commissioner.cli.verbs.serve import add
-
-    add(name, role=role, password_file=password_file, config=config, runs=runs, as_json=json)
-
-
-@accounts_app.command("list")
-def accounts_list(
-    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Names and roles."""
-    from commissioner.cli.verbs.serve import list_accounts
-
-    list_accounts(config=config, runs=runs, as_json=json)
-
-
-@accounts_app.command("remove")
-def accounts_remove(
-    name: Annotated[str, typer.Argument(help="Name of the account.")],
-    config: Annotated[Path | None, typer.Option("--config", help="The service's TOML file.")] = None,
-    runs: Runs = RUNS,
-    json: Json = False,
-) -> None:
-    """Remove an account; its sessions end at once."""
-    from commissioner.cli.verbs.serve import remove
-
-    remove(name, config=config, runs=runs, as_json=json)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 HOUSE = Path(__file__).parents[2] / "commissioner"
 COMPILED = {"kernel", "inlined", "njit", "_kernel", "_inlined"}
-OPTIONS = "cli/app.py"
+OPTIONS = ("cli/app.py", "cli/groups/")
 """Verbs of the command line, whose parameters are its options."""
 MOST, MANY = 10, {
     "identify/batch/modal.py:modal_pass",

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from commissioner.cli.help import Verbs
-
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
+from commissioner.cli.options import Json
 
 drives_app = typer.Typer(
     cls=Verbs,

@@ -8,14 +8,12 @@ from typing import Annotated
 import typer
 
 from commissioner.cli.help import Verbs
+from commissioner.cli.options import Json, Map
 
 recordings_app = typer.Typer(
     cls=Verbs, no_args_is_help=True, help="Recordings from other instruments: see what is understood, convert."
 )
 MOST_STATES = 12
-Map = Annotated[
-    Path | None, typer.Option("--map", help='TOML file that says what channels are: [columns] "CH1" = "current_u_a".')
-]
 
 
 @recordings_app.callback()
@@ -28,7 +26,7 @@ def recordings_import(
     file: Annotated[Path, typer.Argument(help="A recording of any kind that is read.")],
     mapping: Map = None,
     out: Annotated[Path | None, typer.Option("--out", help="Recording to write: .csv, .csv.gz or .parquet.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")] = False,
+    json: Json = False,
 ) -> None:
     """Show what is understood of a file: columns, units, rate, phase order; with --out write the contract's form."""
     from commissioner.cli.screens import screen
