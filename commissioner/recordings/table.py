@@ -27,6 +27,7 @@ from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
 from commissioner.recordings.reading.said_tests import codes, is_title, unknown
+from commissioner.recordings.reading.slow_columns import currents_on_the_commands_clock, on_one_clock
 from commissioner.recordings.whole import whole_file
 from commissioner.records import (
     POINT_COLUMNS,
@@ -50,6 +51,7 @@ TEXT_KEYS = frozenset(
 )
 
 
+CURRENTS = ("current_u_a", "current_v_a", "current_w_a")
 RUNNING_COLUMNS = ("voltage_u_v", "voltage_v_v", "voltage_uv_v", "voltage_vw_v", "speed_rad_per_s")
 
 
@@ -191,6 +193,10 @@ def to_standstill(table: Table) -> StandstillRecording:
     if np.any(segment != np.round(segment)):
         bad = float(segment[segment != np.round(segment)][0])
         raise _refuse(table.source, "segment is not a whole number", bad, "0, 1, 2, ...", "number the segments")
+    begins = (0, *(np.flatnonzero(np.diff(segment)) + 1))
+    clocked = currents_on_the_commands_clock(columns, CURRENTS, "voltage_axis_v", table.source, begins)
+    table = _without_unmeasured(table, *clocked)
+    columns, segment = table.columns, table.columns["segment"]
     period = sample_period(table, segment)
     recording = StandstillRecording(
         time_s=columns["time_s"],
@@ -208,6 +214,12 @@ def to_standstill(table: Table) -> StandstillRecording:
         averaged=_averaged(table, segment),
     )
     return without_computed_third(recording)
+
+
+def _without_unmeasured(table: Table, columns: Mapping[str, Signal], every: int, notes: Sequence[ReadingNote]) -> Table:
+    period = table.metadata.get("sample_period_s")
+    longer = {} if every == 1 or period in (None, "") else {"sample_period_s": every * float(period)}
+    return replace(table, columns=columns, metadata={**table.metadata, **longer}, notes=(*table.notes, *notes))
 
 
 def _averaged(table: Table, segment: Signal) -> NDArray[np.int64] | None:
@@ -228,11 +240,10 @@ def _averaged(table: Table, segment: Signal) -> NDArray[np.int64] | None:
 
 def _with_third_current(table: Table) -> Table:
     """With the current of u or v that two others leave for it, where it is the one that is not there: no sensor, so w tells no more."""
-    names = ("current_u_a", "current_v_a", "current_w_a")
-    missing = [name for name in names if name not in table.columns]
+    missing = [name for name in CURRENTS if name not in table.columns]
     if len(missing) != 1 or missing == ["current_w_a"]:
         return table
-    a, b = (name for name in names if name in table.columns)
+    a, b = (name for name in CURRENTS if name in table.columns)
     note = ReadingNote(COMPUTED, f"{missing[0]} is not there: taken as the negative sum of {a} and {b}")
     columns = {**table.columns, missing[0]: -(table.columns[a] + table.columns[b])}
     return replace(table, columns={k: v for k, v in columns.items() if k != "current_w_a"}, notes=(*table.notes, note))
@@ -248,7 +259,6 @@ def to_running(table: Table) -> RunningRecording:
     line = ("voltage_uv_v", "voltage_vw_v", "voltage_wu_v")
     is_line = phase[0] not in columns
     voltages = line if is_line else phase
-    currents = ("current_u_a", "current_v_a", "current_w_a")
     if "voltage_axis_v" in columns and is_line and not any(name in columns for name in line):
         raise _refuse(
             Path(table.source),
@@ -257,12 +267,14 @@ def to_running(table: Table) -> RunningRecording:
             "three voltages of a running motor",
             "`commissioner identify` or `commissioner diagnose` reads it",
         )
-    _require(table, _all_but_one(currents, columns), "a running-motor recording")
+    _require(table, _all_but_one(CURRENTS, columns), "a running-motor recording")
     _require(table, ("time_s", *(_all_but_one(line, columns) if is_line else phase)), "a running-motor recording")
+    table = _without_unmeasured(table, *on_one_clock(columns, (*CURRENTS, *voltages), table.source))
+    columns = table.columns
     empty = np.full(columns["time_s"].size, np.nan)
     time = columns["time_s"]
     period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
-    i = [columns.get(name, empty) for name in currents]
+    i = [columns.get(name, empty) for name in CURRENTS]
     v = [columns.get(name, empty) for name in voltages]
     return RunningRecording(
         time_s=time,
@@ -279,11 +291,11 @@ def to_running(table: Table) -> RunningRecording:
 
 def to_currents(table: Table) -> RunningRecording:
     """The table as a running recording without voltages (NaN throughout). DataRefused: fewer than two currents, or no time."""
-    currents = ("current_u_a", "current_v_a", "current_w_a")
-    _require(table, ("time_s", *_all_but_one(currents, table.columns)), "a recording of a motor's currents")
+    _require(table, ("time_s", *_all_but_one(CURRENTS, table.columns)), "a recording of a motor's currents")
+    table = _without_unmeasured(table, *on_one_clock(table.columns, CURRENTS, table.source))
     time = table.columns["time_s"]
     empty = np.full(time.size, np.nan)
-    u, v, w = (table.columns.get(name, empty) for name in currents)
+    u, v, w = (table.columns.get(name, empty) for name in CURRENTS)
     period = float(table.metadata.get("sample_period_s", 0.0) or np.median(np.diff(time)))
     return RunningRecording(
         time, (u, v, w), (empty, empty, empty), False, table.columns.get("speed_rad_per_s"), period, table.metadata,

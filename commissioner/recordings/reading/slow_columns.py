@@ -1,0 +1,122 @@
+"""Columns that a slower clock sampled than wrote their rows: a value stands for several rows, or lies on a straight line between two.
+
+What stands between was not measured, and a fit would take it for the motor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from commissioner.errors import DataRefused
+from commissioner.records import ReadingNote, Signal
+
+LEAST_NEW, LEAST_VALUES = 100, 20
+"""Rows with something new, and different values among them: below, a column of a few levels (a switched voltage, a test at rest)."""
+REGULAR = 0.99
+PRINTED = 3.0
+"""Last places by which a rounded straight line bends."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """A new value on every `every`th row of each block from its entry in `first` on; `first` empty: not on equal steps. `is_held`: in
+    between it stands."""
+
+    every: int
+    first: tuple[int, ...]
+    is_held: bool
+
+    def is_within(self, slower: Pace) -> bool:
+        """Whether every new row of the slower one is one of this too."""
+        return slower.every % self.every == 0 and self.first == tuple(k % self.every for k in slower.first)
+
+
+def pace_of(values: Signal, begins: Sequence[int] = (0,)) -> Pace | None:
+    """None: a value of its own in every row, as far as `(n,)` tell; a column with holes tells nothing. `begins`: the first row of
+    each block, between which the clock may have stood."""
+    if values.size <= LEAST_NEW or not np.all(np.isfinite(values)):
+        return None
+    held = _pace(values, np.diff(values) != 0.0, begins, is_held=True)
+    if held is not None:
+        return held
+    bends = np.abs(np.diff(values, 2)) > 1e-6 * np.abs(values).max() + PRINTED * _last_place(values)
+    return _pace(values, bends, begins, is_held=False)
+
+
+def on_one_clock(
+    columns: Mapping[str, Signal], watched: Sequence[str], source: str, begins: Sequence[int] = (0,)
+) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
+    """(columns, of how many rows one is left, what was left out). DataRefused: slow columns whose new rows are not the same."""
+    paces = _slow(columns, watched, begins)
+    if not paces:
+        return dict(columns), 1, []
+    slowest = max(paces.values(), key=lambda p: p.every)
+    if not all(p.first and p.is_within(slowest) for p in paces.values()):
+        raise _refused(paces, source, "export every column at one rate, each row measured")
+    rows = np.arange(next(iter(columns.values())).size)
+    kept = rows % slowest.every == np.repeat(slowest.first, np.diff([*begins, rows.size]))
+    note = ReadingNote("slow_columns", f"{_said(paces)}: the rows between were left out")
+    return {name: values[kept] for name, values in columns.items()}, slowest.every, [note]
+
+
+def currents_on_the_commands_clock(
+    columns: Mapping[str, Signal], currents: Sequence[str], command: str, source: str, begins: Sequence[int]
+) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
+    """As `on_one_clock`, where what drives the currents stands still between their rows. DataRefused where it does not: what the
+    currents did meanwhile cannot be computed from a command of fewer rows."""
+    paces = _slow(columns, currents, begins)
+    driven = pace_of(columns[command], begins) if paces else None
+    if paces and any(
+        not p.first or driven is None or not p.is_within(driven) or driven.every != p.every for p in paces.values()
+    ):
+        raise _refused(
+            paces,
+            source,
+            f"record the currents in every row; or write only their rows, if {command} does not change between them",
+        )
+    return on_one_clock(columns, currents, source, begins)
+
+
+def _slow(columns: Mapping[str, Signal], watched: Sequence[str], begins: Sequence[int]) -> dict[str, Pace]:
+    return {name: pace for name in watched if name in columns and (pace := pace_of(columns[name], begins))}
+
+
+def _pace(values: Signal, is_new: np.ndarray, begins: Sequence[int], *, is_held: bool) -> Pace | None:
+    at = np.setdiff1d(np.flatnonzero(is_new) + 1, begins)
+    if at.size < LEAST_NEW or np.unique(values[at]).size < LEAST_VALUES:
+        return None
+    gaps = np.diff(at)
+    every = int(np.bincount(gaps).argmax())
+    if every < 2:
+        return None
+    phases = [np.bincount(rows % every, minlength=every) for rows in np.split(at, np.searchsorted(at, begins[1:]))]
+    if sum(int(phase.max()) for phase in phases) >= REGULAR * at.size:
+        return Pace(every, tuple(int(phase.argmax()) for phase in phases), is_held)
+    steps = np.abs(np.diff(values[at]))
+    is_uneven = is_held and np.mean(np.abs(gaps - every) <= 1) >= REGULAR and gaps.min() >= 2
+    return Pace(every, (), is_held) if is_uneven and np.median(steps) > PRINTED * steps[steps > 0.0].min() else None
+
+
+def _last_place(values: Signal) -> float:
+    """Of the decimals that all are written with; 0 where there is none."""
+    return next(
+        (10.0**-d for d in range(8) if np.all(np.abs(values * 10.0**d - np.round(values * 10.0**d)) < 1e-3)), 0.0
+    )
+
+
+def _said(paces: Mapping[str, Pace]) -> str:
+    slowest = max(paces.values(), key=lambda p: p.every)
+    between = "stand" if slowest.is_held else "lie on straight lines"
+    steps = f"every {slowest.every} rows" if slowest.first else f"every {slowest.every} rows or one more or less"
+    return f"{', '.join(paces)} have a new value {steps} and {between} in between"
+
+
+def _refused(paces: Mapping[str, Pace], source: str, remedy: str) -> DataRefused:
+    return DataRefused(
+        f"{source}: {_said(paces)}: what is there was not measured", step="read the recording",
+        value=", ".join(f"{name}: every {pace.every} rows" for name, pace in paces.items()), limit="a measured value in every row",
+        remedy=remedy,
+    )  # fmt: skip

@@ -1,0 +1,109 @@
+"""A value that stands for several rows, or lies on a line between two, was not measured there."""
+
+import numpy as np
+import pytest
+
+from commissioner.errors import DataRefused
+from commissioner.recordings.reading.slow_columns import Pace, pace_of
+from commissioner.recordings.table import Table, to_currents, to_running, to_standstill
+
+ROWS, PERIOD_S = 4000, 5e-4
+TIME = PERIOD_S * np.arange(ROWS)
+RNG = np.random.default_rng(7)
+MEASURED = 5.0 * np.cos(2.0 * np.pi * 41.3 * TIME) + 0.01 * RNG.standard_normal(ROWS)
+
+
+def held(values, every, first=0):
+    return values[np.maximum((np.arange(values.size) - first) // every * every + first, 0)]
+
+
+def on_lines(values, every):
+    return np.interp(np.arange(values.size), np.arange(0, values.size, every), values[::every])
+
+
+@pytest.mark.parametrize(("every", "first"), [(2, 0), (2, 1), (5, 3)])
+@pytest.mark.parametrize("step", [0.0, 0.001, 0.0073])
+def test_a_held_value_and_an_interpolated_one_tell_their_pace(every, first, step):
+    column = MEASURED if step == 0.0 else step * np.round(MEASURED / step)
+    assert pace_of(held(column, every, first)) == Pace(every, (first % every,), is_held=True)
+    assert pace_of(on_lines(column, every)) == Pace(every, (0,), is_held=False)
+    assert pace_of(np.round(on_lines(column, every), 3)) == Pace(every, (0,), is_held=False)
+
+
+def test_a_clock_between_two_rows_is_told_as_uneven():
+    newest = np.ceil(2.5 * np.floor(np.arange(ROWS) / 2.5)).astype(int)
+    seen = pace_of(MEASURED[newest])
+    assert seen is not None and seen.is_held and not seen.first
+    with pytest.raises(DataRefused, match="or one more or less"):
+        to_currents(running(lambda x: x[newest]))
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        MEASURED,
+        0.1 * np.round(MEASURED / 0.1),
+        0.5 * np.round(0.01 * MEASURED / 0.5),
+        np.cos(2.0 * np.pi * 0.3 * TIME),
+        np.where(TIME < 1.5, 2.0, np.cos(2.0 * np.pi * 20.0 * TIME)),
+        np.round(TIME * 40.0),
+        300.0 * np.sign(np.cos(2.0 * np.pi * 50.0 * TIME + 0.1)),
+        270.0 * (np.round(np.arange(ROWS) / 10.0) % 6),
+        np.zeros(ROWS),
+        np.where(np.arange(ROWS) == 100, np.nan, held(MEASURED, 5)),
+        held(MEASURED, 5)[:90],
+    ],
+    ids=["own", "coarse", "coarser_than_noise", "slow_exact", "rest_first", "ramp_in_steps", "square", "six_steps", "zero", "hole", "short"],
+)  # fmt: skip
+def test_what_is_coarse_slow_still_or_switched_has_its_own_value_in_every_row(column):
+    assert pace_of(column) is None
+
+
+def running(change, names=("current_u_a", "current_v_a", "current_w_a"), **metadata):
+    phase = [41.3 * 2.0 * np.pi * TIME - 2.0 * np.pi / 3.0 * k for k in range(3)]
+    columns = {"time_s": TIME} | {
+        f"{what}_{p}_{unit}": size * np.cos(phase[k]) + 0.01 * RNG.standard_normal(ROWS)
+        for what, unit, size in (("current", "a", 5.0), ("voltage", "v", 300.0)) for k, p in enumerate("uvw")
+    }  # fmt: skip
+    columns |= {name: change(columns[name]) for name in names}
+    return Table(columns, metadata, "file.csv")
+
+
+@pytest.mark.parametrize("read", [to_running, to_currents])
+def test_of_a_running_motor_the_measured_rows_are_left(read):
+    table = running(lambda x: held(x, 4), sample_period_s=PERIOD_S)
+    seen = read(table)
+    assert seen.sample_period_s == pytest.approx(4 * PERIOD_S) and seen.time_s.size == ROWS // 4
+    assert np.array_equal(seen.currents_a[1], table.columns["current_v_a"][::4])
+    assert "every 4 rows" in seen.notes[-1].what
+    assert read(running(lambda x: on_lines(x, 4))).sample_period_s == pytest.approx(4 * PERIOD_S)
+    assert read(running(lambda x: x)).time_s.size == ROWS
+
+
+def test_columns_of_unlike_clocks_are_refused():
+    table = running(lambda x: held(x, 4))
+    two = {**table.columns, "current_v_a": held(running(lambda x: x).columns["current_v_a"], 3)}
+    with pytest.raises(DataRefused, match="every 4 rows") as refusal:
+        to_running(Table(two, {}, "file.csv"))
+    assert "current_v_a: every 3 rows" in str(refusal.value.value)
+    assert refusal.value.remedy == "export every column at one rate, each row measured"
+
+
+def standing(command_every, current_every):
+    segment = np.repeat([0.0, 1.0], [ROWS // 2 + 1, ROWS // 2 - 1])
+    shifted = np.concatenate([held(x, current_every) for x in np.split(MEASURED, [ROWS // 2 + 1])])
+    columns = {
+        "time_s": TIME, "segment": segment, "axis_deg": np.zeros(ROWS), "current_u_a": shifted, "current_v_a": -0.5 * shifted,
+        "voltage_axis_v": np.concatenate([held(x, command_every) for x in np.split(10.0 * MEASURED, [ROWS // 2 + 1])]),
+    }  # fmt: skip
+    return Table(columns, {}, "file.csv")
+
+
+def test_at_standstill_they_are_left_where_the_command_stands_between_them_too():
+    seen = to_standstill(standing(4, 4))
+    assert seen.sample_period_s == pytest.approx(4 * PERIOD_S)
+    assert seen.current_u_a.size == -(-(ROWS // 2 + 1) // 4) + -(-(ROWS // 2 - 1) // 4)
+    assert to_standstill(standing(4, 1)).current_u_a.size == ROWS
+    for command_every in (1, 2, 8):
+        with pytest.raises(DataRefused, match="every 4 rows"):
+            to_standstill(standing(command_every, 4))
