@@ -1,4 +1,4 @@
-"""Columns that a slower clock sampled than wrote their rows: a value stands for several rows, or lies on a straight line between two.
+"""Columns that a slower clock sampled than wrote their rows: a value stands for several rows, lies on a straight line between two, or is not there.
 
 What stands between was not measured, and a fit would take it for the motor.
 """
@@ -16,18 +16,19 @@ from commissioner.records import ReadingNote, Signal
 LEAST_NEW, LEAST_VALUES = 100, 20
 """Rows with something new, and different values among them: below, a column of a few levels (a switched voltage, a test at rest)."""
 REGULAR = 0.99
+HELD, ON_LINES, BLANK = "stand", "lie on straight lines", "are blank"
 PRINTED = 3.0
 """Last places by which a rounded straight line bends."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """A new value on every `every`th row of each block from its entry in `first` on; `first` empty: not on equal steps. `is_held`: in
-    between it stands."""
+    """A new value on every `every`th row of each block from its entry in `first` on; `first` empty: not on equal steps. `between`: what
+    the rows in between hold."""
 
     every: int
     first: tuple[int, ...]
-    is_held: bool
+    between: str
 
     def is_within(self, slower: Pace) -> bool:
         """Whether every new row of the slower one is one of this too."""
@@ -35,15 +36,16 @@ class Pace:
 
 
 def pace_of(values: Signal, begins: Sequence[int] = (0,)) -> Pace | None:
-    """None: a value of its own in every row, as far as `(n,)` tell; a column with holes tells nothing. `begins`: the first row of
-    each block, between which the clock may have stood."""
-    if values.size <= LEAST_NEW or not np.all(np.isfinite(values)):
+    """None: a value of its own in every row, as far as `(n,)` tell. `begins`: the first row of each block, between which the clock may
+    have stood."""
+    if values.size <= LEAST_NEW:
         return None
-    held = _pace(values, np.diff(values) != 0.0, begins, is_held=True)
-    if held is not None:
-        return held
+    there = np.isfinite(values)
+    if not np.all(there):
+        return _pace(values, np.flatnonzero(there), begins, BLANK)
     bends = np.abs(np.diff(values, 2)) > 1e-6 * np.abs(values).max() + PRINTED * _last_place(values)
-    return _pace(values, bends, begins, is_held=False)
+    held = _pace(values, np.setdiff1d(np.flatnonzero(np.diff(values)) + 1, begins), begins, HELD)
+    return held or _pace(values, np.setdiff1d(np.flatnonzero(bends) + 1, begins), begins, ON_LINES)
 
 
 def on_one_clock(
@@ -84,8 +86,7 @@ def _slow(columns: Mapping[str, Signal], watched: Sequence[str], begins: Sequenc
     return {name: pace for name in watched if name in columns and (pace := pace_of(columns[name], begins))}
 
 
-def _pace(values: Signal, is_new: np.ndarray, begins: Sequence[int], *, is_held: bool) -> Pace | None:
-    at = np.setdiff1d(np.flatnonzero(is_new) + 1, begins)
+def _pace(values: Signal, at: np.ndarray, begins: Sequence[int], between: str) -> Pace | None:
     if at.size < LEAST_NEW or np.unique(values[at]).size < LEAST_VALUES:
         return None
     gaps = np.diff(at)
@@ -94,10 +95,10 @@ def _pace(values: Signal, is_new: np.ndarray, begins: Sequence[int], *, is_held:
         return None
     phases = [np.bincount(rows % every, minlength=every) for rows in np.split(at, np.searchsorted(at, begins[1:]))]
     if sum(int(phase.max()) for phase in phases) >= REGULAR * at.size:
-        return Pace(every, tuple(int(phase.argmax()) for phase in phases), is_held)
+        return Pace(every, tuple(int(phase.argmax()) for phase in phases), between)
     steps = np.abs(np.diff(values[at]))
-    is_uneven = is_held and np.mean(np.abs(gaps - every) <= 1) >= REGULAR and gaps.min() >= 2
-    return Pace(every, (), is_held) if is_uneven and np.median(steps) > PRINTED * steps[steps > 0.0].min() else None
+    is_uneven = between == HELD and np.mean(np.abs(gaps - every) <= 1) >= REGULAR and gaps.min() >= 2
+    return Pace(every, (), between) if is_uneven and np.median(steps) > PRINTED * steps[steps > 0.0].min() else None
 
 
 def _last_place(values: Signal) -> float:
@@ -109,9 +110,8 @@ def _last_place(values: Signal) -> float:
 
 def _said(paces: Mapping[str, Pace]) -> str:
     slowest = max(paces.values(), key=lambda p: p.every)
-    between = "stand" if slowest.is_held else "lie on straight lines"
     steps = f"every {slowest.every} rows" if slowest.first else f"every {slowest.every} rows or one more or less"
-    return f"{', '.join(paces)} have a new value {steps} and {between} in between"
+    return f"{', '.join(paces)} have a new value {steps} and {slowest.between} in between"
 
 
 def _refused(paces: Mapping[str, Pace], source: str, remedy: str) -> DataRefused:

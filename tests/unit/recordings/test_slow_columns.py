@@ -25,15 +25,15 @@ def on_lines(values, every):
 @pytest.mark.parametrize("step", [0.0, 0.001, 0.0073])
 def test_a_held_value_and_an_interpolated_one_tell_their_pace(every, first, step):
     column = MEASURED if step == 0.0 else step * np.round(MEASURED / step)
-    assert pace_of(held(column, every, first)) == Pace(every, (first % every,), is_held=True)
-    assert pace_of(on_lines(column, every)) == Pace(every, (0,), is_held=False)
-    assert pace_of(np.round(on_lines(column, every), 3)) == Pace(every, (0,), is_held=False)
+    assert pace_of(held(column, every, first)) == Pace(every, (first % every,), "stand")
+    assert pace_of(on_lines(column, every)) == Pace(every, (0,), "lie on straight lines")
+    assert pace_of(np.round(on_lines(column, every), 3)) == Pace(every, (0,), "lie on straight lines")
 
 
 def test_a_clock_between_two_rows_is_told_as_uneven():
     newest = np.ceil(2.5 * np.floor(np.arange(ROWS) / 2.5)).astype(int)
     seen = pace_of(MEASURED[newest])
-    assert seen is not None and seen.is_held and not seen.first
+    assert seen is not None and seen.between == "stand" and not seen.first
     with pytest.raises(DataRefused, match="or one more or less"):
         to_currents(running(lambda x: x[newest]))
 
@@ -50,7 +50,7 @@ def test_a_clock_between_two_rows_is_told_as_uneven():
         300.0 * np.sign(np.cos(2.0 * np.pi * 50.0 * TIME + 0.1)),
         270.0 * (np.round(np.arange(ROWS) / 10.0) % 6),
         np.zeros(ROWS),
-        np.where(np.arange(ROWS) == 100, np.nan, held(MEASURED, 5)),
+        np.where(np.arange(ROWS) % 7 == 3, np.nan, MEASURED),
         held(MEASURED, 5)[:90],
     ],
     ids=["own", "coarse", "coarser_than_noise", "slow_exact", "rest_first", "ramp_in_steps", "square", "six_steps", "zero", "hole", "short"],
@@ -77,6 +77,8 @@ def test_of_a_running_motor_the_measured_rows_are_left(read):
     assert np.array_equal(seen.currents_a[1], table.columns["current_v_a"][::4])
     assert "every 4 rows" in seen.notes[-1].what
     assert read(running(lambda x: on_lines(x, 4))).sample_period_s == pytest.approx(4 * PERIOD_S)
+    blank = np.where(np.arange(ROWS) % 3 == 1, 1.0, np.nan)
+    assert read(running(lambda x: x * blank)).currents_a[0].size == np.count_nonzero(np.isfinite(blank))
     assert read(running(lambda x: x)).time_s.size == ROWS
 
 
