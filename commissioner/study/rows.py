@@ -9,7 +9,7 @@ from typing import Any, NotRequired, cast
 
 from typing_extensions import TypedDict
 
-from commissioner.encoding import plain
+from commissioner.encoding import plain, read_json
 from commissioner.errors import UsageError
 from commissioner.monitor.contract import Measured
 from commissioner.recordings.whole import whole_file
@@ -66,7 +66,7 @@ class Rows:
                     f"{folder} holds the rows of a study", step="study", value=str(lines), limit="an empty folder, or --resume",
                     remedy="give --resume to finish it, or another --out",
                 )  # fmt: skip
-            before = json.loads(known.read_text("utf-8")) if known.is_file() else None
+            before = read_json(known.read_text("utf-8")) if known.is_file() else None
             if before != plain(asked):
                 raise UsageError(
                     f"{folder} holds another study", step="study", value=str(known), limit="the study that was begun there",
@@ -104,7 +104,7 @@ def _whole_lines(path: Path) -> Iterable[Row]:
     """Lines up to one that a kill has cut off."""
     for line in path.read_text("utf-8").split("\n"):
         try:
-            row = json.loads(line)
+            row = read_json(line)
         except ValueError:
             continue
         if isinstance(row, dict) and isinstance(row.get("case"), int):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.history.share import (
     CONFLICT,
@@ -139,7 +139,7 @@ class _Service:
             self._connection.request(method, path, body, headers)
             answer = self._connection.getresponse()
             text = answer.read()
-            document = json.loads(text)
+            document = read_json(text)
         except ssl.SSLCertVerificationError as failure:
             raise CommissionerError(
                 f"the service's certificate is not trusted: {failure.verify_message}", step="push", value=self._url,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from commissioner.encoding import LARGEST
 from commissioner.errors import CommissionerError
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.origin import machine_part
@@ -106,7 +107,7 @@ def stamps(root: Path) -> Stamps:
     for name in names:
         with suppress(OSError, ValueError):
             seen = os.stat(f"{prefix}{name}{os.sep}{JOURNAL}")  # noqa: PTH116  a Path for each of 10 000 takes as long as the rest
-            found[name] = (seen.st_size, seen.st_mtime_ns)
+            found[name] = _stamp(seen)
     return found
 
 
@@ -140,9 +141,13 @@ def _refresh(store: Store, root: Path, place: str, seen: Stamps, *, anew: bool =
 
 
 def _note(store: Store, folder: Path) -> None:
-    seen = (folder / JOURNAL).stat()
     place = place_of(folder.parent)
-    store.write(place, [_row(folder, place, (seen.st_size, seen.st_mtime_ns))], ())
+    store.write(place, [_row(folder, place, _stamp((folder / JOURNAL).stat()))], ())
+
+
+def _stamp(seen: os.stat_result) -> tuple[int, int]:
+    """Size and time; a time that no index can keep (a clock centuries off) is the latest or earliest that it can."""
+    return seen.st_size, max(-LARGEST, min(seen.st_mtime_ns, LARGEST - 1))
 
 
 def _row(folder: Path, place: str, stamp: tuple[int, int]) -> Row:

@@ -15,7 +15,7 @@ from fastapi.responses import RedirectResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.requests import HTTPConnection
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Operator, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
@@ -209,7 +209,7 @@ class _Socket:
             while True:
                 text = await self._socket.receive_text()
                 with contextlib.suppress(ValueError):
-                    said = json.loads(text)
+                    said = read_json(text)
                     if isinstance(said, dict):
                         await self._take(said)
 

@@ -1,6 +1,7 @@
 """The run folder loses nothing that was written and shows where a kill tore the rest."""
 
 import json
+import os
 import re
 import stat
 
@@ -12,7 +13,7 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import export_run
 from commissioner.operations.history.runs import Archive as RunFolders
-from commissioner.operations.history.runs import Wanted, find_runs, show_run
+from commissioner.operations.history.runs import Wanted, find_runs, show_run, write_runs
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import find_run, summarise
@@ -229,3 +230,34 @@ def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
 def test_an_outcome_that_no_run_has_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no run ends like this"):
         find_runs(RunFolders(tmp_path), Wanted(outcome="nonsense"))
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("summary.json", ("summary", "energised_s")),
+        ("summary.json", ("summary", "motor", "rated_power_w")),
+        ("summary.json", ("summary", "parameters", "stator_resistance_ohm")),
+        ("request.json", ("nameplate", "rated_power_w")),
+    ],
+)
+def test_a_number_beyond_any_float_hides_no_run(tmp_path, name, path):
+    good, bad = "20260101-000000-simulated-abcdef", "20260102-000000-simulated-abcdef"
+    make_run(tmp_path, good, result=result_of(good, MACHINE))
+    folder = make_run(tmp_path, bad, result=result_of(bad, MACHINE))
+    document = place = json.loads((folder / name).read_text("utf-8"))
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = 10**400
+    (folder / name).write_text(json.dumps(document), "utf-8")
+    if name != "summary.json":
+        (folder / "summary.json").unlink()
+    assert [row.run for row in find_runs(RunFolders(tmp_path)).rows] == [bad, good]
+    assert write_runs(RunFolders(tmp_path), Wanted(), tmp_path / "runs.csv").runs == 2
+
+
+def test_a_run_of_a_clock_centuries_off_is_listed(tmp_path):
+    run = "20260101-000000-simulated-abcdef"
+    folder = make_run(tmp_path, run)
+    os.utime(folder / "journal.jsonl", (13_569_465_600, 13_569_465_600))
+    assert [row.run for row in find_runs(RunFolders(tmp_path)).rows] == [run]
