@@ -43,12 +43,16 @@ def plain(value: Any, *, without: Container[str] = ()) -> Any:
 
 
 def read_json(text: str | bytes) -> Any:
-    """What the JSON in `text` says. ValueError: it is none, is nested deeper than any of ours, or holds a whole number
-    that no counter of ours can be."""
+    """What the JSON in `text` says, `?` for half a character that no file can hold. ValueError: it is none, is nested deeper than
+    any of ours, or holds a whole number that no counter of ours can be."""
+    said = text if isinstance(text, str) else text.decode("utf-8")
     try:
-        return json.loads(text, parse_int=_whole_number)
+        document = json.loads(said, parse_int=_whole_number)
+        if "\\ud" in said.lower():
+            return json.loads(json.dumps(document, ensure_ascii=False).encode("utf-8", "replace"))
     except RecursionError as error:
         raise ValueError("JSON that is nested too deep") from error
+    return document
 
 
 def _whole_number(digits: str) -> int:

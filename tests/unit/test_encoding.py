@@ -13,3 +13,7 @@ def test_json_that_is_none_of_ours_is_a_value_error(text):
 
 def test_the_largest_counter_is_read():
     assert read_json(b'{"n": [9223372036854775807, -9223372036854775808]}') == {"n": [2**63 - 1, -(2**63)]}
+
+
+def test_half_a_character_is_a_question_mark():
+    assert read_json('{"a": ["\\ud800", "\\ud83d\\ude00"]}') == {"a": ["?", "\N{GRINNING FACE}"]}

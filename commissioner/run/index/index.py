@@ -121,12 +121,17 @@ def _on_file(root: Path, act: Callable[[Store], T]) -> T:
     try:
         with closing(open_file(root)) as store:
             return act(store)
-    except sqlite3.DatabaseError as damaged:
-        if isinstance(damaged, sqlite3.OperationalError):  # locked, read-only, no room: not damaged
+    except sqlite3.DatabaseError as failure:
+        if not _is_damaged(failure):
             raise
         forget(root)
     with closing(open_file(root)) as store:
         return act(store)
+
+
+def _is_damaged(failure: sqlite3.DatabaseError) -> bool:
+    """False of a file that is locked, read-only or has no room; a statement that fails as such found another table than ours."""
+    return not isinstance(failure, sqlite3.OperationalError) or failure.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
 def _refresh(store: Store, root: Path, place: str, seen: Stamps, *, anew: bool = False) -> tuple[int, int]:
@@ -161,7 +166,8 @@ def _sayable(value: str | int) -> str | int:
 
 
 def _select(store: Store, wanted: Wanted, place: str, indexed: str) -> Found:
-    rows, count, bound = select(wanted, place, is_shared=store.is_shared)
+    rows, count, meant = select(wanted, place, is_shared=store.is_shared)
+    bound = {name: _sayable(value) for name, value in meant.items()}
     found = tuple(map(Row._make, store.read(rows, bound | ({"most": wanted.limit} if wanted.limit > 0 else {}))))
     total = int(store.read(count, bound)[0][0]) if wanted.limit > 0 and len(found) == wanted.limit else len(found)
     return Found(found, total, indexed)

@@ -3,7 +3,9 @@
 import json
 import os
 import re
+import sqlite3
 import stat
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import export_run
 from commissioner.operations.history.runs import Archive as RunFolders
-from commissioner.operations.history.runs import Wanted, find_runs, show_run, write_runs
+from commissioner.operations.history.runs import Wanted, find_runs, index_runs, show_run, write_runs
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import find_run, summarise
@@ -261,3 +263,20 @@ def test_a_run_of_a_clock_centuries_off_is_listed(tmp_path):
     folder = make_run(tmp_path, run)
     os.utime(folder / "journal.jsonl", (13_569_465_600, 13_569_465_600))
     assert [row.run for row in find_runs(RunFolders(tmp_path)).rows] == [run]
+
+
+@pytest.mark.parametrize("made", ["DROP TABLE runs", "ALTER TABLE runs RENAME COLUMN motor TO engine"])
+def test_an_index_with_another_table_is_made_anew(tmp_path, made):
+    run = "20260101-000000-simulated-abcdef"
+    make_run(tmp_path, run)
+    index_runs(RunFolders(tmp_path))
+    with closing(sqlite3.connect(tmp_path / "index.sqlite")) as index:
+        index.execute(made)
+    assert index_runs(RunFolders(tmp_path), rebuild=True).read == 1
+    assert find_runs(RunFolders(tmp_path)).indexed == "index.sqlite"
+
+
+def test_words_that_are_no_text_find_nothing(tmp_path):
+    """What a terminal of another encoding hands over."""
+    make_run(tmp_path, "20260101-000000-simulated-abcdef")
+    assert not find_runs(RunFolders(tmp_path), Wanted(text="\udcff", motor="\udcff")).rows
