@@ -73,7 +73,10 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
     for fact in ("what", "step", "value", "limit", "remedy"):
         setattr(error, fact, hide(getattr(error, fact)))
     if as_json:
-        screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
+        try:
+            screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
+        except OSError:  # what the document goes to takes no more: the person at the terminal is told
+            screen.failure(error)
     else:
         screen.failure(error)
 

@@ -168,6 +168,8 @@ def _sayable(value: str | int) -> str | int:
 def _select(store: Store, wanted: Wanted, place: str, indexed: str) -> Found:
     rows, count, meant = select(wanted, place, is_shared=store.is_shared)
     bound = {name: _sayable(value) for name, value in meant.items()}
-    found = tuple(map(Row._make, store.read(rows, bound | ({"most": wanted.limit} if wanted.limit > 0 else {}))))
+    found = tuple(
+        map(Row._make, store.read(rows, bound | ({"most": min(wanted.limit, LARGEST - 1)} if wanted.limit > 0 else {})))
+    )
     total = int(store.read(count, bound)[0][0]) if wanted.limit > 0 and len(found) == wanted.limit else len(found)
     return Found(found, total, indexed)

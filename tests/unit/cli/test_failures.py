@@ -1,7 +1,9 @@
 """Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
 
+import contextlib
 import json
 import os
+import pathlib
 import signal
 import subprocess
 import time
@@ -78,6 +80,20 @@ def test_whatever_is_raised_is_one_document_with_its_exit_code(capsys, error, co
 def test_a_value_is_named_also_where_none_was_seen(capsys, error, value):
     _, document = leave(capsys, of=raising(error))
     assert value in document["error"]["value"]
+
+
+@pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_document_that_its_target_cannot_take_is_told_at_the_terminal(monkeypatch, capsys):
+    with pathlib.Path("/dev/full").open("w", encoding="utf-8") as full, pytest.raises(SystemExit) as left:
+        monkeypatch.setattr("sys.stdout", full)
+        try:
+            run_to_exit(app, ["drives", "list", "--json"])
+        finally:
+            monkeypatch.undo()
+            with contextlib.suppress(OSError):
+                full.close()
+    assert left.value.code == 5
+    assert "No space left on device" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import find_run, summarise
 from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal, write_recording
+from commissioner.run.archive.seal import read_key
 from commissioner.service.archive import Archive
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
@@ -280,3 +281,16 @@ def test_words_that_are_no_text_find_nothing(tmp_path):
     """What a terminal of another encoding hands over."""
     make_run(tmp_path, "20260101-000000-simulated-abcdef")
     assert not find_runs(RunFolders(tmp_path), Wanted(text="\udcff", motor="\udcff")).rows
+
+
+def test_more_runs_than_there_can_be_are_all(tmp_path):
+    run = "20260101-000000-simulated-abcdef"
+    make_run(tmp_path, run)
+    assert [row.run for row in find_runs(RunFolders(tmp_path), Wanted(limit=10**30)).rows] == [run]
+
+
+@pytest.mark.parametrize(("size", "what"), [(15, "too short"), (70_000, "too long")])
+def test_a_key_has_an_end(tmp_path, size, what):
+    (tmp_path / "key").write_bytes(b"k" * size)
+    with pytest.raises(UsageError, match=what):
+        read_key(tmp_path / "key")
