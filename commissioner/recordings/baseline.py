@@ -51,7 +51,7 @@ def read(path: Path) -> History:
         if document["version"] != VERSION:
             raise ValueError(f"version {document['version']}")
         return History(tuple(map(_entry, document["healthy"])), tuple(map(_entry, document["judged"])))
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(
             file=str(path), key="version", value=str(error), expected=f"a baseline file of version {VERSION}"
         ) from error
