@@ -24,12 +24,15 @@ the limit or expectation it broke, and the remedy.
 
 from __future__ import annotations
 
+import errno
 import reprlib
 
 from typing_extensions import TypedDict
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
+OF_DISK = frozenset({errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+"""What a disk says that takes no more, or fails."""
 
 
 class ErrorDocument(TypedDict):
@@ -78,11 +81,11 @@ class ConfigurationError(UsageError):
     """A file said something that cannot be right."""
 
     def __init__(self, *, file: str, key: str, value: object, expected: str) -> None:
-        shown = _SHORT.repr(value)
+        shown = "nothing" if value is None else _SHORT.repr(value)
         super().__init__(
-            f"{file}: {key} = {shown} cannot be used",
+            f"{file}: {key} is missing" if value is None else f"{file}: {key} = {shown} cannot be used",
             step="read configuration",
-            value=value if isinstance(value, int | float | None) or value == shown.strip("'") else shown,
+            value=value if isinstance(value, int | float) or value == shown.strip("'") else shown,
             limit=expected,
             remedy=f"correct {key} in {file}: {expected}",
         )

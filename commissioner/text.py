@@ -7,6 +7,7 @@ autoescape, JSON); what no medium may get is spelled out here.
 from __future__ import annotations
 
 import unicodedata
+from urllib.parse import SplitResult, urlsplit
 
 LONGEST = 300
 """Characters of one text on a terminal or page; what is longer is told by its length."""
@@ -21,6 +22,14 @@ def shown(value: object, longest: int = LONGEST) -> str:
     cut = text[:longest]
     kept = cut if cut.isprintable() and cut.isascii() else "".join(map(_visible, cut))
     return kept if len(text) <= longest else f"{kept}... ({len(text)} characters)"
+
+
+def split_address(text: str) -> SplitResult:
+    """The parts of an address that somebody gave; none where it is no address."""
+    try:
+        return urlsplit(text)
+    except ValueError:
+        return urlsplit("")
 
 
 def _visible(character: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import sys
 import tempfile
 import traceback
@@ -13,10 +12,9 @@ import typer
 from typer.exceptions import TyperException
 
 from commissioner.cli.signals import be_deaf, listen
-from commissioner.errors import Aborted, CommissionerError, DataRefused, UsageError
+from commissioner.errors import OF_DISK, Aborted, CommissionerError, DataRefused, UsageError
 from commissioner.link.wire.secrets import Secrets, shown_call
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS})
 NO_ARGUMENTS = "NoArgsIsHelpError"
 """How the command line's library leaves a call without arguments: its message is the help."""
 INTERRUPTED = 130
@@ -75,7 +73,10 @@ def _say(error: CommissionerError, as_json: bool, hide: Callable[[Any], Any]) ->
     for fact in ("what", "step", "value", "limit", "remedy"):
         setattr(error, fact, hide(getattr(error, fact)))
     if as_json:
-        screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
+        try:
+            screen.emit({"outcome": error.outcome, "reason": error.what, "error": error.as_dict()})
+        except OSError:  # what the document goes to takes no more: the person at the terminal is told
+            screen.failure(error)
     else:
         screen.failure(error)
 
@@ -97,11 +98,11 @@ def _stopped(arguments: Sequence[str], by: str = "Ctrl-C or SIGTERM") -> Commiss
 
 def _file_failure(failure: OSError, arguments: Sequence[str]) -> CommissionerError:
     """A file or folder that is in the way, closed to us, or on a disk that is full or failing."""
-    kind = CommissionerError if failure.errno in FULL else UsageError
+    kind = CommissionerError if failure.errno in OF_DISK else UsageError
     remedy = "make room on the disk, or use another one" if kind is CommissionerError else "give another file or folder"
     return kind(
         f"{failure.filename or 'a file'} cannot be used: {failure.strerror or failure}", step=_verb(arguments),
-        value=failure.filename, limit="a file or folder that this user may read or write", remedy=remedy,
+        value=failure.filename or shown_call(arguments), limit="a file or folder that this user may read or write", remedy=remedy,
     )  # fmt: skip
 
 

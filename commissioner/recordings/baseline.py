@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from commissioner.encoding import read_json
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.trend.trend import Entry, History, State, Verdict, judge
 from commissioner.recordings.whole import whole_file
@@ -46,11 +47,11 @@ def read(path: Path) -> History:
             remedy="name the file, not its folder",
         )
     try:
-        document = json.loads(path.read_text("utf-8"))
+        document = read_json(path.read_text("utf-8"))
         if document["version"] != VERSION:
             raise ValueError(f"version {document['version']}")
         return History(tuple(map(_entry, document["healthy"])), tuple(map(_entry, document["judged"])))
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(
             file=str(path), key="version", value=str(error), expected=f"a baseline file of version {VERSION}"
         ) from error

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from commissioner.encoding import read_json
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.machine.fit import PRIOR_FROM_COMMISSIONING, Start
 from commissioner.motor.circuit import InverseGamma
@@ -63,11 +63,11 @@ def start_from(path: Path) -> Start:
         )
     names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
     try:
-        document = json.loads(path.read_text("utf-8"))
+        document = read_json(path.read_text("utf-8"))
         parameters, kind = document["parameters"], str(document.get("kind", "commissioning result"))
         values = [float(parameters[name]["value"]) for name in names]
         stds = [float(parameters[name].get("std") or 0.0) for name in names]
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(
             file=str(path),
             key="parameters",

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from commissioner.errors import (
+    OF_DISK,
     Aborted,
     CommissionerError,
     DriveError,
@@ -22,7 +23,6 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
 from commissioner.run.archive.folder import RunFolder, archive_lost
 
-OF_DISK = {errno.ENOSPC, errno.EROFS, errno.EIO, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.service.contract.people import AuditEntry
 
 FIRST = "0" * 64
@@ -89,7 +89,7 @@ def _entries(path: Path) -> Iterator[JsonObject]:
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
             try:
-                entry = json.loads(line)
+                entry = read_json(line)
             except ValueError:
                 entry = {"n": None, "what": "a line that cannot be read"}
             yield entry if isinstance(entry, dict) else {"n": None, "what": "a line that is no entry"}

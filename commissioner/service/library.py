@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
 from commissioner.service.configuration import DriveTable, Settings
@@ -218,7 +218,7 @@ def _must_be_new(taken: list[str], identifier: str) -> None:
 
 def _read_json(path: Path) -> JsonObject | None:
     try:
-        return DriveTable.model_validate(json.loads(path.read_text("utf-8"))).model_dump()
+        return DriveTable.model_validate(read_json(path.read_text("utf-8"))).model_dump()
     except ValueError:
         return None
 

@@ -9,7 +9,7 @@ from typing import Any, NotRequired, cast
 
 from typing_extensions import TypedDict
 
-from commissioner.encoding import plain
+from commissioner.encoding import plain, read_json
 from commissioner.errors import UsageError
 from commissioner.monitor.contract import Measured
 from commissioner.recordings.whole import whole_file
@@ -66,8 +66,7 @@ class Rows:
                     f"{folder} holds the rows of a study", step="study", value=str(lines), limit="an empty folder, or --resume",
                     remedy="give --resume to finish it, or another --out",
                 )  # fmt: skip
-            before = json.loads(known.read_text("utf-8")) if known.is_file() else None
-            if before != plain(asked):
+            if _asked_before(known) != plain(asked):
                 raise UsageError(
                     f"{folder} holds another study", step="study", value=str(known), limit="the study that was begun there",
                     remedy="give another --out",
@@ -100,12 +99,23 @@ class Rows:
         return target
 
 
+def _asked_before(known: Path) -> Any:
+    """The study that was begun in the folder; None where nothing says so any more."""
+    try:
+        return read_json(known.read_bytes()) if known.is_file() else None
+    except ValueError:
+        return None
+
+
 def _whole_lines(path: Path) -> Iterable[Row]:
-    """Lines up to one that a kill has cut off."""
-    for line in path.read_text("utf-8").split("\n"):
+    """The lines that are rows: what a kill has cut off or a disk has spoilt is a case that is still missing."""
+    from pydantic import TypeAdapter, ValidationError
+
+    promised = TypeAdapter(Row)
+    for line in path.read_bytes().split(b"\n"):
         try:
-            row = json.loads(line)
-        except ValueError:
+            row = read_json(line)
+            promised.validate_python(row)
+        except (ValueError, ValidationError):
             continue
-        if isinstance(row, dict) and isinstance(row.get("case"), int):
-            yield cast("Row", row)
+        yield cast("Row", row)

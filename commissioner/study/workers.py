@@ -9,6 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from multiprocessing import get_context
 from typing import Any
+from urllib.parse import urlsplit
 
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.study.rows import DEFECT, Row
@@ -100,6 +101,7 @@ def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
             remedy="pip install \".[study]\" in the folder of this program",
         ) from error  # fmt: skip
     try:
+        urlsplit(scheduler)  # its ValueError comes before there is a half-made client
         client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise UsageError(

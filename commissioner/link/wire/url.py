@@ -77,6 +77,8 @@ DriveUrl = TcpUrl | TlsUrl | RtuUrl
 
 def parse_url(text: str) -> DriveUrl:
     """The drive's address. Raises UsageError naming the part that cannot be right."""
+    if not text.isprintable():
+        raise _refuse(text, "a character that is no text", "printable characters")
     if USERINFO.search(text):
         raise _refuse(text, "a user", "no user, password or fragment")
     try:

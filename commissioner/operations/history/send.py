@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from http.cookies import SimpleCookie
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.operations.history.share import (
     CONFLICT,
@@ -30,6 +30,7 @@ from commissioner.operations.history.share import (
 from commissioner.run.archive.catalogue import find_folder, run_folders
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL
+from commissioner.text import split_address
 
 ANSWER_S = 120.0
 AT_ONCE = PIECE // 2
@@ -105,7 +106,7 @@ class _Service:
     """One connection to a service; logged in, where there is an account."""
 
     def __init__(self, url: str, account: Account | None, ca: Path | None) -> None:
-        parts = urlsplit(url)
+        parts = split_address(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.username is not None:
             raise _usage("this is no address of a service", parts.hostname or parts.scheme or "nothing",
                          "http://HOST:PORT or https://HOST:PORT", "give what `commissioner serve` prints, the name with --account")  # fmt: skip
@@ -139,7 +140,7 @@ class _Service:
             self._connection.request(method, path, body, headers)
             answer = self._connection.getresponse()
             text = answer.read()
-            document = json.loads(text)
+            document = read_json(text)
         except ssl.SSLCertVerificationError as failure:
             raise CommissionerError(
                 f"the service's certificate is not trusted: {failure.verify_message}", step="push", value=self._url,

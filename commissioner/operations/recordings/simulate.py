@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import pi, sqrt
@@ -17,6 +16,7 @@ from commissioner.diagnose.export.model_file import plain as without_effects
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.diagnose.intake.record import Facts
 from commissioner.diagnose.plant.model import Layout, Model
+from commissioner.encoding import read_json
 from commissioner.errors import ConfigurationError
 from commissioner.motor.nameplate import prior
 from commissioner.operations.events import Began, Observe, nobody
@@ -111,8 +111,8 @@ def _running_model(name: str) -> Mapping[str, Any] | None:
     if path.suffix != ".json" or not path.is_file() or path.stat().st_size > MAX_BYTES:
         return None
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError):
+        document = read_json(path.read_text("utf-8"))
+    except ValueError:
         return None
     return document if isinstance(document, dict) and is_running_model(document) else None
 
@@ -155,9 +155,9 @@ def _extended(path: Path, plain: bool) -> _Motor:
             file=str(path), key="size", value=path.stat().st_size, expected=f"at most {MAX_BYTES} bytes"
         )
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path.read_text("utf-8"))
         return _of_document(without_effects(document) if plain else document)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(
             file=str(path), key="document", value=str(error), expected="a model.json written by `commissioner diagnose`"
         ) from error

@@ -43,7 +43,7 @@ def read_run(folder: Path, *, with_result: bool = True) -> RunSummary:
         if found is None:
             return summarise(folder)
         return replace(found, result=sound_result(folder)) if with_result else found
-    except (CommissionerError, OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
+    except (CommissionerError, OSError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         return unreadable(folder, error)
 
 

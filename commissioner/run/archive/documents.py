@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, DataRefused
 
 if TYPE_CHECKING:
@@ -28,10 +27,10 @@ class Loss:
 
 
 def read_document(text: str) -> JsonObject:
-    """The JSON object in `text`; empty where it holds none, or one nested deeper than any of ours."""
+    """The JSON object in `text`; empty where it holds none, or one that is none of ours."""
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError):
+        document = read_json(text)
+    except ValueError:
         return {}
     return document if isinstance(document, dict) else {}
 

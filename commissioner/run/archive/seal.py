@@ -18,7 +18,8 @@ from commissioner.errors import UsageError
 
 CLOSED = "folder_closed"
 """Kind of the record."""
-SHORTEST_KEY = 16
+SHORTEST_KEY, LONGEST_KEY = 16, 65536
+"""Bytes."""
 NOT_COVERED = ("journal.jsonl", "blocks.bin", "summary.json")
 """The first two by the chain itself, the third follows from the last record."""
 
@@ -31,18 +32,21 @@ class Covered(TypedDict):
 
 
 def read_key(path: Path) -> bytes:
-    """The bytes of a key file. UsageError: it cannot be read or is too short to be one."""
+    """The bytes of a key file. UsageError: it cannot be read or is too short or too long to be one."""
     try:
-        key = path.read_bytes().strip()
+        with path.open("rb") as file:  # a pipe may hand it over, a device without end must not
+            key = file.read(LONGEST_KEY + 1).strip()
     except OSError as error:
         raise UsageError(
             f"the key file {path} cannot be read: {error.strerror or error}", step="seal", value=str(path),
             limit="a file that this user may read", remedy="give --seal a key file, e.g. 32 random bytes",
         ) from error  # fmt: skip
-    if len(key) < SHORTEST_KEY:
+    if not SHORTEST_KEY <= len(key) <= LONGEST_KEY:
+        is_short = len(key) < SHORTEST_KEY
         raise UsageError(
-            f"the key in {path} is too short", step="seal", value=f"{len(key)} bytes",
-            limit=f"at least {SHORTEST_KEY} bytes", remedy="make one of 32 random bytes and keep it off the run folders",
+            f"the key in {path} is too {'short' if is_short else 'long'}", step="seal",
+            value=f"{len(key)} bytes" if is_short else f"more than {LONGEST_KEY} bytes",
+            limit=f"{SHORTEST_KEY} ... {LONGEST_KEY} bytes", remedy="make one of 32 random bytes and keep it off the run folders",
         )  # fmt: skip
     return key
 

@@ -153,8 +153,13 @@ def _is_typed(summary: RunSummary) -> bool:
         and isinstance(summary.energised_s, int | float | None)
         and isinstance(summary.motor, dict)
         and isinstance(summary.parameters, dict)
+        and all(map(_is_quantity, summary.parameters.values()))
         and isinstance(summary.serial_number, int | None)
     )
+
+
+def _is_quantity(found: object) -> bool:
+    return isinstance(found, dict) and isinstance(found.get("value"), int | float | None)
 
 
 def _of(records: list[Record], kind: str) -> list[Record]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from commissioner.encoding import LARGEST
 from commissioner.errors import CommissionerError
 from commissioner.run.archive.catalogue import read_run
 from commissioner.run.archive.origin import machine_part
@@ -106,7 +107,7 @@ def stamps(root: Path) -> Stamps:
     for name in names:
         with suppress(OSError, ValueError):
             seen = os.stat(f"{prefix}{name}{os.sep}{JOURNAL}")  # noqa: PTH116  a Path for each of 10 000 takes as long as the rest
-            found[name] = (seen.st_size, seen.st_mtime_ns)
+            found[name] = _stamp(seen)
     return found
 
 
@@ -120,12 +121,17 @@ def _on_file(root: Path, act: Callable[[Store], T]) -> T:
     try:
         with closing(open_file(root)) as store:
             return act(store)
-    except sqlite3.DatabaseError as damaged:
-        if isinstance(damaged, sqlite3.OperationalError):  # locked, read-only, no room: not damaged
+    except sqlite3.DatabaseError as failure:
+        if not _is_damaged(failure):
             raise
         forget(root)
     with closing(open_file(root)) as store:
         return act(store)
+
+
+def _is_damaged(failure: sqlite3.DatabaseError) -> bool:
+    """False of a file that is locked, read-only or has no room; a statement that fails as such found another table than ours."""
+    return not isinstance(failure, sqlite3.OperationalError) or failure.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
 def _refresh(store: Store, root: Path, place: str, seen: Stamps, *, anew: bool = False) -> tuple[int, int]:
@@ -140,9 +146,13 @@ def _refresh(store: Store, root: Path, place: str, seen: Stamps, *, anew: bool =
 
 
 def _note(store: Store, folder: Path) -> None:
-    seen = (folder / JOURNAL).stat()
     place = place_of(folder.parent)
-    store.write(place, [_row(folder, place, (seen.st_size, seen.st_mtime_ns))], ())
+    store.write(place, [_row(folder, place, _stamp((folder / JOURNAL).stat()))], ())
+
+
+def _stamp(seen: os.stat_result) -> tuple[int, int]:
+    """Size and time; a time that no index can keep (a clock centuries off) is the latest or earliest that it can."""
+    return seen.st_size, max(-LARGEST, min(seen.st_mtime_ns, LARGEST - 1))
 
 
 def _row(folder: Path, place: str, stamp: tuple[int, int]) -> Row:
@@ -156,7 +166,10 @@ def _sayable(value: str | int) -> str | int:
 
 
 def _select(store: Store, wanted: Wanted, place: str, indexed: str) -> Found:
-    rows, count, bound = select(wanted, place, is_shared=store.is_shared)
-    found = tuple(map(Row._make, store.read(rows, bound | ({"most": wanted.limit} if wanted.limit > 0 else {}))))
+    rows, count, meant = select(wanted, place, is_shared=store.is_shared)
+    bound = {name: _sayable(value) for name, value in meant.items()}
+    found = tuple(
+        map(Row._make, store.read(rows, bound | ({"most": min(wanted.limit, LARGEST - 1)} if wanted.limit > 0 else {})))
+    )
     total = int(store.read(count, bound)[0][0]) if wanted.limit > 0 and len(found) == wanted.limit else len(found)
     return Found(found, total, indexed)

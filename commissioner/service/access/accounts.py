@@ -12,6 +12,7 @@ from pathlib import Path
 from argon2 import PasswordHasher
 from argon2.exceptions import Argon2Error, InvalidHashError
 
+from commissioner.encoding import read_json
 from commissioner.errors import UsageError
 
 SHORTEST, LONGEST = 8, 200
@@ -104,9 +105,9 @@ class Accounts:
 
 def _read(path: Path) -> dict[str, Account]:
     try:
-        rows = json.loads(path.read_text("utf-8"))["accounts"]
+        rows = read_json(path.read_text("utf-8"))["accounts"]
         return {row["name"]: Account(row["name"], Role[row["role"].upper()], row["password"]) for row in rows}
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(
             f"{path} holds no accounts", step="read accounts", value=type(error).__name__,
             limit="the file as `commissioner accounts` writes it", remedy="restore it from a copy, or remove it and add the accounts again",

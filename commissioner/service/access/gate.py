@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from commissioner.service.problems import Refusal, respond
+from commissioner.text import split_address
 
 CSP = (
     "default-src 'none'; script-src 'self'; style-src 'self'; font-src 'self'; img-src 'self' data:; connect-src 'self'; "
@@ -49,7 +49,7 @@ class Gate:
         if scope["type"] == "http" and scope["method"] in SAFE:
             return None
         origin, site = headers.get("origin"), headers.get("sec-fetch-site", "none")
-        if (origin is not None and urlsplit(origin).netloc.lower() != host.lower()) or site not in (
+        if (origin is not None and split_address(origin).netloc.lower() != host.lower()) or site not in (
             "same-origin",
             "none",
         ):

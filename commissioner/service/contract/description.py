@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, get_type_hints
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.routing import APIRoute, iter_route_contexts
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 
 ANSWER = "application/json"
 REFERENCE = "#/components/schemas/{model}"
@@ -26,13 +27,31 @@ def sends(*media_types: str) -> dict[int | str, JsonObject]:
     return {200: {"description": "The file, or the stream.", "content": content}}
 
 
+class _Asked(Request):
+    async def json(self) -> Any:
+        """JSONDecodeError, which FastAPI tells as what the body is not, for everything that `read_json` refuses."""
+        try:
+            return read_json(await self.body())
+        except ValueError as error:
+            raise json.JSONDecodeError(str(error), "", 0) from error
+
+
 class Typed(APIRoute):
-    """A route whose answer is sent as it was made: mypy checks its type, OpenAPI shows it, nothing is filtered or converted."""
+    """A route whose body is read as all JSON from outside, and whose answer is sent as it was made: mypy checks its type, OpenAPI
+    shows it, nothing is filtered or converted."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **more: Any) -> None:
         said = more.get("response_class")
         is_json = said is None or not isinstance(said, type)
         super().__init__(path, endpoint, **more | ({"response_model": Any} if is_json else {}))
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        answer = super().get_route_handler()
+
+        async def asked(request: Request) -> Response:
+            return await answer(_Asked(request.scope, request.receive))
+
+        return asked
 
 
 def describe_answers(app: FastAPI) -> None:

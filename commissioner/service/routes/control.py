@@ -8,14 +8,13 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Annotated, Literal
-from urllib.parse import urlsplit
 
-from fastapi import APIRouter, Form, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Depends, Form, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 from starlette.requests import HTTPConnection
 
-from commissioner.encoding import JsonObject
+from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import Operator, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
@@ -28,6 +27,7 @@ from commissioner.service.problems import Refusal
 from commissioner.service.runs.control import Party
 from commissioner.service.runs.desk import LiveRun
 from commissioner.service.runs.feed import Feed, Message
+from commissioner.text import split_address
 
 router = APIRouter(route_class=Typed)
 BAND_S, BAND_BESIDE_NUMBERS_S = 0.4, 0.8
@@ -39,8 +39,21 @@ UNKNOWN = "somebody at a page"
 class StopWish(BaseModel):
     """Why; may stay empty."""
 
-    model_config = ConfigDict(extra="ignore")
-    reason: Annotated[str, Field(max_length=300)] = ""
+    reason: str = ""
+
+
+_MAY_SAY_WHY = {"requestBody": {"content": {"application/json": {"schema": StopWish.model_json_schema()}}}}
+
+
+async def _why(request: Request) -> str:
+    """The reason where the body says one: a STOP is never refused for its words."""
+    with contextlib.suppress(ValueError):
+        said = read_json(await request.body())
+        return str(said.get("reason") or "")[:300] if isinstance(said, dict) else ""
+    return ""
+
+
+Why = Annotated[str, Depends(_why)]
 
 
 class ControlWish(BaseModel):
@@ -77,22 +90,22 @@ async def stop_runs(connection: HTTPConnection, reason: str, how: str, run: str 
     return stopped
 
 
-@router.post("/api/runs/{run}/stop")
-async def stop(request: Request, run: str, wish: StopWish | None = None) -> Stopped:
+@router.post("/api/runs/{run}/stop", openapi_extra=_MAY_SAY_WHY)
+async def stop(request: Request, run: str, why: Why) -> Stopped:
     """The operator's stop. 200 says when the drive confirmed zero volts; 502: it did not. Needs no log-in."""
     parts = parts_of(request)
     if run not in parts.desk.runs:
         parts.archive.find(run)
         return Stopped(run, None, True, None, 0.0, "ended before")
-    stopped = await stop_runs(request, wish.reason if wish else "", "POST", run)
+    stopped = await stop_runs(request, why, "POST", run)
     _check_confirmed(stopped)
     return stopped[0]
 
 
-@router.post("/api/stop")
-async def stop_everything(request: Request, wish: StopWish | None = None) -> StopsDocument:
+@router.post("/api/stop", openapi_extra=_MAY_SAY_WHY)
+async def stop_everything(request: Request, why: Why) -> StopsDocument:
     """STOP for every run of this service, also one that is only starting. Needs no log-in."""
-    stopped = await stop_runs(request, wish.reason if wish else "", "POST")
+    stopped = await stop_runs(request, why, "POST")
     _check_confirmed(stopped)
     return {"stopped": stopped}
 
@@ -103,7 +116,7 @@ async def stop_by_form(
 ) -> Response:
     """The same from a page without script; back to where it came from."""
     await stop_runs(request, "", "form", run, drive)
-    back = urlsplit(request.headers.get("referer", "/")).path or "/"
+    back = split_address(request.headers.get("referer", "/")).path or "/"
     return RedirectResponse(back if back.startswith("/") and not back.startswith("//") else "/", 303)
 
 
@@ -209,7 +222,7 @@ class _Socket:
             while True:
                 text = await self._socket.receive_text()
                 with contextlib.suppress(ValueError):
-                    said = json.loads(text)
+                    said = read_json(text)
                     if isinstance(said, dict):
                         await self._take(said)
 

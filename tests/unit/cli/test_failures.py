@@ -1,7 +1,9 @@
 """Every verb's failure is one sentence with step, value, limit and remedy, one document with --json, and its exit code."""
 
+import contextlib
 import json
 import os
+import pathlib
 import signal
 import subprocess
 import time
@@ -14,7 +16,7 @@ from commissioner.cli.app import app
 from commissioner.cli.failures import run_to_exit
 from commissioner.cli.screens import screen
 from commissioner.cli.signals import let_end
-from commissioner.errors import DriveFault
+from commissioner.errors import ConfigurationError, DriveFault
 from commissioner.link.wire.secrets import Secrets
 from tests.support.command_line import COMMAND, call
 
@@ -56,6 +58,7 @@ def raising(error):
         (typer.Abort(), 4, "aborted"),
         (PermissionError(13, "Permission denied", "/somewhere/file"), 2, "usage"),
         (OSError(28, "No space left on device"), 5, "faulted"),
+        (OSError(27, "File too large"), 5, "faulted"),
         (MemoryError(), 3, "rejected"),
         (ZeroDivisionError("a defect"), 5, "faulted"),
     ],
@@ -65,6 +68,32 @@ def test_whatever_is_raised_is_one_document_with_its_exit_code(capsys, error, co
     assert (left, document["outcome"]) == (code, outcome)
     assert {"kind", "what", "step", "value", "limit", "remedy"} <= document["error"].keys()
     assert document["reason"] and document["error"]["step"] and document["error"]["remedy"]
+
+
+@pytest.mark.parametrize(
+    ("error", "value"),
+    [
+        (OSError(27, "File too large"), "--json"),
+        (ConfigurationError(file="a.toml", key="files", value=None, expected="a pattern"), "nothing"),
+    ],
+)
+def test_a_value_is_named_also_where_none_was_seen(capsys, error, value):
+    _, document = leave(capsys, of=raising(error))
+    assert value in document["error"]["value"]
+
+
+@pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_document_that_its_target_cannot_take_is_told_at_the_terminal(monkeypatch, capsys):
+    with pathlib.Path("/dev/full").open("w", encoding="utf-8") as full, pytest.raises(SystemExit) as left:
+        monkeypatch.setattr("sys.stdout", full)
+        try:
+            run_to_exit(app, ["drives", "list", "--json"])
+        finally:
+            monkeypatch.undo()
+            with contextlib.suppress(OSError):
+                full.close()
+    assert left.value.code == 5
+    assert "No space left on device" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -72,6 +72,8 @@ def test_tls_files_must_exist_and_come_in_pairs(tmp_path):
         "rtu:///dev/x?host=1",
         "tls://drive?device=1&device=1",
         "tcp://drive?device=١",
+        "tcp://\udcff",
+        "tcp://drive\0",
     ],
 )
 def test_what_is_not_an_address_is_refused_with_the_form_that_is(text):

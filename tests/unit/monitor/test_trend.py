@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from commissioner.errors import ConfigurationError
 from commissioner.monitor.trend.trend import Entry, History, State, compare, judge
-from commissioner.recordings.baseline import read, update
+from commissioner.recordings.baseline import VERSION, read, update
 
 
 def entry(value: float, torque: float = 10.0, noise: float = 0.1, name: str = "ripple") -> Entry:
@@ -72,9 +73,16 @@ def test_an_alarming_recording_is_not_called_healthy_when_learned(tmp_path) -> N
 
 
 def test_a_file_that_is_no_baseline_is_named(tmp_path) -> None:
-    from commissioner.errors import ConfigurationError
-
     path = tmp_path / "machine.json"
     path.write_text('{"version": 7}')
     with pytest.raises(ConfigurationError, match=r"machine\.json"):
+        read(path)
+
+
+@pytest.mark.parametrize("indicators", ["[]", "7", '{"a": 1}', '{"a": [1, 2, 3]}', '{"a": ["x", null]}', str(10**400)])
+def test_an_entry_that_is_none_is_no_baseline(tmp_path, indicators) -> None:
+    path = tmp_path / "fan.json"
+    entry = f'{{"source": "a", "speed_rad_per_s": 1, "torque_nm": 1, "supply_hz": 1, "indicators": {indicators}}}'
+    path.write_text(f'{{"version": {VERSION}, "healthy": [{entry}], "judged": []}}', "utf-8")
+    with pytest.raises(ConfigurationError):
         read(path)

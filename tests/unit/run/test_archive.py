@@ -1,8 +1,11 @@
 """The run folder loses nothing that was written and shows where a kill tore the rest."""
 
 import json
+import os
 import re
+import sqlite3
 import stat
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -12,11 +15,12 @@ from commissioner.encoding import plain
 from commissioner.errors import DataRefused, UsageError
 from commissioner.operations.archive import export_run
 from commissioner.operations.history.runs import Archive as RunFolders
-from commissioner.operations.history.runs import Wanted, find_runs, show_run
+from commissioner.operations.history.runs import Wanted, find_runs, index_runs, show_run, write_runs
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
 from commissioner.run.archive.catalogue import find_run, summarise
 from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal, write_recording
+from commissioner.run.archive.seal import read_key
 from commissioner.service.archive import Archive
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 
@@ -229,3 +233,64 @@ def test_samples_are_not_exported_past_a_damaged_journal(tmp_path):
 def test_an_outcome_that_no_run_has_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no run ends like this"):
         find_runs(RunFolders(tmp_path), Wanted(outcome="nonsense"))
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("summary.json", ("summary", "energised_s")),
+        ("summary.json", ("summary", "motor", "rated_power_w")),
+        ("summary.json", ("summary", "parameters", "stator_resistance_ohm")),
+        ("request.json", ("nameplate", "rated_power_w")),
+    ],
+)
+def test_a_number_beyond_any_float_hides_no_run(tmp_path, name, path):
+    good, bad = "20260101-000000-simulated-abcdef", "20260102-000000-simulated-abcdef"
+    make_run(tmp_path, good, result=result_of(good, MACHINE))
+    folder = make_run(tmp_path, bad, result=result_of(bad, MACHINE))
+    document = place = json.loads((folder / name).read_text("utf-8"))
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = 10**400
+    (folder / name).write_text(json.dumps(document), "utf-8")
+    if name != "summary.json":
+        (folder / "summary.json").unlink()
+    assert [row.run for row in find_runs(RunFolders(tmp_path)).rows] == [bad, good]
+    assert write_runs(RunFolders(tmp_path), Wanted(), tmp_path / "runs.csv").runs == 2
+
+
+def test_a_run_of_a_clock_centuries_off_is_listed(tmp_path):
+    run = "20260101-000000-simulated-abcdef"
+    folder = make_run(tmp_path, run)
+    os.utime(folder / "journal.jsonl", (13_569_465_600, 13_569_465_600))
+    assert [row.run for row in find_runs(RunFolders(tmp_path)).rows] == [run]
+
+
+@pytest.mark.parametrize("made", ["DROP TABLE runs", "ALTER TABLE runs RENAME COLUMN motor TO engine"])
+def test_an_index_with_another_table_is_made_anew(tmp_path, made):
+    run = "20260101-000000-simulated-abcdef"
+    make_run(tmp_path, run)
+    index_runs(RunFolders(tmp_path))
+    with closing(sqlite3.connect(tmp_path / "index.sqlite")) as index:
+        index.execute(made)
+    assert index_runs(RunFolders(tmp_path), rebuild=True).read == 1
+    assert find_runs(RunFolders(tmp_path)).indexed == "index.sqlite"
+
+
+def test_words_that_are_no_text_find_nothing(tmp_path):
+    """What a terminal of another encoding hands over."""
+    make_run(tmp_path, "20260101-000000-simulated-abcdef")
+    assert not find_runs(RunFolders(tmp_path), Wanted(text="\udcff", motor="\udcff")).rows
+
+
+def test_more_runs_than_there_can_be_are_all(tmp_path):
+    run = "20260101-000000-simulated-abcdef"
+    make_run(tmp_path, run)
+    assert [row.run for row in find_runs(RunFolders(tmp_path), Wanted(limit=10**30)).rows] == [run]
+
+
+@pytest.mark.parametrize(("size", "what"), [(15, "too short"), (70_000, "too long")])
+def test_a_key_has_an_end(tmp_path, size, what):
+    (tmp_path / "key").write_bytes(b"k" * size)
+    with pytest.raises(UsageError, match=what):
+        read_key(tmp_path / "key")

@@ -71,13 +71,13 @@ def test_a_file_that_cannot_be_carried_out_names_its_key(tmp_path, text, key):
 def test_rows_survive_a_kill_in_the_midst_of_a_line(tmp_path):
     rows = Rows(tmp_path, {"seed": 1}, resume=False)
     for case in (2, 0):
-        rows.add({"case": case, "outcome": "commissioned"})
+        rows.add({"case": case, "outcome": "commissioned", "reason": ""})
     rows.close()
     with (tmp_path / ENDED).open("a", encoding="utf-8") as file:
         file.write('{"case": 1, "outco')
     again = Rows(tmp_path, {"seed": 1}, resume=True)
     assert sorted(again.ended) == [0, 2]
-    again.add({"case": 1, "outcome": "rejected"})
+    again.add({"case": 1, "outcome": "rejected", "reason": ""})
     again.close()
     assert pq.read_table(tmp_path / TABLE)["case"].to_pylist() == [0, 1, 2]
     last = Rows(tmp_path, {"seed": 1}, resume=True)
@@ -248,3 +248,27 @@ def test_a_study_with_a_defect_of_ours_does_not_end_as_good(monkeypatch, capsys,
         verb.study(StudyRequest(Path("x.toml"), Path("out")), as_json=True)
     assert leaves is None or left.value.code == leaves
     assert json.loads(capsys.readouterr().out)["outcomes"] == outcomes
+
+
+@pytest.mark.parametrize(
+    "line", [b"\xff\xfe", b"[" * 100_000, b'{"case": 1}', b'{"case": 1, "outcome": [1], "reason": ""}', b"7"]
+)
+def test_a_line_that_is_no_row_is_a_case_that_is_missing(tmp_path, line):
+    rows = Rows(tmp_path, {"seed": 1}, resume=False)
+    rows.add({"case": 0, "outcome": "commissioned", "reason": ""})
+    rows.close()
+    with (tmp_path / "ended.jsonl").open("ab") as file:
+        file.write(line + b"\n")
+    again = Rows(tmp_path, {"seed": 1}, resume=True)
+    assert set(again.ended) == {0}
+    again.close()
+
+
+@pytest.mark.parametrize("spoilt", [b"", b'{"a"', b"\xff\xfe", b"[" * 100_000])
+def test_a_folder_that_does_not_say_its_study_any_more_is_refused(tmp_path, spoilt):
+    rows = Rows(tmp_path, {"seed": 1}, resume=False)
+    rows.add({"case": 0, "outcome": "commissioned", "reason": ""})
+    rows.close()
+    (tmp_path / "study.json").write_bytes(spoilt)
+    with pytest.raises(UsageError, match="holds another study"):
+        Rows(tmp_path, {"seed": 1}, resume=True)

@@ -1,0 +1,36 @@
+"""What no page of ours sends is answered in the one form, and a STOP stops whatever its words."""
+
+import pytest
+from starlette.testclient import TestClient
+
+from commissioner.service.application import create_app
+from commissioner.service.configuration import Settings
+from commissioner.service.parts import make_parts
+
+JSON = {"content-type": "application/json"}
+
+
+@pytest.fixture
+def client(tmp_path):
+    parts = make_parts(Settings(tmp_path / "runs", tmp_path / "data"))
+    return TestClient(create_app(parts), base_url="http://127.0.0.1", raise_server_exceptions=False)
+
+
+@pytest.mark.parametrize(
+    "body", ["{", "[" * 100_000, '{"reason": 7}', '{"reason": "\\ud800"}', '{"reason": "' + 400 * "x" + '"}']
+)
+def test_a_stop_is_never_refused_for_its_words(client, body):
+    answer = client.post("/api/stop", content=body, headers=JSON)
+    assert (answer.status_code, answer.json()) == (200, {"stopped": []})
+
+
+@pytest.mark.parametrize("body", ["[" * 100_000, '{"drive": "\\ud800", "motor": "\\ud800"}', f'{{"drive": {10**400}}}'])
+def test_json_that_is_none_of_ours_is_a_problem_document(client, body):
+    answer = client.post("/api/checks", content=body, headers=JSON)
+    assert answer.status_code in (400, 422)
+    assert answer.json()["limit"] and answer.json()["remedy"]
+
+
+def test_an_address_that_is_none_is_another_sites(client):
+    assert client.post("/api/stop", headers={"origin": "http://["}).status_code == 403
+    assert client.post("/stop", headers={"referer": "http://["}, follow_redirects=False).headers["location"] == "/"
