@@ -91,8 +91,21 @@ def _pool(cases: Sequence[Case], workers: int) -> Iterator[Row]:
                 future.cancel()
 
 
+def _is_address(scheduler: str) -> bool:
+    try:
+        parts = urlsplit(scheduler)
+        return parts.scheme in ("tcp", "tls") and bool(parts.hostname) and bool(parts.port)
+    except ValueError:
+        return False
+
+
 def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
     """Rows as they end, from the workers of a Dask scheduler. UsageError: Dask is not installed, or nobody answers there."""
+    if not _is_address(scheduler):  # a client of such a one is half made, and ends in a traceback of its own
+        raise UsageError(
+            f"{scheduler} is no scheduler's address", step="study", value=scheduler, limit="tcp://HOST:PORT or tls://HOST:PORT",
+            remedy="give the address that `dask scheduler` prints, or leave --scheduler out",
+        )  # fmt: skip
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
@@ -101,7 +114,6 @@ def on_cluster(cases: Sequence[Case], scheduler: str) -> Iterator[Row]:
             remedy="pip install \".[study]\" in the folder of this program",
         ) from error  # fmt: skip
     try:
-        urlsplit(scheduler)  # its ValueError comes before there is a half-made client
         client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise UsageError(

@@ -28,7 +28,7 @@ from commissioner.study.sheet import page
 from commissioner.study.simulators import simulator
 from commissioner.study.specification import Specification, cases_of
 from commissioner.study.summary import summarise
-from commissioner.study.workers import carried_out, here
+from commissioner.study.workers import carried_out, here, on_cluster
 from tests.support.service.described import judge
 
 MOTORS = ["a", "b", "c"]
@@ -272,3 +272,11 @@ def test_a_folder_that_does_not_say_its_study_any_more_is_refused(tmp_path, spoi
     (tmp_path / "study.json").write_bytes(spoilt)
     with pytest.raises(UsageError, match="holds another study"):
         Rows(tmp_path, {"seed": 1}, resume=True)
+
+
+@pytest.mark.parametrize(
+    "address", ["bogus://x:1", "tcp://", "tcp://host", "tcp://1.2.3.4:999999", "foo bar", "tcp://[::1"]
+)
+def test_what_is_no_address_of_a_scheduler_is_told_before_anyone_is_called(address):
+    with pytest.raises(UsageError, match="no scheduler's address"):
+        next(on_cluster([], address))
