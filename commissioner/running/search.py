@@ -16,6 +16,7 @@ from commissioner.estimation.fit import (
     jacobian,
     refine,
     refreshed,
+    unbiased,
     with_noise_of,
 )
 from commissioner.estimation.numbers import AT, NAMES
@@ -183,8 +184,8 @@ def search(
     gain, rivals = _judged(seeking, fit, accepted)
     return Found(
         seeking.problem,
-        seeking.base,
-        fit,
+        unbiased(seeking.problem, seeking.base),
+        unbiased(seeking.problem, fit),
         accepted,
         gain,
         rivals,
