@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused
 from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
-from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES, SHAPES
 from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
 from commissioner.estimation.record import STATES as RECORD_STATES
 
@@ -416,24 +416,23 @@ def unbiased(problem: Problem, fit: Fit, seed: int = 6) -> Fit:
 
     An input that is noisy itself draws a fit aside by the square of its noise: L_sigma of a motor without a start by 0.5 to 0.8 %, four
     standard deviations. The fitted machine's own currents are fitted with noise of that size added to the input, once with either
-    sign: what the two steps have in common is taken off (simulation extrapolation, Cook and Stefanski 1994, DOI 10.1080/01621459.1994.10476871).
+    sign: what the two steps have in common is taken off. Numbers that only shape a law stay: along their valley no step is straight (simulation extrapolation, Cook and Stefanski 1994, DOI 10.1080/01621459.1994.10476871).
     """
     runs = zip(problem.record.windows, simulate(problem, fit.machine), strict=True)
     own = tuple(replace(w, current=run) for w, (run, _) in runs)
     ideal = replace(problem, record=replace(problem.record, windows=own))
     drawn = _input_noise(problem, np.random.default_rng(seed))
-    drawn_aside = np.zeros(len(fit.columns))
+    columns = tuple(c for c in fit.columns if c.kind != "p" or c.index not in SHAPES)
+    drawn_aside = np.zeros(len(columns))
     for sign in (1.0, -1.0):
         noisy = _shaken(ideal, drawn, sign)
-        along = jacobian(noisy, fit.machine, fit.columns)
+        along = jacobian(noisy, fit.machine, columns)
         rest = fitted_part(noisy, residuals(noisy, fit.machine))
         drawn_aside += 0.5 * np.linalg.pinv(_normalised(along @ along.T)) @ (along @ rest)
-    logarithms = [
-        abs(x) for c, x in zip(fit.columns, drawn_aside, strict=True) if c.kind == "p" and c.index in LOGARITHMIC
-    ]
+    logarithms = [abs(x) for c, x in zip(columns, drawn_aside, strict=True) if c.kind == "p" and c.index in LOGARITHMIC]
     if not np.isfinite(drawn_aside).all() or max(logarithms, default=0.0) > LARGEST_STEP:
         return fit
-    return replace(fit, machine=fit.machine.moved(fit.columns, -drawn_aside))
+    return replace(fit, machine=fit.machine.moved(columns, -drawn_aside))
 
 
 def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:

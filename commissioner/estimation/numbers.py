@@ -32,6 +32,8 @@ LOGARITHMIC = frozenset(
         "dead_knee", "inertia", "leakage_split",
     )
 )  # fmt: skip
+SHAPES = frozenset(AT[n] for n in ("leakage_bend", "leakage_knee", "leakage_split", "bar_corner", "dead_knee"))
+"""Numbers that shape the law of another one, weakly determined beside it."""
 DEFAULTS = {"leakage_split": 1.0, "leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
 """Leakage of the stator over that of the rotor; leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s;
 of rated peak current; kg m^2."""
