@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from commissioner.errors import DataRefused
 from commissioner.estimation.kernels.march import STATES, load_tangents, march, tangents
 from commissioner.estimation.noise import Noise, plain_noise, through_machine
-from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES
+from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, LOGARITHMIC, NAMES, SHAPES
 from commissioner.estimation.record import SMOOTH_S, Record, between, first_part, smoothed
 from commissioner.estimation.record import STATES as RECORD_STATES
 
@@ -388,21 +388,62 @@ def refreshed(problem: Problem, fit: Fit) -> Fit:
     return replace(fit, jacobian=jacobian(problem, fit.machine, fit.columns))
 
 
+def _input_noise(problem: Problem, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+    """Drawn for each window: noise of the voltage (n, 2), and of the electrical speed as it is after smoothing (n,)."""
+    record, drawn = problem.record, []
+    for w in record.windows:
+        volts = np.stack([record.sigma_v * rng.standard_normal(w.count) for _ in range(2)], axis=1)
+        speed = np.zeros(w.count)
+        if record.sigma_w:
+            speed = smoothed(record.sigma_w * rng.standard_normal(w.count), SMOOTH_S, 0, problem.period)
+        drawn.append((volts, speed))
+    return drawn
+
+
+def _shaken(problem: Problem, drawn: Sequence[tuple[Array, Array]], sign: float) -> Problem:
+    """The same currents with noise added to what drives the machine."""
+    noisy = []
+    for w, (volts, speed) in zip(problem.record.windows, drawn, strict=True):
+        turning = w.speed.copy()
+        turning[:, 0] += sign * between(speed)
+        added = np.stack([between(volts[:, k]) for k in range(2)], axis=1)
+        noisy.append(replace(w, voltage=w.voltage + sign * added, speed=turning))
+    return replace(problem, record=replace(problem.record, windows=tuple(noisy)))
+
+
+def unbiased(problem: Problem, fit: Fit, seed: int = 6) -> Fit:
+    """The fit less what the noise of voltage and speed does to its numbers.
+
+    An input that is noisy itself draws a fit aside by the square of its noise: L_sigma of a motor without a start by 0.5 to 0.8 %, four
+    standard deviations. The fitted machine's own currents are fitted with noise of that size added to the input, once with either
+    sign: what the two steps have in common is taken off. Numbers that only shape a law stay: along their valley no step is straight (simulation extrapolation, Cook and Stefanski 1994, DOI 10.1080/01621459.1994.10476871).
+    """
+    runs = zip(problem.record.windows, simulate(problem, fit.machine), strict=True)
+    own = tuple(replace(w, current=run) for w, (run, _) in runs)
+    ideal = replace(problem, record=replace(problem.record, windows=own))
+    drawn = _input_noise(problem, np.random.default_rng(seed))
+    columns = tuple(c for c in fit.columns if c.kind != "p" or c.index not in SHAPES)
+    drawn_aside = np.zeros(len(columns))
+    for sign in (1.0, -1.0):
+        noisy = _shaken(ideal, drawn, sign)
+        along = jacobian(noisy, fit.machine, columns)
+        rest = fitted_part(noisy, residuals(noisy, fit.machine))
+        drawn_aside += 0.5 * np.linalg.pinv(_normalised(along @ along.T)) @ (along @ rest)
+    logarithms = [abs(x) for c, x in zip(columns, drawn_aside, strict=True) if c.kind == "p" and c.index in LOGARITHMIC]
+    if not np.isfinite(drawn_aside).all() or max(logarithms, default=0.0) > LARGEST_STEP:
+        return fit
+    return replace(fit, machine=fit.machine.moved(columns, -drawn_aside))
+
+
 def with_noise_of(problem: Problem, machine: Machine, seed: int = 5) -> Problem:
     """The same problem, weighted by what noise of voltage, speed and current leaves in this machine's residual."""
     record = problem.record
     rng = np.random.default_rng(seed)
-    noisy = []
-    for w in record.windows:
-        shaken = np.stack([between(record.sigma_v * rng.standard_normal(w.count)) for _ in range(2)], axis=1)
-        speed = w.speed.copy()
-        if record.sigma_w:
-            speed[:, 0] += between(smoothed(record.sigma_w * rng.standard_normal(w.count), SMOOTH_S, 0, problem.period))
-        noisy.append(replace(w, voltage=w.voltage + shaken, speed=speed))
+    noisy = _shaken(problem, _input_noise(problem, rng), 1.0)
     clean = replace(machine, theta=machine.theta.copy())
     plain, moved = (
         simulate(problem, clean),
-        simulate(replace(problem, record=replace(record, windows=tuple(noisy))), clean),
+        simulate(noisy, clean),
     )
     shown = np.concatenate([(b[0] - a[0])[:, :2] for a, b in zip(plain, moved, strict=True)])
     if not np.isfinite(shown).all():

@@ -12,9 +12,11 @@ NAMES = (
     "stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance",
     "stator_saturation_1", "stator_saturation_2", "stator_saturation_3",
     "rotor_saturation_1", "rotor_saturation_2", "rotor_saturation_3",
+    "gap_saturation_1", "gap_saturation_2", "gap_saturation_3", "leakage_split",
     "leakage_softness", "rotor_leakage_softness", "leakage_bend", "leakage_knee", "bar_resistance", "bar_corner", "iron_conductance", "stator_heat", "rotor_heat",
     "cage_asymmetry_re", "cage_asymmetry_im",
     "loop_conductance_u", "loop_susceptance_u", "loop_conductance_v", "loop_susceptance_v", "loop_conductance_w", "loop_susceptance_w",
+    "loop_conductance_uv", "loop_susceptance_uv", "loop_conductance_vw", "loop_susceptance_vw", "loop_conductance_wu", "loop_susceptance_wu",
     "line_re", "line_im", "dead_voltage", "dead_knee", "voltage_gain_re", "voltage_gain_im", "voltage_offset_re", "voltage_offset_im",
     "speed_gain", "speed_lag", "speed_ripple_cos", "speed_ripple_sin", "delay", "current_gain_v", "current_gain_w",
     "current_offset_u", "current_offset_v", "current_offset_w", "current_pair_u", "current_pair_v", "current_pair_w",
@@ -27,11 +29,13 @@ LOGARITHMIC = frozenset(
     AT[n]
     for n in (
         "stator_resistance", "rotor_resistance", "leakage_inductance", "magnetizing_inductance", "leakage_knee", "bar_corner",
-        "dead_knee", "inertia",
+        "dead_knee", "inertia", "leakage_split",
     )
 )  # fmt: skip
-DEFAULTS = {"leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
-"""Leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s;
+SHAPES = frozenset(AT[n] for n in ("leakage_bend", "leakage_knee", "leakage_split", "bar_corner", "dead_knee"))
+"""Numbers that shape the law of another one, weakly determined beside it."""
+DEFAULTS = {"leakage_split": 1.0, "leakage_knee": 3.0, "bar_corner": 138.0, "dead_knee": 0.02, "inertia": 0.01}
+"""Leakage of the stator over that of the rotor; leakage flux of so many times rated current (from 2 on, the fit of knee and bend ended in a wrong valley); corner of the bars in rad/s;
 of rated peak current; kg m^2."""
 
 

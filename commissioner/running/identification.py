@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, with_noise_of
+from commissioner.estimation.fit import Fit, Machine, Problem, problem_of, refine, simulate, unbiased, with_noise_of
 from commissioner.estimation.numbers import AT, FOUR
 from commissioner.estimation.record import STATES, Record, first_part, prepare
 from commissioner.identify.contract import Measured, RunningDocument
@@ -59,7 +59,7 @@ def identify(recordings: Sequence[RunningRecording], plate: Nameplate) -> Identi
     problem = problem_of(record, 0.0)
     fit = with_speed(problem) if record.has_speed else with_shaft(problem, smooth_load=record.has_start)
     problem = with_noise_of(problem, fit.machine)
-    fit = refine(problem, fit.machine, fit.columns, most=20)
+    fit = unbiased(problem, refine(problem, fit.machine, fit.columns, most=20))
     covariance = _of_four(fit)
     if not np.isfinite(covariance).all() or np.sqrt(covariance.diagonal().max()) > 1.0:
         worst = FOUR[int(np.argmax(covariance.diagonal()))].replace("_", " ")

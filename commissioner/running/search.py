@@ -16,6 +16,7 @@ from commissioner.estimation.fit import (
     jacobian,
     refine,
     refreshed,
+    unbiased,
     with_noise_of,
 )
 from commissioner.estimation.numbers import AT, NAMES
@@ -51,6 +52,29 @@ class Step:
     why: str = ""
 
 
+WORSE = "what was held out gets worse"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A candidate refitted: chi-square it gains, and why it is refused (empty where it is not)."""
+
+    cause: Named
+    fit: Fit
+    gain: float
+    why: str
+
+    @property
+    def worth(self) -> float:
+        """Gain less what its further numbers would gain by chance."""
+        return self.gain - RULES.each_further_number * self.fit.scale * len(self.cause.numbers)
+
+    @property
+    def explains_all(self) -> bool:
+        """Whether nothing is left for another."""
+        return not self.why and self.fit.chi2 < RULES.nothing_left * self.fit.count
+
+
 @dataclass(frozen=True)
 class Found:
     """What the search leaves: nominal and final fit, the causes taken in, gain of each, rivals (chi-square lost by taking them instead)."""
@@ -81,6 +105,10 @@ class Search:
         """Remember, and tell who listens."""
         self.steps.append(step)
         self.observe(step)
+
+    def accept(self, one: Tried) -> None:
+        """Remember that it was taken in."""
+        self.say(Step("accepted", one.cause.cause, one.cause.form.name, one.gain / one.fit.scale))
 
     def candidates(self, without: Iterable[str]) -> list[Named]:
         """Every form that this recording could show."""
@@ -156,8 +184,8 @@ def search(
     gain, rivals = _judged(seeking, fit, accepted)
     return Found(
         seeking.problem,
-        seeking.base,
-        fit,
+        unbiased(seeking.problem, seeking.base),
+        unbiased(seeking.problem, fit),
         accepted,
         gain,
         rivals,
@@ -196,32 +224,47 @@ def _needed(seeking: Search, one: Named) -> float:
     return RULES.least_gain + RULES.each_further_number * (len(one.numbers) - 1)
 
 
-def _forward(seeking: Search, fit: Fit, accepted: Sequence[Named]) -> tuple[Fit, tuple[Named, ...]] | None:
-    """The cause that gains most and holds on what was kept aside; None where none does."""
-    screened = _screen(seeking, fit, seeking.candidates(c.cause for c in accepted))
-    tried: list[tuple[float, Named, Fit, str]] = []
-    for gain, one, own in screened[: RULES.tried]:
-        seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
-        if gain / fit.scale < 0.6 * RULES.least_gain:
-            continue
-        first = np.concatenate([fit.jacobian, own])
-        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
-        won = fit.chi2 - other.chi2
-        why = _refusal(seeking, fit, other, (*accepted, one), won)
-        tried.append((won, one, other, why))
-        if other.chi2 < RULES.nothing_left * other.count and not why:
-            break  # whoever explains as much is told apart as its rival
-    tried.sort(key=lambda item: -item[0])
-    for gain, one, other, why in tried:
-        if not why:
-            seeking.say(Step("accepted", one.cause, one.form.name, gain / other.scale))
-            return refreshed(seeking.problem, other), (*accepted, one)
-        seeking.say(Step("refused", one.cause, one.form.name, gain / other.scale, why))
+def _forward(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]] | None:
+    """The cause that gains most and holds on what was kept aside, or two that do so together; None where none does."""
+    tried = _tried(seeking, fit, fit, accepted)
+    first = next((t for t in tried if not t.why), None)
+    alone = next((t for t in tried if t.why == WORSE), None)
+    if alone is not None and (first is None or alone.gain > first.gain + RULES.tie * alone.fit.scale):
+        pair = (*accepted, alone.cause)
+        both = next((t for t in _tried(seeking, fit, alone.fit, pair) if not t.why), None)
+        if both is not None:
+            seeking.accept(alone)
+            seeking.accept(both)
+            return refreshed(seeking.problem, both.fit), (*pair, both.cause)
+    for one in tried:
+        if not one.why:
+            seeking.accept(one)
+            return refreshed(seeking.problem, one.fit), (*accepted, one.cause)
+        seeking.say(Step("refused", one.cause.cause, one.cause.form.name, one.gain / one.fit.scale, one.why))
     return None
 
 
-def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:
-    """Why the last of these causes is not taken in; empty where it is."""
+def _tried(seeking: Search, held: Fit, fit: Fit, accepted: tuple[Named, ...]) -> list[Tried]:
+    """The candidates that promise most beside `accepted`, refitted, best first; what was held out is judged against `held`."""
+    screened = _screen(seeking, fit, seeking.candidates(c.cause for c in accepted))
+    tried: list[Tried] = []
+    for place, (gain, one, own) in enumerate(screened):
+        if place >= RULES.tried and one.cause not in {t.cause.cause for t in tried if not t.why}:
+            continue
+        seeking.say(Step("screened", one.cause, one.form.name, gain / fit.scale))
+        if gain / fit.scale < 0.6 * RULES.least_gain:
+            continue
+        if any(t.explains_all and t.cause.cause != one.cause for t in tried):
+            continue  # whoever explains as much is told apart as its rival; another form of the same cause is not
+        first = np.concatenate([fit.jacobian, own])
+        other = seeking.fitted(fit.machine, (*accepted, one), fit, first=first)
+        won = fit.chi2 - other.chi2
+        tried.append(Tried(one, other, won, _refusal(seeking, held, fit, other, (*accepted, one), won)))
+    return sorted(tried, key=lambda t: -t.worth)
+
+
+def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[Named], gain: float) -> str:
+    """Why the last of these causes is not taken in beside those of `fit`; empty where it is."""
     is_steady = seeking.problem.record.is_steady
     if gain / other.scale < _needed(seeking, causes[-1]):
         return "gains too little"
@@ -231,20 +274,20 @@ def _refusal(seeking: Search, fit: Fit, other: Fit, causes: Sequence[Named], gai
         return "too small to matter"
     if not seeking.is_plausible(other, causes):
         return "its size is one that physics does not allow"
-    worse = other.held - fit.held
-    if worse / max(fit.held / max(fit.held_count, 1), 1.0) > RULES.hold_out_loss + 0.01 * gain:
-        return "what was held out gets worse"
+    worse = other.held - held.held
+    if worse / max(held.held / max(held.held_count, 1), 1.0) > RULES.hold_out_loss + 0.01 * gain:
+        return WORSE
     return ""
 
 
 def _exchanged(seeking: Search, fit: Fit, accepted: tuple[Named, ...]) -> tuple[Fit, tuple[Named, ...]]:
-    """Each cause against whoever looks alike: the better one stays."""
+    """Each cause against whoever looks alike, until none is better: another form beside it may have made its own the wrong one."""
     for k, one in enumerate(accepted[:-1]):  # the last one has just won against all
         others = tuple(c for j, c in enumerate(accepted) if j != k)
         for lost, rival, other in _rivals(seeking, fit, accepted, k, most=2):
             if lost < -RULES.tie * other.scale and seeking.is_plausible(other, (*others, rival)):
                 seeking.say(Step("exchanged", one.cause, rival.form.name, -lost / other.scale, rival.cause))
-                return refreshed(seeking.problem, other), (*others, rival)
+                return _exchanged(seeking, refreshed(seeking.problem, other), (*others, rival))
     return fit, accepted
 
 
@@ -293,9 +336,11 @@ def _rivals(
     alike.sort(key=lambda item: -item[0])
     out = []
     others = tuple(c for j, c in enumerate(accepted) if j != k)
-    for cosine, rival in alike[:most]:
+    for place, (cosine, rival) in enumerate(alike):
         if cosine < RULES.least_cosine:
             break
+        if place >= most and rival.cause != one.cause:
+            continue
         less = less or _less(seeking, fit, accepted, k)
         other = seeking.fitted(less.machine, (*others, rival), less)
         out.append((other.chi2 - fit.chi2, rival, other))

@@ -29,6 +29,7 @@ R_S, R_R, L_SIGMA, L_M = (
     AT["magnetizing_inductance"],
 )
 SAT_S, SAT_R = AT["stator_saturation_1"], AT["rotor_saturation_1"]
+SAT_G, SPLIT = AT["gap_saturation_1"], AT["leakage_split"]
 SOFT, SOFT_R, BOW, KNEE, BAR, CORNER, IRON = (
     AT["leakage_softness"],
     AT["rotor_leakage_softness"],
@@ -51,7 +52,32 @@ GAIN, OFFSET, PAIR = AT["current_gain_v"], AT["current_offset_u"], AT["current_p
 INERTIA, CONSTANT, FAN, RIPPLE = AT["inertia"], AT["load_constant"], AT["load_fan"], AT["load_ripple_cos"]
 MOST_FLUX = 6.0
 """Square of the flux over rated flux beyond which the law of the iron goes on with its last value: a fit on its way."""
-HALF_3 = 0.5 * np.sqrt(3.0)
+HALF_3 = 0.5 * float(np.sqrt(3.0))
+LOOP_A = (1.0, -0.5, -0.5, HALF_3, 0.0, -HALF_3)
+LOOP_B = (0.0, HALF_3, -HALF_3, -0.5, 1.0, -0.5)
+"""Axes of the windings: u, v, w of a star, uv, vw, wu of a delta, which lie 30 degrees behind."""
+GAP_STEPS = 4
+"""Of Newton's method for the flux of the air gap: the saturated current through the leakage moves it by some per cent only."""
+
+
+@_inlined
+def _gap_current(p, both, z0):
+    """Extra magnetizing current over psi_0 / L_M, of the flux of the air gap; `z0`: square of psi_0 over rated flux; `both`: k (1 - k).
+
+    In the T circuit with the share k of L_sigma before the air gap (k = 0: stator flux, 1: rotor flux) the saturated current
+    i_x divides: (1 - k) i_x comes from the stator, k i_x from the rotor, and psi_m = (1 - k) psi_s + k psi_R - k (1 - k) L_sigma i_x.
+    """
+    back = both * p[L_SIGMA] / p[L_M]
+    share, grown = 1.0 + 0.0 * z0, 0.0 * z0
+    for _ in range(GAP_STEPS):
+        z = z0 * share * share
+        steep = z * (p[SAT_G] + z * (2.0 * p[SAT_G + 1] + 3.0 * z * p[SAT_G + 2]))
+        if z.real > MOST_FLUX:
+            z = MOST_FLUX + 0.0 * z0
+            steep = 0.0 * z0
+        grown = z * (p[SAT_G] + z * (p[SAT_G + 1] + z * p[SAT_G + 2]))
+        share -= (share * (1.0 + back * grown) - 1.0) / (1.0 + back * (grown + 2.0 * steep))
+    return share * grown
 
 
 @_kernel
@@ -69,11 +95,13 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
     per_leak, per_main = 1.0 / p[L_SIGMA], 1.0 / p[L_M]
     has_s = (p[SAT_S] != 0.0) or (p[SAT_S + 1] != 0.0) or (p[SAT_S + 2] != 0.0)
     has_r = (p[SAT_R] != 0.0) or (p[SAT_R + 1] != 0.0) or (p[SAT_R + 2] != 0.0)
+    has_g = (p[SAT_G] != 0.0) or (p[SAT_G + 1] != 0.0) or (p[SAT_G + 2] != 0.0)
+    to_stator, to_rotor = 1.0 / (1.0 + p[SPLIT]), p[SPLIT] / (1.0 + p[SPLIT])
     has_soft, has_soft_r = p[SOFT] != 0.0, p[SOFT_R] != 0.0
     has_bar, has_heat = p[BAR] != 0.0, (p[HEAT_S] != 0.0) or (p[HEAT_R] != 0.0)
     has_cage = (p[CAGE] != 0.0) or (p[CAGE + 1] != 0.0)
     has_loop = False
-    for j in range(6):
+    for j in range(2 * len(LOOP_A)):
         has_loop = has_loop or p[LOOP + j] != 0.0
     has_line = (p[LINE] != 0.0) or (p[LINE + 1] != 0.0)
     has_dead = p[DEAD] != 0.0
@@ -142,10 +170,15 @@ def march(p, scales, x, voltage, speed, knots, places, period, is_free, out, sha
                     z = one + MOST_FLUX
                 grown = per_main * z * (p[SAT_S] + z * (p[SAT_S + 1] + z * p[SAT_S + 2]))
                 ia, ib = ia + y[0] * grown, ib + y[1] * grown
+            if has_g:
+                ga, gb = to_stator * y[0] + to_rotor * y[2], to_stator * y[1] + to_rotor * y[3]
+                grown = _gap_current(p, to_stator * to_rotor, (ga * ga + gb * gb) * flux2) * per_main
+                ga, gb = ga * grown, gb * grown
+                ia, ib = ia + to_stator * ga, ib + to_stator * gb
+                ra, rb = ra + to_rotor * ga, rb + to_rotor * gb
             if has_loop:
-                for j in range(3):
-                    ca = 1.0 if j == 0 else -0.5
-                    cb = 0.0 if j == 0 else (HALF_3 if j == 1 else -HALF_3)
+                for j in range(len(LOOP_A)):
+                    ca, cb = LOOP_A[j], LOOP_B[j]
                     one_loop = p[LOOP + 2 * j] * (ua * ca + ub * cb) + p[LOOP + 2 * j + 1] * w_n * (
                         y[0] * ca + y[1] * cb
                     )

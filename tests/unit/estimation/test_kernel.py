@@ -9,7 +9,7 @@ from commissioner.estimation.numbers import AT, COUNT, DEFAULTS, NAMES, Scales
 SCALES = Scales(11.7, 326.6, 314.16, 26.0, 2)
 PERIOD = 2e-4
 SPOKEN = {
-    "stator_saturation_2": 0.1, "rotor_saturation_1": 0.05, "leakage_softness": 0.2, "leakage_bend": 0.1, "bar_resistance": 0.3,
+    "stator_saturation_2": 0.1, "rotor_saturation_1": 0.05, "gap_saturation_2": 0.04, "leakage_softness": 0.2, "leakage_bend": 0.1, "bar_resistance": 0.3,
     "iron_conductance": 0.02, "stator_heat": 0.02, "rotor_heat": 0.03, "cage_asymmetry_re": 0.01, "cage_asymmetry_im": 0.02,
     "loop_conductance_v": 0.03, "loop_susceptance_v": 0.01, "line_re": 0.02, "line_im": -0.01, "dead_voltage": 0.005,
     "voltage_gain_re": 0.002, "voltage_gain_im": 0.003, "voltage_offset_re": 1e-4, "speed_gain": 0.001, "speed_lag": 1e-3,
@@ -138,3 +138,40 @@ def test_a_start_is_that_of_the_simulator_with_another_circuit():
     march(p, scales.as_tuple(), psi_s, voltage, speed, np.zeros(2), np.zeros(2 * u.size - 1), PERIOD, False, out, shaft)
     error = np.hypot(out[5:, 0] - i[5:].real, out[5:, 1] - i[5:].imag)
     assert np.sqrt(np.mean(error**2)) < 5e-4 * np.abs(i).max()
+
+
+def test_saturation_of_the_air_gaps_flux_is_that_of_the_t_circuit():
+    """Fluxes of both windings, one magnetizing branch that saturates: the node is solved by bisection."""
+    stator, rotor, main, extra, count = 0.0054, 0.0066, 0.17, 0.3, 300
+    g = main / (main + rotor)
+    p = numbers({"gap_saturation_1": extra * g, "leakage_split": stator / (g * rotor)})
+    p[:4] = [1.32, 1.02, stator + g * rotor, g * main]
+    voltage, speed = forcing(count)
+    u = voltage[:, 0] + 1j * voltage[:, 1]
+    rated = SCALES.voltage_v / SCALES.frequency_rad_per_s
+
+    def currents(psi):
+        whole = psi[0] / stator + psi[1] / rotor
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            share = 0.5 * (low + high)
+            flux = share * whole / (1.0 / stator + 1.0 / rotor)
+            taken = flux * (1.0 / stator + 1.0 / rotor + (1.0 + extra * abs(flux / rated) ** 2) / main)
+            low, high = (share, high) if abs(taken) < abs(whole) else (low, share)
+        return (psi[0] - flux) / stator, (psi[1] - flux) / rotor
+
+    def slope(psi, m):
+        i, i_r = currents(psi)
+        return np.array([u[m] - p[0] * i, -p[1] / g**2 * i_r + 1j * speed[m, 0] * psi[1]])
+
+    psi, expected = np.zeros(2, complex), []
+    for q in range(count):
+        expected.append(currents(psi)[0] if abs(psi[0]) else 0.0)
+        if q < count - 1:
+            a = slope(psi, 2 * q) if q else np.array([u[0], 0.0])
+            b = slope(psi + 0.5 * PERIOD * a, 2 * q + 1)
+            c = slope(psi + 0.5 * PERIOD * b, 2 * q + 1)
+            d = slope(psi + PERIOD * c, 2 * q + 2)
+            psi = psi + PERIOD / 6.0 * (a + 2.0 * (b + c) + d)
+    found = run(p, count, is_free=False)[0]
+    assert np.abs(found[:, 0] + 1j * found[:, 1] - expected).max() < 1e-4 * np.abs(expected).max()

@@ -1,15 +1,21 @@
-"""Shorted turns in one phase: a loop beside the magnetizing branch takes a current of its own."""
+"""Shorted turns in one winding: a loop beside the magnetizing branch takes a current of its own. A delta's windings lie between the lines."""
 
 from __future__ import annotations
 
 import math
 
 from commissioner.estimation.numbers import Scales
+from commissioner.estimation.record import Record
 from commissioner.running.causes.cause import PHASES, Cause, Confounder, Form, Sizes, Values
+
+WINDINGS = {"star": tuple(PHASES), "delta": ("uv", "vw", "wu")}
+BEHIND = -0.25
+"""Of a delta's winding, in thirds of a turn."""
+EVERY = WINDINGS["star"] + WINDINGS["delta"]
 
 
 def _sizes(v: Values, _: Scales) -> Sizes:
-    loops = {p: math.hypot(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in PHASES}
+    loops = {p: math.hypot(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in EVERY}
     worst = max(loops, key=lambda p: loops[p])
     sign = math.copysign(1.0, v[f"loop_conductance_{worst}"])
     return {f"current_in_{worst}_of_rated": (sign * loops[worst], "")}
@@ -17,7 +23,10 @@ def _sizes(v: Values, _: Scales) -> Sizes:
 
 def _scenario(v: Values, s: Scales) -> dict[str, float]:
     ((name, (size, _)),) = _sizes(v, s).items()
-    return {"size": size, "phase": PHASES.index(name.split("_")[2])}
+    winding = name.split("_")[2]
+    if winding in PHASES:
+        return {"size": size, "phase": PHASES.index(winding)}
+    return {"size": size, "phase": WINDINGS["delta"].index(winding) + BEHIND}
 
 
 MOST_LAG = 1.7
@@ -25,8 +34,15 @@ MOST_LAG = 1.7
 
 
 def _is_loop(v: Values) -> bool:
-    loops = [(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in PHASES]
+    loops = [(v[f"loop_conductance_{p}"], v[f"loop_susceptance_{p}"]) for p in EVERY]
     return all(g >= 0.0 and -0.3 * g <= b <= MOST_LAG * g for g, b in loops)
+
+
+def _form(connection: str, winding: str) -> Form:
+    def is_there(record: Record) -> bool:
+        return record.plate.connection == connection
+
+    return Form(f"phase {winding}", (f"loop_conductance_{winding}", f"loop_susceptance_{winding}"), needs=is_there)
 
 
 CAUSE = Cause(
@@ -35,10 +51,10 @@ CAUSE = Cause(
     says="One phase of the stator takes {size} of rated current beside its own, in proportion to the voltage: as shorted turns do",
     meaning="A fault of the motor: shorted turns heat where they are and grow.",
     remedy="Stop the motor soon and measure the winding; do not start it again before.",
-    physics="i += (g u_k + b w psi_sk) n_k: a loop of resistance and leakage on phase k, driven by that phase's flux",
+    physics="i += (g u_k + b w psi_sk) n_k: a loop of resistance and leakage on winding k (of a delta: between two lines), driven by its flux",
     signature="a negative-sequence current in proportion to the voltage that the voltage's own unbalance does not explain",
     source="Patel, Chandorkar (locus of the negative sequence against load); Radecki, DOI 10.5277/PED160111",
-    forms=tuple(Form(f"phase {p}", (f"loop_conductance_{p}", f"loop_susceptance_{p}")) for p in PHASES),
+    forms=tuple(_form(connection, p) for connection, windings in WINDINGS.items() for p in windings),
     sizes=_sizes,
     range=(0.0, 2.0),
     allows=_is_loop,

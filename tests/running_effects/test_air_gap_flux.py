@@ -1,0 +1,34 @@
+"""The flux that saturates is the air gap's: neither the stator's nor the rotor's, and nothing else is named for the difference."""
+
+from dataclasses import replace
+
+import pytest
+
+from commissioner.running.diagnosis import Verdict, diagnose
+from tests.running_effects.start import PLATE, started
+
+SATURATED = {"gap_saturation_2": 0.1, "gap_saturation_3": 0.15, "leakage_split": 0.9}
+
+
+def test_it_is_named_alone_with_its_size():
+    """By the stator's or the rotor's flux heat of the stator, iron loss or a gain were named beside it, and the size was far off."""
+    seen = diagnose([started(PLATE, **SATURATED)], PLATE)
+    assert [(c.name, c.form) for c in seen.causes] == [("magnetizing_saturation", "air-gap flux")]
+    size, std, _ = seen.causes[0].sizes["extra_at_rated_flux"]
+    assert abs(size - 0.25) < 3.0 * std < 0.1
+
+
+def test_with_a_leakage_that_saturates_both_are_named():
+    """Alone the leakage makes the part that was held out worse, for want of the other."""
+    seen = diagnose([started(PLATE, leakage_softness=0.25, **SATURATED)], PLATE)
+    assert {c.name for c in seen.causes} == {"magnetizing_saturation", "leakage_saturation"}
+    assert seen.verdict is Verdict.EXPLAINED
+
+
+@pytest.mark.parametrize("winding", ["uv", "wu"])
+def test_shorted_turns_of_a_delta_lie_between_two_lines(winding):
+    """By a loop on one phase of the equivalent star a gain of the voltages and an iron loss were named."""
+    delta = replace(PLATE, connection="delta")
+    seen = diagnose([started(delta, **{f"loop_conductance_{winding}": 0.03})], delta)
+    assert [(c.name, c.form) for c in seen.causes] == [("stator_asymmetry", f"phase {winding}")]
+    assert seen.causes[0].sizes[f"current_in_{winding}_of_rated"][0] == pytest.approx(0.03, rel=0.05)
