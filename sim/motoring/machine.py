@@ -75,11 +75,12 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Effect:
-    """`size` in the catalogue's unit; `phase` 0, 1, 2 = u, v, w where the effect sits in one."""
+    """`size` in the catalogue's unit; `phase` 0, 1, 2 = u, v, w where the effect sits in one; -0.25, 0.75, 1.75 = a delta's
+    windings uv, vw, wu."""
 
     name: str
     size: float
-    phase: int = 0
+    phase: float = 0
     details: dict[str, float] = field(default_factory=dict)
 
 

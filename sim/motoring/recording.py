@@ -57,11 +57,19 @@ def _table(kind: Any, table: dict[str, Any], source: str, where: str) -> Any:
         raise ValueError(f"{source}: [{where}] {error}") from error
 
 
+WINDINGS = {0: "u", 1: "v", 2: "w", -0.25: "uv", 0.75: "vw", 1.75: "wu"}
+"""By where they lie, in thirds of a turn."""
+
+
 def _effect(name: str, entry: Any, source: str) -> Effect:
     entry = {"size": entry} if isinstance(entry, int | float) else dict(entry)
     if name not in (*CATALOGUE, *UNLISTED) or not isinstance(entry.get("size"), int | float):
         raise ValueError(f"{source}: effects.{name} must be one of {', '.join((*CATALOGUE, *UNLISTED))}, with a size")
-    size, phase = float(entry.pop("size")), int(entry.pop("phase", 0))
+    size, phase = float(entry.pop("size")), entry.pop("phase", 0)
+    if phase not in (WINDINGS if name == "stator_asymmetry" else (0, 1, 2)):
+        raise ValueError(
+            f"{source}: effects.{name} is in no phase {phase}: 0, 1, 2 are u, v, w; -0.25, 0.75, 1.75 a delta's uv, vw, wu"
+        )
     return Effect(name, size, phase, {k: float(v) for k, v in entry.items()})
 
 
@@ -96,7 +104,7 @@ def answer_key(scenario: Scenario, played: Played, seed: int) -> dict[str, Any]:
             {
                 "name": e.name,
                 "size": e.size,
-                "phase": "uvw"[e.phase],
+                "phase": WINDINGS[e.phase],
                 "unit": CATALOGUE[e.name].unit if e.name in CATALOGUE else "",
             }
             for e in scenario.effects

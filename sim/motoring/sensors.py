@@ -35,7 +35,7 @@ def sensed(scenario: Scenario, played: Played, rng: np.random.Generator) -> Colu
     ):
         if name in effects:
             e = effects[name]
-            phases[e.phase] = change(phases[e.phase], e.size)
+            phases[int(e.phase)] = change(phases[int(e.phase)], e.size)
     if "gain_drift" in effects:
         phases[0] *= 1.0 + effects["gain_drift"].size * np.sin(2 * np.pi * time / time[-1] * 3.0)
     if "sensor_knee" in effects:
@@ -49,7 +49,7 @@ def sensed(scenario: Scenario, played: Played, rng: np.random.Generator) -> Colu
         names = ["voltage_uv_v", "voltage_vw_v", "voltage_wu_v"]
     if "voltage_gain_mismatch" in effects:
         e = effects["voltage_gain_mismatch"]
-        volts[e.phase] *= 1 + e.size
+        volts[int(e.phase)] *= 1 + e.size
     volts = volts + sensors.voltage_noise_v * rng.standard_normal(volts.shape)
     columns: Columns = {"time_s": time}
     columns |= {f"current_{p}_a": phases[k] for k, p in enumerate("uvw") if sensors.has_w or p != "w"}

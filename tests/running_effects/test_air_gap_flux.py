@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 
 from commissioner.running.diagnosis import Verdict, diagnose
+from sim.motoring.machine import Effect
+from tests.running_effects.cases import Case, taken
 from tests.running_effects.start import PLATE, started
 
 SATURATED = {"gap_saturation_2": 0.1, "gap_saturation_3": 0.15, "leakage_split": 0.9}
@@ -32,3 +34,12 @@ def test_shorted_turns_of_a_delta_lie_between_two_lines(winding):
     seen = diagnose([started(delta, **{f"loop_conductance_{winding}": 0.03})], delta)
     assert [(c.name, c.form) for c in seen.causes] == [("stator_asymmetry", f"phase {winding}")]
     assert seen.causes[0].sizes[f"current_in_{winding}_of_rated"][0] == pytest.approx(0.03, rel=0.05)
+
+
+@pytest.mark.parametrize(("phase", "winding"), [(-0.25, "uv"), (1.75, "wu")])
+def test_a_deltas_winding_lies_where_another_author_puts_it(phase, winding):
+    scenario = replace(Case(5003, "null").scenario(), effects=(Effect("stator_asymmetry", 0.04, phase),))
+    recording, plate, _ = taken(scenario, 5003)
+    seen = diagnose([recording], replace(plate, connection="delta"))
+    assert [(c.name, c.form) for c in seen.causes] == [("stator_asymmetry", f"phase {winding}")]
+    assert seen.causes[0].sizes[f"current_in_{winding}_of_rated"][0] == pytest.approx(0.04, rel=0.1)

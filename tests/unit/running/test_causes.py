@@ -56,3 +56,5 @@ def test_a_pure_reactance_is_no_shorted_turn():
     assert cause.is_plausible(zeros(loop_conductance_u=0.03, loop_susceptance_u=0.01), SCALES)
     assert not cause.is_plausible(zeros(loop_conductance_u=0.001, loop_susceptance_u=0.03), SCALES)
     assert not cause.is_plausible(zeros(loop_conductance_u=-0.03), SCALES)
+    assert cause.scenario(zeros(loop_conductance_w=0.03), SCALES) == {"size": 0.03, "phase": 2}
+    assert cause.scenario(zeros(loop_conductance_wu=0.03), SCALES) == {"size": 0.03, "phase": 1.75}
