@@ -16,11 +16,14 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 STATES = ("off", "start", "steady", "transient", "coasting")
 """What a stretch of 20 ms is: no voltage and no current; speeding up; nothing changes; a load step or a ramp; current without voltage."""
 STEADY_SHARE = 0.95
 """Of the samples of one steady load: what swings with the shaft makes a block of 20 ms look like a step now and then."""
 BLOCK_S = 0.02
+OPENING_S = 0.01
+"""Before a contactor has opened: each pole waits for the zero of its own current."""
 OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
@@ -240,27 +243,36 @@ def _is_crossed(current: Array, voltage: Array) -> bool:
     return bool(both[0] * both[1] < 0 and abs(both[1]) > 0.3 * abs(both[0]))
 
 
+def _near(mask: Bools, by: int) -> Bools:
+    """Whether anything within `by` samples is in the mask."""
+    before = np.concatenate([[0], np.cumsum(mask)])
+    at = np.arange(mask.size)
+    return before[np.minimum(at + by + 1, mask.size)] > before[np.maximum(at - by, 0)]
+
+
 def _windows(
     one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
 ) -> Iterator[Window]:
-    """Stretches without gap and with voltage; after a closing the window begins one sample later."""
-    finite = np.isfinite(current).all(axis=1) & np.isfinite(voltage).all(axis=1)
-    on = np.hypot(*voltage.T) > OFF_VOLTAGE * scales.voltage_v
-    span = max(round(2e-3 / one.sample_period_s), 1)
-    on = np.convolve(on, np.ones(2 * span + 1), "same") > 0.5 if on.any() else on
-    on &= np.hypot(*voltage.T) > 1e-9 * scales.voltage_v
+    """Stretches without gap, with voltage and current: they begin one sample after a closing and end before the poles open one by one."""
+    finite: Bools = np.asarray(np.isfinite(np.hstack([current, voltage])).all(axis=1))
+    raw, size = np.hypot(*voltage.T), np.nan_to_num(np.hypot(current[:, 0], current[:, 1]))
+    flows = size > OFF_CURRENT * min(scales.current_a, float(np.quantile(size, 0.9)))
+    pole = round(OPENING_S / one.sample_period_s)
+    driven = _near(raw > OFF_VOLTAGE * scales.voltage_v, max(round(2e-3 / one.sample_period_s), 1))
+    on = driven & _near(flows, pole) & (raw > 1e-9 * scales.voltage_v)
     steps = np.diff(one.time_s, prepend=one.time_s[0] - one.sample_period_s)
     is_break = (steps > 1.5 * one.sample_period_s) | (steps <= 0)
     usable = on & finite
     begins = np.flatnonzero(usable & (~np.roll(usable, 1) | is_break | (np.arange(usable.size) == 0)))
     for first in begins:
         after = np.flatnonzero(~usable[first:] | (is_break[first:] & (np.arange(usable.size - first) > 0)))
-        last = first + (int(after[0]) if after.size else usable.size - first)
+        last = int(first) + int(after[0]) if after.size else usable.size
         closing = first > 0 and not on[first - 1] and not is_break[first]
-        threshold = OFF_VOLTAGE * scales.voltage_v
         begin = int(first)
         if closing:
-            begin += int(np.argmax(np.hypot(*voltage[first:last].T) > threshold)) + 1
+            begin += int(np.argmax(raw[first:last] > OFF_VOLTAGE * scales.voltage_v)) + 1
+        if last < usable.size and finite[last] and not is_break[last] and np.any(flows[first:last]):
+            last = int(first) + int(np.flatnonzero(flows[first:last])[-1]) - pole
         if (last - begin) * one.sample_period_s < LEAST_S:
             continue
         yield _window(one, current, voltage, slice(begin, int(last)), plate, has_speed, bool(closing), scales)

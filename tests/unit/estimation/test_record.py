@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from commissioner.errors import DataRefused
-from commissioner.estimation.record import MONITORED_RATE, MONITORED_S, STATES, between, noise_of, prepare
+from commissioner.estimation.record import MONITORED_RATE, MONITORED_S, OPENING_S, STATES, between, noise_of, prepare
 from commissioner.monitor.intake import clock
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording
 from tests.running_effects.cases import Case, taken
+from tests.running_effects.start import PLATE, started
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +118,18 @@ def test_too_slow_for_a_fit_is_sent_to_the_verb_that_reads_it(supply_hz, per_per
 
 def test_what_monitor_reads_is_what_it_reads():
     assert (MONITORED_S, MONITORED_RATE) == (clock.SHORTEST_S, clock.SLOWEST_RATE)
+
+
+@pytest.mark.parametrize("lost", [1.0, 0.02])
+def test_a_window_ends_before_the_contactor_opens_whatever_voltage_the_field_keeps(lost):
+    """`lost`: share of a wrong current scale. What is left of the field had been the model's input, with no current for it to make."""
+    made = started(PLATE)
+    after = np.maximum(made.time_s - 1.6, 0.0)
+    is_open = after > 0.0
+    fades = np.where(is_open, 0.9 * np.exp(-after / 0.15), 1.0)
+    noise = 0.035 * np.random.default_rng(5).standard_normal(made.time_s.size)
+    currents = tuple(lost * np.where(is_open, noise, i) for i in made.currents_a)
+    recording = replace(made, currents_a=currents, voltages_v=tuple(fades * v for v in made.voltages_v))
+    (window,) = prepare([recording], PLATE).windows
+    begins = made.time_s[101]
+    assert begins + window.count * recording.sample_period_s == pytest.approx(1.6 - OPENING_S, abs=3 * 2e-4)
