@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import savgol_filter
 
 from commissioner.errors import DataRefused
@@ -245,9 +246,7 @@ def _is_crossed(current: Array, voltage: Array) -> bool:
 
 def _near(mask: Bools, by: int) -> Bools:
     """Whether anything within `by` samples is in the mask."""
-    before = np.concatenate([[0], np.cumsum(mask)])
-    at = np.arange(mask.size)
-    return before[np.minimum(at + by + 1, mask.size)] > before[np.maximum(at - by, 0)]
+    return np.asarray(maximum_filter1d(mask, 2 * by + 1, mode="constant"))
 
 
 def _windows(

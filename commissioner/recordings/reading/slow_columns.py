@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commissioner.errors import DataRefused
+from commissioner.motor.computed import printed_step
 from commissioner.records import ReadingNote, Signal
 
 LEAST_NEW, LEAST_VALUES = 100, 20
@@ -43,16 +44,38 @@ def pace_of(values: Signal, begins: Sequence[int] = (0,)) -> Pace | None:
     there = np.isfinite(values)
     if not np.all(there):
         return _pace(values, np.flatnonzero(there), begins, BLANK)
-    bends = np.abs(np.diff(values, 2)) > 1e-6 * np.abs(values).max() + PRINTED * _last_place(values)
-    held = _pace(values, np.setdiff1d(np.flatnonzero(np.diff(values)) + 1, begins), begins, HELD)
-    return held or _pace(values, np.setdiff1d(np.flatnonzero(bends) + 1, begins), begins, ON_LINES)
+    if held := _pace(values, np.setdiff1d(np.flatnonzero(np.diff(values)) + 1, begins), begins, HELD):
+        return held
+    bends = np.abs(np.diff(values, 2)) > 1e-6 * np.abs(values).max() + PRINTED * printed_step(values).max()
+    return _pace(values, np.setdiff1d(np.flatnonzero(bends) + 1, begins), begins, ON_LINES)
 
 
 def on_one_clock(
     columns: Mapping[str, Signal], watched: Sequence[str], source: str, begins: Sequence[int] = (0,)
 ) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
     """(columns, of how many rows one is left, what was left out). DataRefused: slow columns whose new rows are not the same."""
-    paces = _slow(columns, watched, begins)
+    return _measured(columns, _slow(columns, watched, begins), source, begins)
+
+
+def currents_on_the_commands_clock(
+    columns: Mapping[str, Signal], currents: Sequence[str], command: str, source: str, begins: Sequence[int]
+) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
+    """As `on_one_clock`, where what drives the currents stands still between their rows. DataRefused where it does not: what the
+    currents did meanwhile cannot be computed from a command of fewer rows."""
+    paces = _slow(columns, currents, begins)
+    driven = pace_of(columns[command], begins) if paces else None
+    if any(not p.first or driven is None or not p.is_within(driven) or driven.every != p.every for p in paces.values()):
+        raise _refused(
+            paces,
+            source,
+            f"record the currents in every row; or write only their rows, if {command} does not change between them",
+        )
+    return _measured(columns, paces, source, begins)
+
+
+def _measured(
+    columns: Mapping[str, Signal], paces: Mapping[str, Pace], source: str, begins: Sequence[int]
+) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
     if not paces:
         return dict(columns), 1, []
     slowest = max(paces.values(), key=lambda p: p.every)
@@ -64,34 +87,16 @@ def on_one_clock(
     return {name: values[kept] for name, values in columns.items()}, slowest.every, [note]
 
 
-def currents_on_the_commands_clock(
-    columns: Mapping[str, Signal], currents: Sequence[str], command: str, source: str, begins: Sequence[int]
-) -> tuple[dict[str, Signal], int, list[ReadingNote]]:
-    """As `on_one_clock`, where what drives the currents stands still between their rows. DataRefused where it does not: what the
-    currents did meanwhile cannot be computed from a command of fewer rows."""
-    paces = _slow(columns, currents, begins)
-    driven = pace_of(columns[command], begins) if paces else None
-    if paces and any(
-        not p.first or driven is None or not p.is_within(driven) or driven.every != p.every for p in paces.values()
-    ):
-        raise _refused(
-            paces,
-            source,
-            f"record the currents in every row; or write only their rows, if {command} does not change between them",
-        )
-    return on_one_clock(columns, currents, source, begins)
-
-
 def _slow(columns: Mapping[str, Signal], watched: Sequence[str], begins: Sequence[int]) -> dict[str, Pace]:
     return {name: pace for name in watched if name in columns and (pace := pace_of(columns[name], begins))}
 
 
 def _pace(values: Signal, at: np.ndarray, begins: Sequence[int], between: str) -> Pace | None:
-    if at.size < LEAST_NEW or np.unique(values[at]).size < LEAST_VALUES:
+    if at.size < LEAST_NEW:
         return None
     gaps = np.diff(at)
     every = int(np.bincount(gaps).argmax())
-    if every < 2:
+    if every < 2 or np.unique(values[at]).size < LEAST_VALUES:
         return None
     phases = [np.bincount(rows % every, minlength=every) for rows in np.split(at, np.searchsorted(at, begins[1:]))]
     if sum(int(phase.max()) for phase in phases) >= REGULAR * at.size:
@@ -99,13 +104,6 @@ def _pace(values: Signal, at: np.ndarray, begins: Sequence[int], between: str) -
     steps = np.abs(np.diff(values[at]))
     is_uneven = between == HELD and np.mean(np.abs(gaps - every) <= 1) >= REGULAR and gaps.min() >= 2
     return Pace(every, (), between) if is_uneven and np.median(steps) > PRINTED * steps[steps > 0.0].min() else None
-
-
-def _last_place(values: Signal) -> float:
-    """Of the decimals that all are written with; 0 where there is none."""
-    return next(
-        (10.0**-d for d in range(8) if np.all(np.abs(values * 10.0**d - np.round(values * 10.0**d)) < 1e-3)), 0.0
-    )
 
 
 def _said(paces: Mapping[str, Pace]) -> str:

@@ -28,6 +28,8 @@ def test_a_held_value_and_an_interpolated_one_tell_their_pace(every, first, step
     assert pace_of(held(column, every, first)) == Pace(every, (first % every,), "stand")
     assert pace_of(on_lines(column, every)) == Pace(every, (0,), "lie on straight lines")
     assert pace_of(np.round(on_lines(column, every), 3)) == Pace(every, (0,), "lie on straight lines")
+    significant = np.array([float(f"{x:.6g}") for x in on_lines(column, every)])
+    assert pace_of(significant) == Pace(every, (0,), "lie on straight lines")
 
 
 def test_a_clock_between_two_rows_is_told_as_uneven():
