@@ -35,7 +35,7 @@ of the service against `sim --speed max` are not: the reader paces them, and the
 defects that a rule must catch: what comes late fails it all the more. `NOT_REALTIME` are the tests of these files that
 no clock judges."""
 ALONE = ("campaigns/test_short_campaigns.py", "campaigns/hostile_run", "integration/test_kill.py", "sim/test_faults.py")
-"""Of those, the ones whose whole course is counted in wall time. The others mostly wait: two at a time do one another no harm."""
+"""Of those, the ones whose whole course is counted in wall time. The others mostly wait: three at a time do one another no harm."""
 NOT_REALTIME = (
     "test_a_full_three_axis_run_at_115200_ends_commissioned",
     "test_what_is_found_at_115200_is_true_within_three_of_its_errors",
@@ -59,8 +59,8 @@ NOT_REALTIME = (
     "test_at_max_the_same_seed_gives_the_same_words",
     "test_command_line_serves_and_prints_where",
 )
-TOGETHER = ("integration/service/browser", "integration/service")
-"""Folders whose tests share a costly fixture of a whole session: one worker has them all, what lies in the first by itself."""
+TOGETHER = "integration/service"
+"""Its files share a costly fixture of a whole session: a file's tests stay on one worker."""
 NIGHT = TESTS.parent / ".ci" / "night.txt"
 """Whole diagnoses and runs whose claims have shorter witnesses beside them: `.ci/night` runs them, by name."""
 COSTS = TESTS.parent / ".ci" / "costs.json"
@@ -122,12 +122,10 @@ def _costliest_first(items: list[pytest.Item]) -> None:
 
 
 def _shared(item: pytest.Item) -> str | None:
-    """What the tests that belong together are called: their folder, or their file where they share a fixture of the module
-    or what a function keeps."""
-    for folder in TOGETHER:
-        if item.path.is_relative_to(TESTS / folder):
-            return folder
+    """What the tests that belong together are called: their file, where they share a costly fixture or what a function keeps."""
     file = item.path.relative_to(TESTS).as_posix()
+    if file.startswith(TOGETHER):
+        return file
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
     if any(fixture.scope == "module" and fixture.baseid.endswith(file) for made in fixtures for fixture in made):
         return file
