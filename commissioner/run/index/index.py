@@ -84,6 +84,22 @@ def refresh(root: Path, archive: str | None = None, *, rebuild: bool = False) ->
     return Refreshed(len(seen), read, gone, str(root / NAME) if archive is None else archive)
 
 
+def unlike(root: Path) -> Mapping[str, str]:
+    """What `index.sqlite` says of a run otherwise than its folder, though the journal is the one it was made from: somebody changed
+    the index. By run, the name of the first value; empty where there is no index."""
+    place, seen = place_of(root), stamps(root)
+    if not (root / NAME).is_file():
+        return {}
+    rows = {row.run: row for row in _on_file(root, lambda store: _select(store, Wanted(), place, NAME)).rows}
+    differ = dict[str, str]()
+    for run, row in rows.items():
+        if seen.get(run) == (row.journal_bytes, row.journal_mtime_ns):
+            true = _row(root / run, place, seen[run])
+            if other := [name for name in Row._fields if getattr(row, name) != getattr(true, name)]:
+                differ[run] = other[0]
+    return differ
+
+
 def note(folder: Path) -> None:
     """Tell the indexes that there are of a run that has ended or was changed. Never fails: a list puts right what is missing."""
     root, archive = folder.parent, os.environ.get(ARCHIVE, "").strip()

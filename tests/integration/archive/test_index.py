@@ -10,6 +10,7 @@ import sqlite3
 import pytest
 
 from commissioner.errors import CommissionerError, UsageError
+from commissioner.operations.archive import verify_runs
 from commissioner.run.archive.catalogue import read_runs
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
@@ -194,6 +195,20 @@ def test_an_index_of_another_version_is_made_anew(root):
         connection.execute("PRAGMA user_version = 99")
     assert told(root, None) == by_folders(root)
     assert len(stored(root, None)) == 40
+
+
+def test_a_value_changed_in_the_index_is_found_by_verify_and_mended_by_a_rebuild(root):
+    refresh(root)
+    run = by_folders(root)[3]
+    assert all(not seen.lost_in(NAME) for seen in verify_runs(root, None))
+    with sqlite3.connect(root / NAME) as connection:
+        connection.execute("UPDATE runs SET outcome = 'commissioned too' WHERE run = ?", (run,))
+    (loss,) = [loss for seen in verify_runs(root, None) if not seen.is_whole for loss in seen.lost_in(NAME)]
+    assert "its outcome of this run is not the folder's" in loss.what
+    (one,) = verify_runs(root, run)
+    assert one.losses == (loss,)
+    refresh(root, rebuild=True)
+    assert not verify_runs(root, run)[0].losses
 
 
 def test_a_list_works_where_no_index_can_be_written(root):

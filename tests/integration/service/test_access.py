@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from argon2 import PasswordHasher
+from filelock import FileLock
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
@@ -117,6 +118,15 @@ def test_another_host_needs_tls_and_accounts(tmp_path, host):
     check_may_listen(Settings(tmp_path, tmp_path, "127.0.0.1"), False)
 
 
+def test_one_service_at_a_time_works_in_a_folder(tmp_path):
+    """Two would break the chain of one audit."""
+    (tmp_path / ".service").mkdir()
+    with FileLock(tmp_path / ".service" / "service.lock"):
+        answer = call("serve", "--port", "0", "--runs", str(tmp_path), "--json")
+    assert answer.code == 2 and "another service works in" in answer.stdout + answer.stderr
+    assert not (tmp_path / ".service" / "audit.jsonl").exists()
+
+
 def test_serve_refuses_another_host_before_it_listens(tmp_path):
     done = call("serve", "--host", "0.0.0.0", "--port", "0", "--runs", str(tmp_path), "--json")
     assert done.code == 2
@@ -185,6 +195,31 @@ def test_a_body_larger_than_any_request_needs_is_refused(client):
 
 
 # --- tokens and sessions ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("name", "status"), [("", 401), ("vera", 403)])
+@pytest.mark.parametrize("path", ["/api/recordings", "/recordings"])
+def test_an_upload_is_refused_before_it_is_read_where_the_role_is_not_enough(client, accounts, name, status, path):
+    """A body is stored before a route is asked: whoever is not known could fill the disk."""
+    token = log_in(client, name) if name else {}
+    sent = []
+
+    def pieces():
+        for _ in range(50):
+            sent.append(1)
+            yield b"0" * 1_000_000
+
+    answer = client.post(
+        path, content=pieces(), headers=token | {"content-length": "50000000", "content-type": "multipart/form-data; boundary=b"}
+    )  # fmt: skip
+    refused(answer, status)
+
+
+def test_an_upload_has_a_size_and_an_end(client, accounts):
+    token = log_in(client, "otto")
+    for headers in ({"content-length": "1000000001"}, {"transfer-encoding": "chunked"}):
+        problem = refused(client.post("/api/recordings", content=b"", headers=token | headers), 413)
+        assert "say how much" in problem["remedy"]
+
+
 def test_a_session_without_its_token_changes_nothing(client, accounts):
     token = log_in(client, "ada")
     for headers in ({}, {"x-csrf-token": "another"}):
