@@ -267,12 +267,34 @@ def test_two_computers_share_a_database_and_a_copied_run_is_told_once(fresh_data
 
 
 @pytest.mark.parametrize(
-    "url", ["mysql://x/y", "postgresql://x/y", "postgresql+psycopg://anna:secret@host/db", "runs.sqlite"]
+    "url",
+    [
+        "postgresql+psycopg://",
+        "postgresql+psycopg://anna@host:port/db",
+        "mysql://x/y",
+        "postgresql://x/y",
+        "postgresql+psycopg://anna:secret@host/db",
+        "runs.sqlite",
+    ],
 )
 def test_an_address_that_is_none_or_holds_a_password_is_refused(url):
     with pytest.raises(UsageError) as caught:
         check_url(url)
     assert "secret" not in json.dumps(caught.value.as_dict())
+
+
+def test_a_database_whose_tables_are_not_ours_is_said_to_be_so(root, fresh_database):
+    from sqlalchemy import create_engine, text
+
+    refresh(root, fresh_database)
+    engine = create_engine(fresh_database)
+    with engine.begin() as connection:
+        connection.execute(text("DROP TABLE runs"))
+    engine.dispose()
+    for act in (lambda: find(root, Wanted(), fresh_database), lambda: refresh(root, fresh_database, rebuild=True)):
+        with pytest.raises(CommissionerError, match="database cannot be used") as caught:
+            act()
+        assert "give an empty database" in caught.value.remedy
 
 
 def test_a_database_that_does_not_answer_is_one_clear_failure(root):

@@ -15,6 +15,7 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from commissioner.errors import UsageError
+from commissioner.run.archive.folder import RunFolder
 from commissioner.service import parts as service_parts
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.sessions import Sessions
@@ -75,11 +76,11 @@ def client(app, parts):
 
 
 @contextlib.contextmanager
-def socket_of(client, **headers):
+def socket_of(client, path="/api/control", **headers):
     """A page's line; its end in the midst of a message is how pages go."""
     with (
         contextlib.suppress(CancelledError),
-        client.websocket_connect("/api/control", headers={"host": "127.0.0.1:8321"} | headers) as made,
+        client.websocket_connect(path, headers={"host": "127.0.0.1:8321"} | headers) as made,
     ):
         yield made
 
@@ -330,6 +331,25 @@ def test_a_viewer_looks_and_an_operator_acts(client, accounts):
         assert refused(answer, 403)["limit"] == "role administrator"
 
 
+def test_a_page_that_stays_open_is_asked_each_time_who_it_is(client, parts, accounts):
+    """Its account may be gone since."""
+
+    def answered(line):
+        line.send_json({"control": "ask"})
+        line.send_json({"stop": "to see that it hears"})
+        said = list[dict]()
+        while not said or "stopped" not in said[-1]:
+            said.append(line.receive_json())
+        return [message for message in said if "control" in message]
+
+    log_in(client, "otto")
+    cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+    with socket_of(client, path="/api/control?drive=simulator", cookie=cookie) as line:
+        assert answered(line)[0]["control"]["you"] is True
+        parts.accounts.remove("otto")
+        assert answered(line) == []
+
+
 def test_an_administrator_adds_and_removes_accounts(client, accounts):
     token = log_in(client, "ada")
     wish = {"name": "eve", "password": "long enough", "role": "viewer"}
@@ -410,6 +430,24 @@ def test_an_unknown_name_takes_as_long_as_a_wrong_password(parts, accounts):
 
     seconds("ada")
     assert seconds("nobody") > 0.2 * seconds("ada")
+
+
+@pytest.mark.parametrize(("more", "is_alarm"), [((), True), (("tuning_ended",), False)])
+def test_a_tuning_that_was_cut_off_is_not_said_to_be_ended_by_a_watchdog(client, parts, more, is_alarm):
+    """An ordinary drive goes on with it."""
+    path = parts.settings.runs / "20260101-010101-a"
+    path.mkdir(parents=True)
+    folder = RunFolder(path)
+    for kind in ("run_started", "drive_identified", "tuning_began"):
+        folder.journal(kind, {})
+    folder.journal("about_to", {"action": "tune", "values": {}})
+    for kind in more:
+        folder.journal(kind, {})
+    folder.close()
+    page = client.get("/runs/20260101-010101-a", headers={"accept": "text/html"}).text
+    assert ("the drive may go on with its tuning" in page) is is_alarm
+    assert ("watchdog switched the output off" in page) is not is_alarm
+    assert ("Take the motor as live" in page or "without the drive’s word" in page) is is_alarm
 
 
 # --- what a drive offers --------------------------------------------------------------------------------------------
