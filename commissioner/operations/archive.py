@@ -94,7 +94,7 @@ def verify_runs(runs: Path, run: str | None, key: bytes | None = None) -> tuple[
     folders = run_folders(runs) if run is None else [find_folder(runs, run)]
     differ: Mapping[str, str] = {}
     with suppress(sqlite3.Error):  # an index that cannot be had is done without
-        differ = unlike(runs)
+        differ = unlike(runs, {folder.name for folder in folders})
     return tuple(_beside_index(verify_folder(folder, key), differ) for folder in folders)
 
 
