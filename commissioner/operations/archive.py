@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import sqlite3
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, DataRefused, UsageError
@@ -13,6 +16,8 @@ from commissioner.run.archive.catalogue import find_folder, find_run, run_folder
 from commissioner.run.archive.documents import Loss, damaged, read_saved
 from commissioner.run.archive.replay import Difference, replay
 from commissioner.run.archive.verify import DAMAGED, Verified, losses_at_sight, refuse_damage, verify
+from commissioner.run.index.index import unlike
+from commissioner.run.index.store import NAME as INDEX
 
 
 @dataclass(frozen=True)
@@ -80,14 +85,25 @@ def export_run(runs: Path, run: str, out: Path, *, salvage: bool = False) -> Exp
 
 
 def verify_runs(runs: Path, run: str | None, key: bytes | None = None) -> tuple[Verified, ...]:
-    """One run, or all of them where `run` is None. UsageError: there is no such archive."""
+    """One run, or all of them where `run` is None, and what the index says of them. UsageError: there is no such archive."""
     if not runs.is_dir():
         raise UsageError(
             f"{runs} is no folder", step="archive", value=str(runs), limit="the folder of an archive",
             remedy="give it with --runs",
         )  # fmt: skip
     folders = run_folders(runs) if run is None else [find_folder(runs, run)]
-    return tuple(verify_folder(folder, key) for folder in folders)
+    differ: Mapping[str, str] = {}
+    with suppress(sqlite3.Error):  # an index that cannot be had is done without
+        differ = unlike(runs, {folder.name for folder in folders})
+    return tuple(_beside_index(verify_folder(folder, key), differ) for folder in folders)
+
+
+def _beside_index(seen: Verified, differ: Mapping[str, str]) -> Verified:
+    """The folder is the truth; a list that believes a changed index tells something else."""
+    if seen.run not in differ:
+        return seen
+    what = f"its {differ[seen.run]} of this run is not the folder's: `commissioner runs index --rebuild`"
+    return replace(seen, losses=(*seen.losses, Loss(INDEX, None, what)), is_whole=False)
 
 
 def verify_folder(folder: Path, key: bytes | None) -> Verified:

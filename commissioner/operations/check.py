@@ -14,7 +14,7 @@ from commissioner.procedure.checks import CheckResult, NotChecked, check_failed
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import BELOW_TRIP, Job
 from commissioner.records import DriveIdentity
-from commissioner.run.inspection import inspect_drive
+from commissioner.run.inspection import WHICH, Inspection, inspect_drive
 from commissioner.settings import load_motor, load_procedure
 
 
@@ -78,7 +78,7 @@ def check(request: CheckRequest) -> Checked:
     failure = check_failed(seen.checks)
     return Checked(
         outcome="rejected" if failure else "passed",
-        reason=failure.what if failure else _passed(len(seen.not_checked)),
+        reason=failure.what if failure else _passed(seen),
         drive=seen.identity,
         nameplate_in_drive=seen.nameplate,
         parameters_in_drive=seen.parameters,
@@ -92,9 +92,12 @@ def check(request: CheckRequest) -> Checked:
     )
 
 
-def _passed(not_checked: int) -> str:
-    left = f"every check that this drive file allows passed, {not_checked} could not be made"
-    return f"{left if not_checked else 'every check passed'}; nothing was energised or written"
+def _passed(seen: Inspection) -> str:
+    """Where no register tells which drive answers, the person has to look: a sister type answers alike."""
+    left = f"every check that this drive file allows passed, {len(seen.not_checked)} could not be made"
+    if any(row.name == WHICH for row in seen.not_checked):
+        left += f", among them whether this is a {seen.identity.drive_type}: compare the label"
+    return f"{left if seen.not_checked else 'every check passed'}; nothing was energised or written"
 
 
 def limits_of(job: Job, rated_drive_current_a: float) -> RunLimits:

@@ -168,7 +168,7 @@ class VerdictReached:
 @dataclass(frozen=True)
 class RunEnded:
     """`outcome`: commissioned | rejected | aborted | faulted; `error` holds a failure's step, value, limit, remedy. `energised_s`:
-    None where a run that was cut off is told from its archive."""
+    None where nobody counted: a drive that tunes itself does not say, nor can a run that was cut off."""
 
     outcome: str
     reason: str

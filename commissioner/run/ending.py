@@ -120,7 +120,7 @@ def note(folder: RunFolder, kind: str, record: object) -> None:
         folder.journal(kind, record, durable=True)
 
 
-def ended_by(error: CommissionerError, folder: RunFolder, energised_s: float) -> RunEnded:
+def ended_by(error: CommissionerError, folder: RunFolder, energised_s: float | None) -> RunEnded:
     """The end that an error makes of a run, journalled; a call that cannot be right aborts one that has begun."""
     note(folder, "error", error.as_dict())
     outcome = "aborted" if isinstance(error, UsageError) else error.outcome

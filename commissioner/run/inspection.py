@@ -97,6 +97,7 @@ def _others(inverter: Inverter) -> Iterator[CheckResult]:
         yield CheckResult(f"{name} in the drive", is_there, seen, "an answer", remedy)
 
 
+WHICH = "which drive this is: nothing in its registers tells two of this type apart"
 TELLING = ("serial_number", "drive_type", "magic")
 PLATE = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
 
@@ -107,7 +108,7 @@ def _not_checked(profile: DriveProfile) -> Iterator[NotChecked]:
         return
     if not any(name in profile.items for name in TELLING):
         why = profile.unknown.get("identity", "the drive file knows no register for type, firmware or serial number")
-        yield NotChecked("which drive this is: nothing in its registers tells two of this type apart", why)
+        yield NotChecked(WHICH, why)
     if "status_word" not in profile.items or profile.status_decoder == "none":
         why = profile.unknown.get("status_word", "the drive file knows no status word")
         yield NotChecked("no fault, output off", why)

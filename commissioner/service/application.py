@@ -10,16 +10,20 @@ from pathlib import Path
 
 from fastapi import FastAPI
 from starlette.middleware import Middleware
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from commissioner.service import problems
+from commissioner.service.access.accounts import Role
 from commissioner.service.access.gate import Gate
+from commissioner.service.access.visitors import check_role, visitor_of
 from commissioner.service.contract.description import describe_answers
 from commissioner.service.page import views
 from commissioner.service.page.frame import prepare, prepare_causes
 from commissioner.service.parts import Parts
+from commissioner.service.problems import Refusal
 from commissioner.service.routes import all_routers
 
 CAUSES_S = 5.0
@@ -54,7 +58,12 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
         redoc_url=None,
         responses=problems.RESPONSES,
         middleware=[
-            Middleware(Gate, host_names=parts.settings.host_names(), uploads=("/api/recordings", "/recordings")),
+            Middleware(
+                Gate,
+                host_names=parts.settings.host_names(),
+                uploads=("/api/recordings", "/recordings"),
+                refuse_upload=_refuse_upload,
+            ),
         ],
     )
     app.state.parts, app.state.url = parts, url
@@ -66,6 +75,15 @@ def create_app(parts: Parts, *, url: str = "", ready: Callable[[], None] = lambd
     describe_answers(app)
     app.mount("/static", _Static(directory=STATIC), name="static")
     return app
+
+
+def _refuse_upload(request: Request) -> Response | None:
+    """None for whoever may upload."""
+    try:
+        check_role(visitor_of(request), Role.OPERATOR)
+    except Refusal as refusal:
+        return views.answer(request, refusal)
+    return None
 
 
 async def _prepare() -> None:

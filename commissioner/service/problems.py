@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -70,7 +72,13 @@ def refusal_of(error: CommissionerError) -> Refusal:
 
 
 def disk_refuses(failure: OSError) -> Refusal:
-    """What needs an entry on the disk is not done without one."""
+    """What needs an entry on the disk is not done without one; a name that no disk takes is not the disk's fault."""
+    if failure.errno == errno.ENAMETOOLONG:
+        name = Path(str(failure.filename)).name
+        return Refusal(
+            422, "a name is too long for a file", step="write down", value=name[:200], limit=f"255 bytes, this one has {len(name.encode())}",
+            remedy="give a shorter name; a letter beyond ASCII counts for two bytes or more",
+        )  # fmt: skip
     return Refusal(
         507, "the disk takes no more", detail=str(failure)[:200], step="write down", value=failure.strerror or str(failure)[:200],
         limit="room for an entry before anything is done", remedy="make room on the service's disk, then repeat; STOP works without",

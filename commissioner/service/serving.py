@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import uvicorn
+from filelock import FileLock, Timeout
 
 from commissioner.errors import UsageError
 from commissioner.service.application import create_app
@@ -14,7 +17,13 @@ from commissioner.service.parts import make_parts
 
 
 def serve_until_stopped(settings: Settings, ready: Callable[[str], None]) -> None:
-    """Serve; `ready` is told the address once requests are answered. UsageError: it may not, or cannot, listen there."""
+    """Serve; `ready` is told the address once requests are answered. UsageError: it may not, or cannot, listen there, or another
+    service works in its folder."""
+    with _alone_in(settings.data):
+        _serve(settings, ready)
+
+
+def _serve(settings: Settings, ready: Callable[[str], None]) -> None:
     parts = make_parts(settings)
     check_may_listen(settings, bool(parts.accounts.all()))
     listening = _listen(settings.host, settings.port)
@@ -51,6 +60,23 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._closing()
         await super().shutdown(sockets)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Two services would break the chain of one audit, and each would clear away what was uploaded to the other. The system drops
+    the lock with the process, however that ends."""
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    lock = FileLock(folder / "service.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise UsageError(
+            f"another service works in {folder}", step="serve", value=str(folder), limit="one service for one folder",
+            remedy="use that one's page, or give this one another folder: --runs, or `data` in the file of --config",
+        ) from None  # fmt: skip
+    with lock:
+        yield
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -175,7 +175,7 @@ def losses(run: str, found: Sequence[Loss]) -> None:
 
 
 def seconds(energised_s: float | None) -> str:
-    """How long the motor was energised; a run that was cut off could not say it."""
+    """How long the motor was energised; a drive that tuned itself, or a run that was cut off, does not say it."""
     return "not known" if energised_s is None else f"{energised_s:.1f} s"
 
 

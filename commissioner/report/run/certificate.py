@@ -460,7 +460,7 @@ def _counted(number: int) -> str:
 
 def _energised(result: Record) -> str:
     seconds = result["energised_s"]
-    return "not known: the run was cut off" if seconds is None else f"{seconds:.1f} s"
+    return "not known" if seconds is None else f"{seconds:.1f} s"
 
 
 def _tests(number: int) -> str:

@@ -192,8 +192,20 @@ def _drive(identity: Record) -> str:
 
 
 def _last_state(records: list[Record]) -> str:
+    """How far a run came whose process ended before it could say so."""
     states = [record.get("state") for record in _of(records, "state_entered")]
-    return f"the service ended while {states[-1]}" if states else "the service ended before it connected"
+    last = next((line["kind"] for line in reversed(records) if line["kind"] in _TUNINGS), "")
+    if last in ("tuning_began", "tuned_once"):
+        return "the process ended while the drive tuned itself: nothing but the drive's own supervision ends that, look at it"
+    if last:
+        return "the process ended after the drive had tuned itself"
+    if states:
+        return f"the process ended while {states[-1]}"
+    return f"the process ended {'after' if _of(records, 'drive_identified') else 'before'} it connected"
+
+
+_TUNINGS = ("tuning_began", "tuned_once", "tuning_ended", "tunings_judged")
+"""Records of a tuning by the drive itself; another may begin after one has been done."""
 
 
 def _written(records: list[Record]) -> str:

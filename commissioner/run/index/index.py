@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,6 +82,22 @@ def refresh(root: Path, archive: str | None = None, *, rebuild: bool = False) ->
             limit="a folder that this user may write", remedy="lists work without it, from the folders; free the disk or the lock",
         ) from failure  # fmt: skip
     return Refreshed(len(seen), read, gone, str(root / NAME) if archive is None else archive)
+
+
+def unlike(root: Path, runs: Collection[str]) -> Mapping[str, str]:
+    """What `index.sqlite` says of these runs otherwise than their folders, though the journal is the one it was made from: somebody
+    changed the index. By run, the name of the first value; empty where there is no index."""
+    if not (root / NAME).is_file():
+        return {}
+    place, seen = place_of(root), stamps(root)
+    rows = {row.run: row for row in _on_file(root, lambda store: _select(store, Wanted(), place, NAME)).rows}
+    differ = dict[str, str]()
+    for run, row in rows.items():
+        if run in runs and seen.get(run) == (row.journal_bytes, row.journal_mtime_ns):
+            true = _row(root / run, place, seen[run])
+            if other := [name for name in Row._fields if getattr(row, name) != getattr(true, name)]:
+                differ[run] = other[0]
+    return differ
 
 
 def note(folder: Path) -> None:

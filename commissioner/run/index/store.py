@@ -144,18 +144,27 @@ class SharedStore:
 
     def _failed(self, failure: Exception) -> CommissionerError:
         first = str(failure).strip().splitlines()[0] if str(failure).strip() else type(failure).__name__
-        missing = isinstance(failure, ImportError)
         return CommissionerError(
-            "the archive's database cannot be used", step="archive index", value=first, limit=self._shown,
-            remedy="pip install \".[postgres]\" in the folder of this program" if missing else "check address, database, user and `~/.pgpass`; without "
-            "--archive the folders alone are read",
+            "the archive's database cannot be used", step="archive index", value=first, limit=self._shown, remedy=_remedy(failure)
         )  # fmt: skip
+
+
+def _remedy(failure: Exception) -> str:
+    """A database that answers, and refuses what is asked of its tables, is reached."""
+    if isinstance(failure, ImportError):
+        return 'pip install ".[postgres]" in the folder of this program'
+    from sqlalchemy.exc import ProgrammingError
+
+    if isinstance(failure, ProgrammingError):
+        return "let this user make and write the tables, or give an empty database: the folders fill it"
+    return "check address, database, user and `~/.pgpass`; without --archive the folders alone are read"
 
 
 def check_url(url: str) -> str:
     """The URL. UsageError: not PostgreSQL's, or a password stands in it."""
-    user, _, _ = url.removeprefix(POSTGRES).partition("/")[0].rpartition("@")
-    if not url.startswith(POSTGRES):
+    user, _, place = url.removeprefix(POSTGRES).partition("/")[0].rpartition("@")
+    _, colon, port = place.rpartition("]")[2].rpartition(":")
+    if not url.startswith(POSTGRES) or not place or (colon and not port.isdecimal()):
         raise UsageError(
             "this is no archive database", step="archive index", value=url.partition("@")[2] or url,
             limit=f"{POSTGRES}USER@HOST/DATABASE", remedy="leave --archive out for the SQLite file beside the runs",

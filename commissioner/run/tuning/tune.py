@@ -186,6 +186,7 @@ class _Run:
         self._wanted, self._folder, self._found, self._operator = wanted, folder, found, operator
         self._present, self._clock, self._earlier = present, clock, earlier
         self._kept: KeptSet | None = None
+        self._energised_s: float | None = 0.0
         self._profile, self._plate = wanted.order.profile, wanted.order.nameplate
 
     def carry_out(self, opened: OpenPort, lock: DriveLock) -> RunEnded:
@@ -200,11 +201,11 @@ class _Run:
                 self._prove_power_cycle(opened, self._kept)
         except (CommissionerError, OSError) as failure:
             error = failure if isinstance(failure, CommissionerError) else as_error(failure, self._folder)
-            ended = ended_by(error, self._folder, 0.0)
+            ended = ended_by(error, self._folder, self._energised_s)
         else:
             verdict = self._found.verdict
             assert verdict is not None
-            ended = RunEnded("rejected" if verdict.objections else "commissioned", verdict.reason, 0.0)
+            ended = RunEnded("rejected" if verdict.objections else "commissioned", verdict.reason, self._energised_s)
         note(self._folder, "run_ended", ended)
         return ended
 
@@ -254,6 +255,7 @@ class _Run:
             if number > 1:
                 self._pause(inverter)
             self._tell(TuningBegan(number, self._wanted.repeat))
+            self._energised_s = None
             try:
                 done = tuner.once()
             except CommissionerError as failure:

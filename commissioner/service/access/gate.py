@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from commissioner.service.problems import Refusal, respond
@@ -19,15 +21,24 @@ REPORT_CSP = (
 )
 """A report is one file with its own style and pictures: shown without script, form or link to anywhere."""
 SAFE = ("GET", "HEAD", "OPTIONS")
-BODY_BYTES = 1_000_000
-"""No request but an upload needs more."""
+BODY_BYTES, UPLOAD_BYTES = 1_000_000, 1_000_000_000
+"""No request but an upload needs more than the first."""
 
 
 class Gate:
-    """Refuses foreign Host and Origin, on the WebSocket too, and adds the security headers."""
+    """Refuses foreign Host and Origin, on the WebSocket too, and adds the security headers. A body is stored before a route is
+    asked: `refuse_upload` answers for whoever may send none to `uploads`, before it is read."""
 
-    def __init__(self, app: ASGIApp, *, host_names: Iterable[str], uploads: tuple[str, ...] = ()) -> None:
-        self._app, self._names, self._uploads = app, frozenset(name.lower() for name in host_names), uploads
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        host_names: Iterable[str],
+        uploads: tuple[str, ...],
+        refuse_upload: Callable[[Request], Response | None],
+    ) -> None:
+        self._app, self._names = app, frozenset(name.lower() for name in host_names)
+        self._uploads, self._refuse_upload = uploads, refuse_upload
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -35,7 +46,8 @@ class Gate:
             return
         refusal = self._refusal(scope)
         if refusal is None:
-            await self._app(scope, receive, _with_headers(send))
+            refused = self._refuse_upload(Request(scope)) if self._is_upload(scope) else None
+            await (refused or self._app)(scope, receive, _with_headers(send))
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 4403, "reason": refusal.problem.title})
         else:
@@ -56,11 +68,19 @@ class Gate:
             return _refused(403, "the request comes from another site's page", origin or site, f"a page of {host}")
         if scope["type"] == "websocket":
             return None
-        length = headers.get("content-length", "0")
-        is_upload = scope["path"].startswith(self._uploads or ("\0",))
-        if not is_upload and ("transfer-encoding" in headers or not length.isdigit() or int(length) > BODY_BYTES):
-            return _refused(413, "the request is too large", length[:20], f"{BODY_BYTES} bytes")
+        length, most = headers.get("content-length", "0"), UPLOAD_BYTES if self._is_upload(scope) else BODY_BYTES
+        if "transfer-encoding" in headers or not length.isdigit() or int(length) > most:
+            return _refused(
+                413,
+                "the request is too large",
+                length[:20],
+                f"{most} bytes",
+                "send less in one request, and say how much",
+            )
         return None
+
+    def _is_upload(self, scope: Scope) -> bool:
+        return scope["type"] == "http" and scope["method"] not in SAFE and scope["path"].startswith(self._uploads)
 
 
 def _name_of(host: str) -> str:
@@ -68,10 +88,10 @@ def _name_of(host: str) -> str:
     return (host[: host.find("]") + 1] if host.startswith("[") else host.partition(":")[0]).lower()
 
 
-def _refused(status: int, title: str, value: str, limit: str) -> Refusal:
-    return Refusal(
-        status, title, step="gate", value=value[:200], limit=limit, remedy="open the page from the service itself"
-    )
+def _refused(
+    status: int, title: str, value: str, limit: str, remedy: str = "open the page from the service itself"
+) -> Refusal:
+    return Refusal(status, title, step="gate", value=value[:200], limit=limit, remedy=remedy)
 
 
 def _with_headers(send: Send) -> Send:

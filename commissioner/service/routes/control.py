@@ -16,7 +16,7 @@ from starlette.requests import HTTPConnection
 
 from commissioner.encoding import JsonObject, read_json
 from commissioner.service.access.accounts import Role
-from commissioner.service.access.visitors import Operator, parts_of, visitor_of
+from commissioner.service.access.visitors import Operator, Visitor, parts_of, visitor_of
 from commissioner.service.contract.description import Typed
 from commissioner.service.contract.drives import ControlDocument
 from commissioner.service.contract.runs import Stopped, StopsDocument
@@ -193,13 +193,18 @@ class _Socket:
     def __init__(self, socket: WebSocket, run: str, drive: str) -> None:
         self._socket, self._run, self._drive = socket, run[:200], drive[:60]
         self._parts = parts_of(socket)
-        self._who = visitor_of(socket)
         self._sending = asyncio.Lock()
         self._has_numbers = False
 
+    @property
+    def _who(self) -> Visitor:
+        """Now: a session may have ended since the page was opened, and an account may be gone."""
+        return visitor_of(self._socket)
+
     async def serve(self) -> None:
         await self._socket.accept()
-        session = self._who.session.id if self._who.session else ""
+        who = self._who
+        session = who.session.id if who.session else ""
         pages = self._parts.desk.pages
         if session:
             pages.opened(session)
@@ -241,8 +246,9 @@ class _Socket:
     async def _change_control(self, do: str) -> None:
         live = self._parts.desk.runs.get(self._run)
         drive = self._drive or (live.drive if live else "")
-        if self._who.may(Role.OPERATOR) and drive and do in ("ask", "grant", "refuse", "release"):
-            await self._send({"control": change_control(self._parts, drive, do, self._who.party)})
+        who = self._who
+        if who.may(Role.OPERATOR) and drive and do in ("ask", "grant", "refuse", "release"):
+            await self._send({"control": change_control(self._parts, drive, do, who.party)})
 
     async def _send(self, document: Mapping[str, object] | str) -> None:
         text = document if isinstance(document, str) else json.dumps(document, separators=(",", ":"))
@@ -253,8 +259,7 @@ class _Socket:
     async def _send_band(self) -> None:
         texts = texts_of(self._socket)
         while True:
-            who = visitor_of(self._socket)
-            band = band_of(self._parts, who, Place(self._run, self._drive), texts)
+            band = band_of(self._parts, self._who, Place(self._run, self._drive), texts)
             await self._send({"band": asdict(band)})
             await asyncio.sleep(BAND_BESIDE_NUMBERS_S if self._has_numbers else BAND_S)
 
@@ -265,7 +270,7 @@ class _Socket:
         await self._send({"history": feed.state.history})
         with feed.watch(is_page=True) as watcher:
             is_over, self._has_numbers = False, True
-            while not watcher.is_lost and not is_over:
+            while not watcher.is_lost and not is_over and self._who.may(Role.VIEWER):
                 taken = await watcher.take()
                 is_over = taken[-1] is None
                 for text in _together([message for message in taken if message is not None]):

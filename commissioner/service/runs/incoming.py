@@ -65,8 +65,11 @@ class Incoming:
         return start + len(piece)
 
     def arrive(self, run: str, files: Collection[str]) -> share.Moved:
-        """All `files` are here: prove the run by its chain and put it in place. UsageError: there is no journal among them."""
+        """All `files` are here: prove the run by its chain and put it in place. Refusal: its journal has not come."""
         folder = self._root / run
+        if JOURNAL not in files or not (folder / JOURNAL).is_file():
+            raise Refusal(409, "the run's journal has not come", step="push", value=", ".join(sorted(files))[:200], limit=JOURNAL,
+                          remedy="send it with PUT, then say again that all is here")  # fmt: skip
         for path in list(folder.iterdir()) if folder.is_dir() else []:
             if path.name not in files:
                 path.unlink()

@@ -10,6 +10,7 @@ import sqlite3
 import pytest
 
 from commissioner.errors import CommissionerError, UsageError
+from commissioner.operations.archive import verify_runs
 from commissioner.run.archive.catalogue import read_runs
 from commissioner.run.archive.folder import RunFolder
 from commissioner.run.index.index import ARCHIVE, find, note, refresh
@@ -196,6 +197,20 @@ def test_an_index_of_another_version_is_made_anew(root):
     assert len(stored(root, None)) == 40
 
 
+def test_a_value_changed_in_the_index_is_found_by_verify_and_mended_by_a_rebuild(root):
+    refresh(root)
+    run = by_folders(root)[3]
+    assert all(not seen.lost_in(NAME) for seen in verify_runs(root, None))
+    with sqlite3.connect(root / NAME) as connection:
+        connection.execute("UPDATE runs SET outcome = 'commissioned too' WHERE run = ?", (run,))
+    (loss,) = [loss for seen in verify_runs(root, None) if not seen.is_whole for loss in seen.lost_in(NAME)]
+    assert "its outcome of this run is not the folder's" in loss.what
+    (one,) = verify_runs(root, run)
+    assert one.losses == (loss,)
+    refresh(root, rebuild=True)
+    assert not verify_runs(root, run)[0].losses
+
+
 def test_a_list_works_where_no_index_can_be_written(root):
     refresh(root)
     shutil.rmtree(root / by_folders(root)[0])
@@ -252,12 +267,34 @@ def test_two_computers_share_a_database_and_a_copied_run_is_told_once(fresh_data
 
 
 @pytest.mark.parametrize(
-    "url", ["mysql://x/y", "postgresql://x/y", "postgresql+psycopg://anna:secret@host/db", "runs.sqlite"]
+    "url",
+    [
+        "postgresql+psycopg://",
+        "postgresql+psycopg://anna@host:port/db",
+        "mysql://x/y",
+        "postgresql://x/y",
+        "postgresql+psycopg://anna:secret@host/db",
+        "runs.sqlite",
+    ],
 )
 def test_an_address_that_is_none_or_holds_a_password_is_refused(url):
     with pytest.raises(UsageError) as caught:
         check_url(url)
     assert "secret" not in json.dumps(caught.value.as_dict())
+
+
+def test_a_database_whose_tables_are_not_ours_is_said_to_be_so(root, fresh_database):
+    from sqlalchemy import create_engine, text
+
+    refresh(root, fresh_database)
+    engine = create_engine(fresh_database)
+    with engine.begin() as connection:
+        connection.execute(text("DROP TABLE runs"))
+    engine.dispose()
+    for act in (lambda: find(root, Wanted(), fresh_database), lambda: refresh(root, fresh_database, rebuild=True)):
+        with pytest.raises(CommissionerError, match="database cannot be used") as caught:
+            act()
+        assert "give an empty database" in caught.value.remedy
 
 
 def test_a_database_that_does_not_answer_is_one_clear_failure(root):

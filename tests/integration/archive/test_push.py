@@ -137,6 +137,31 @@ def test_a_copy_that_is_not_what_was_read_never_gets_into_the_archive(service, r
     assert push(service, spoilt).what == "left: damaged"
 
 
+@pytest.mark.parametrize(("letter", "count"), [("a", 150), ("ä", 117), ("ä", 150), ("\U00010400", 150)])
+def test_a_name_that_no_disk_takes_is_a_name_too_long_and_no_full_disk(service, letter, count):
+    """A letter beyond ASCII takes two bytes or more of the 255 that a file's name may have."""
+    run = f"20260101-010101-{letter * count}"
+    fits = len(run.encode()) <= 255
+    with logged_in(service) as client:
+        answers = [
+            client.get(f"/api/incoming/{run}"),
+            client.put(f"/api/incoming/{run}/journal.jsonl", content=b"{}"),
+            client.put(f"/api/incoming/20260101-010101-b/a{letter * min(count, 99)}", content=b"{}"),
+        ]
+    assert [answer.status_code for answer in answers[:2]] == [200 if fits else 422] * 2
+    assert {answer.json()["title"] for answer in answers if answer.status_code == 422} <= {
+        "a name is too long for a file"
+    }
+    assert {answer.status_code for answer in answers} <= {200, 422}
+
+
+def test_without_its_journal_a_run_has_not_arrived(service):
+    with logged_in(service) as client:
+        assert client.put("/api/incoming/20260101-010101-c/blocks.bin", content=b"{}").status_code == 200
+        answer = client.post("/api/incoming/20260101-010101-c", json={"files": ["blocks.bin"]})
+    assert (answer.status_code, answer.json()["limit"]) == (409, "journal.jsonl")
+
+
 def test_a_later_state_follows_an_older_never_wins_and_two_ways_are_told(service, run, tmp_path):
     push(service, run)
     older = shutil.copytree(run, tmp_path / "older" / run.name)

@@ -83,6 +83,7 @@ def test_what_a_file_cannot_check_is_listed_as_not_checked():
     assert "nothing in its registers tells two of this type apart" in names
     assert "rated_current_a in the drive" in names and "watchdog" in names
     assert f"{len(done.not_checked)} could not be made" in done.reason
+    assert "whether this is a Yaskawa A1000: compare the label" in done.reason
 
 
 def test_what_is_not_known_of_a_drive_is_shown_as_unknown_and_never_as_0():

@@ -29,6 +29,7 @@ def test_a_remote_tuning_is_kept_and_taken_back_by_restore(tmp_path):
     assert result["outcome"] == "commissioned" and len(result["tune"]["repeats"]) == 3
     assert result["tune"]["in_the_drive"].startswith("new")
     assert "tuning: proved on no physical drive yet" in result["remarks"]
+    assert result["energised_s"] is None  # the drive did it, and does not say how long
     assert restored.code == 0 and restored.json["outcome"] == "restored"
     assert [t["end"] for t in drive.truth["tunings"]] == ["done"] * 3
     assert drive.truth["held"]["stator_resistance"] == result["tune"]["rows"][0]["before"]

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 from argon2 import PasswordHasher
+from filelock import FileLock
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from commissioner.errors import UsageError
+from commissioner.run.archive.folder import RunFolder
 from commissioner.service import parts as service_parts
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.sessions import Sessions
@@ -74,11 +76,11 @@ def client(app, parts):
 
 
 @contextlib.contextmanager
-def socket_of(client, **headers):
+def socket_of(client, path="/api/control", **headers):
     """A page's line; its end in the midst of a message is how pages go."""
     with (
         contextlib.suppress(CancelledError),
-        client.websocket_connect("/api/control", headers={"host": "127.0.0.1:8321"} | headers) as made,
+        client.websocket_connect(path, headers={"host": "127.0.0.1:8321"} | headers) as made,
     ):
         yield made
 
@@ -115,6 +117,15 @@ def test_another_host_needs_tls_and_accounts(tmp_path, host):
         assert all(word in error.value.remedy for word in missing)
     check_may_listen(sealed, True)
     check_may_listen(Settings(tmp_path, tmp_path, "127.0.0.1"), False)
+
+
+def test_one_service_at_a_time_works_in_a_folder(tmp_path):
+    """Two would break the chain of one audit."""
+    (tmp_path / ".service").mkdir()
+    with FileLock(tmp_path / ".service" / "service.lock"):
+        answer = call("serve", "--port", "0", "--runs", str(tmp_path), "--json")
+    assert answer.code == 2 and "another service works in" in answer.stdout + answer.stderr
+    assert not (tmp_path / ".service" / "audit.jsonl").exists()
 
 
 def test_serve_refuses_another_host_before_it_listens(tmp_path):
@@ -185,6 +196,31 @@ def test_a_body_larger_than_any_request_needs_is_refused(client):
 
 
 # --- tokens and sessions ------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("name", "status"), [("", 401), ("vera", 403)])
+@pytest.mark.parametrize("path", ["/api/recordings", "/recordings"])
+def test_an_upload_is_refused_before_it_is_read_where_the_role_is_not_enough(client, accounts, name, status, path):
+    """A body is stored before a route is asked: whoever is not known could fill the disk."""
+    token = log_in(client, name) if name else {}
+    sent = []
+
+    def pieces():
+        for _ in range(50):
+            sent.append(1)
+            yield b"0" * 1_000_000
+
+    answer = client.post(
+        path, content=pieces(), headers=token | {"content-length": "50000000", "content-type": "multipart/form-data; boundary=b"}
+    )  # fmt: skip
+    refused(answer, status)
+
+
+def test_an_upload_has_a_size_and_an_end(client, accounts):
+    token = log_in(client, "otto")
+    for headers in ({"content-length": "1000000001"}, {"transfer-encoding": "chunked"}):
+        problem = refused(client.post("/api/recordings", content=b"", headers=token | headers), 413)
+        assert "say how much" in problem["remedy"]
+
+
 def test_a_session_without_its_token_changes_nothing(client, accounts):
     token = log_in(client, "ada")
     for headers in ({}, {"x-csrf-token": "another"}):
@@ -295,6 +331,25 @@ def test_a_viewer_looks_and_an_operator_acts(client, accounts):
         assert refused(answer, 403)["limit"] == "role administrator"
 
 
+def test_a_page_that_stays_open_is_asked_each_time_who_it_is(client, parts, accounts):
+    """Its account may be gone since."""
+
+    def answered(line):
+        line.send_json({"control": "ask"})
+        line.send_json({"stop": "to see that it hears"})
+        said = list[dict]()
+        while not said or "stopped" not in said[-1]:
+            said.append(line.receive_json())
+        return [message for message in said if "control" in message]
+
+    log_in(client, "otto")
+    cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+    with socket_of(client, path="/api/control?drive=simulator", cookie=cookie) as line:
+        assert answered(line)[0]["control"]["you"] is True
+        parts.accounts.remove("otto")
+        assert answered(line) == []
+
+
 def test_an_administrator_adds_and_removes_accounts(client, accounts):
     token = log_in(client, "ada")
     wish = {"name": "eve", "password": "long enough", "role": "viewer"}
@@ -375,6 +430,24 @@ def test_an_unknown_name_takes_as_long_as_a_wrong_password(parts, accounts):
 
     seconds("ada")
     assert seconds("nobody") > 0.2 * seconds("ada")
+
+
+@pytest.mark.parametrize(("more", "is_alarm"), [((), True), (("tuning_ended",), False)])
+def test_a_tuning_that_was_cut_off_is_not_said_to_be_ended_by_a_watchdog(client, parts, more, is_alarm):
+    """An ordinary drive goes on with it."""
+    path = parts.settings.runs / "20260101-010101-a"
+    path.mkdir(parents=True)
+    folder = RunFolder(path)
+    for kind in ("run_started", "drive_identified", "tuning_began"):
+        folder.journal(kind, {})
+    folder.journal("about_to", {"action": "tune", "values": {}})
+    for kind in more:
+        folder.journal(kind, {})
+    folder.close()
+    page = client.get("/runs/20260101-010101-a", headers={"accept": "text/html"}).text
+    assert ("the drive may go on with its tuning" in page) is is_alarm
+    assert ("watchdog switched the output off" in page) is not is_alarm
+    assert ("Take the motor as live" in page or "without the drive’s word" in page) is is_alarm
 
 
 # --- what a drive offers --------------------------------------------------------------------------------------------

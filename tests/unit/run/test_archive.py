@@ -209,6 +209,23 @@ def test_a_run_that_was_cut_off_says_no_energised_time(tmp_path):
     assert (shown.summary.outcome, shown.summary.energised_s, shown.losses) == ("cut off", None, ())
 
 
+@pytest.mark.parametrize(
+    ("kinds", "says"),
+    [
+        ([], "before it connected"),
+        (["drive_identified"], "after it connected"),
+        (["drive_identified", "tuning_began"], "while the drive tuned itself"),
+        (["drive_identified", "tuning_began", "tuned_once"], "while the drive tuned itself"),
+        (["drive_identified", "tuning_began", "tuning_ended"], "after the drive had tuned itself"),
+        (["drive_identified", "tuning_began", "tuned_once", "tunings_judged"], "after the drive had tuned itself"),
+    ],
+)
+def test_a_run_that_was_cut_off_says_how_far_it_came(folder, kinds, says):
+    for kind in kinds:
+        folder.journal(kind, {"drive_type": "X"})
+    assert says in summarise(folder.path).reason
+
+
 def test_whoever_shows_an_edited_run_says_so(tmp_path, capsys):
     run = "20260101-000000-simulated-abcdef"
     path = make_run(tmp_path, run, result=result_of(run, MACHINE)) / "result.json"
