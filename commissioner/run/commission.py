@@ -61,7 +61,6 @@ class Order:
 @dataclass(frozen=True)
 class Origin:
     """Who asked for a run: under which names of drive and motor (`facts`, kept with the request), what is told the folder as soon
-
     as there is one, and by what others end the run (None: the terminal's signals alone).
     """
 

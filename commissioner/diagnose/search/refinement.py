@@ -36,7 +36,6 @@ def refined(
     current: Fit, record: Record, layout: Layout, noise: Noise, *, has_leakage_side: bool
 ) -> tuple[Fit, Layout]:
     """The last fit and its dictionaries: iron on its side (unless `has_leakage_side` beside the same causes already), loops of the radii
-
     they have, no idle numbers. All that is found on the first part of every segment, and fitted to the whole once.
     """
     started, part = on_part(current, record, layout, noise, REFINED_SAMPLES)
@@ -84,7 +83,6 @@ def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model
 
 def without_springs(model: Model, layout: Layout, iron_flux_wb: float) -> tuple[Model, Layout]:
     """The model and its dictionary without memory operators that a flux of `iron_flux_wb` does not fill: they do not yield, and are part
-
     of 1 / L_M.
     """
     radii = layout.stop_radius_wb
@@ -204,7 +202,6 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 def _spare(model: Model, record: Record) -> list[list[int]]:
     """Rows of theta that may as well be zero: each memory operator, second path and course of heat; what only refines a clock, a
-
     delay, a lag or the legs; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
     """
     rows = list(enumerate(model.terms, 4))
