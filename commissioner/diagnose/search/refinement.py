@@ -115,7 +115,8 @@ def leakage_side(current: Fit, record: Record, layout: Layout, noise: Noise) -> 
     """
     started, part = on_part(current, record, layout, noise, LEAKAGE_SIDE_SAMPLES)
     share = part.samples / record.samples
-    if not all(shows(started, share, n, loss_without(current, n)) for n in _effects_with_a_side(current.model)):
+    with_a_side = {t.effect for t in current.model.terms if t.kind == kinds.NU}
+    if not all(shows(started, share, n, loss_without(current, n)) for n in with_a_side):
         started, part = current, record
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
@@ -137,10 +138,6 @@ def without_curves(model: Model) -> Model:
     curves = (kinds.IRON_CURVE, kinds.LEAKAGE_CURVE, kinds.STOP)
     values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
     return replace(model, values=values)
-
-
-def _effects_with_a_side(model: Model) -> set[str]:
-    return {t.effect for t in model.terms if t.kind == kinds.NU}
 
 
 def _side(model: Model) -> float:

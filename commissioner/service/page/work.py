@@ -341,19 +341,11 @@ async def run(request: Request, run: str) -> Response:
 
 
 @router.get("/runs/{run}/write-back")
-async def write_back(request: Request, run: str) -> Response:
-    return await _table(request, run, "write-back")
-
-
 @router.get("/runs/{run}/restore")
-async def restore(request: Request, run: str) -> Response:
-    return await _table(request, run, "restore")
-
-
-async def _table(request: Request, run: str, what: Act) -> Response:
+async def written_table(request: Request, run: str) -> Response:
     """Register, now, will be: the table is the question."""
     enter(request, Role.OPERATOR)
-    parts = parts_of(request)
+    parts, what = parts_of(request), _act_of(request)
     place = _place(parts, run)
     try:
         table = await plan(parts, run, what)
@@ -363,18 +355,11 @@ async def _table(request: Request, run: str, what: Act) -> Response:
 
 
 @router.post("/runs/{run}/write-back")
-async def do_write_back(request: Request, run: str) -> Response:
-    return await _act(request, run, "write-back")
-
-
 @router.post("/runs/{run}/restore")
-async def do_restore(request: Request, run: str) -> Response:
-    return await _act(request, run, "restore")
-
-
-async def _act(request: Request, run: str, what: Act) -> Response:
+async def write_table(request: Request, run: str) -> Response:
+    """It was agreed to."""
     who, fields = await enter_form(request)
-    parts = parts_of(request)
+    parts, what = parts_of(request), _act_of(request)
     place = _place(parts, run)
     try:
         done = await act(parts, run, what, fields.get("token", ""), who)
@@ -391,6 +376,10 @@ async def _act(request: Request, run: str, what: Act) -> Response:
         who_wrote=who.person,
         motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
     )
+
+
+def _act_of(request: Request) -> Act:
+    return "restore" if request.url.path.endswith("/restore") else "write-back"
 
 
 def _units(drive: Drive | None) -> dict[str, str]:
