@@ -23,7 +23,8 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.summary import summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost
+from commissioner.run.archive.documents import archive_lost
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.report import write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock

@@ -162,7 +162,7 @@ def waiting_verb(pipe):
     os.mkfifo(pipe)
     script = COMMAND[-1].replace(
         "main()",
-        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()",
+        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda archive, **_: open(archive.runs).read(); main()",
     )
     call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(pipe), "--json"]
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
