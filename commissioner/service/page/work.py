@@ -12,6 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
 
+from commissioner.report.sheet.marks import capitalised
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -21,7 +22,7 @@ from commissioner.service.library import PLATE_FIELDS, SIMULATOR, Drive, Motor, 
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
 from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
-from commissioner.service.page.texts import UNIT_SIGNS, Texts, sentence, texts_of, typeset
+from commissioner.service.page.texts import UNIT_SIGNS, Texts, texts_of, typeset
 from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
@@ -149,7 +150,7 @@ def _motor_page(
 def say_plate(judged: JudgedPlate, t: Texts) -> SaidPlate:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
-        key: "" if field["ok"] else typeset(f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}")
+        key: "" if field["ok"] else typeset(f"{capitalised(t.tell(field['what']))}: {t.tell(field['remedy'])}")
         for key, field in judged["fields"].items()
     }
     if judged["efficiency"] is None or judged["usual_efficiency"] is None:
