@@ -11,7 +11,7 @@ import numpy as np
 
 from commissioner.diagnose.causes import CATALOGUE, LINEAR
 from commissioner.diagnose.causes.inverter.legs import tail_of_legs
-from commissioner.diagnose.contract import NextExperiment, SearchRecord
+from commissioner.diagnose.contract import NextExperiment
 from commissioner.diagnose.export.contract import ModelDocument
 from commissioner.diagnose.export.model_file import model_document
 from commissioner.diagnose.fit.answerable import check_before_search, check_one_state
@@ -23,7 +23,7 @@ from commissioner.diagnose.intake.noise import Noise, measure_noise, resting_sha
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.plant.model import Layout
 from commissioner.diagnose.rules import RULES
-from commissioner.diagnose.search.journal import Said, Step, followed, replayed, written
+from commissioner.diagnose.search.journal import Said, Step, followed, replayed
 from commissioner.diagnose.search.search import Found, search
 from commissioner.diagnose.verdict.causes import (
     Cause,
@@ -82,11 +82,6 @@ class Diagnosis:
     """False: given up before nothing more passed the rules, and nothing is named."""
     steps: tuple[Step, ...] = ()
     """What the search did, record by record: `search.journal.replayed` makes the same choices from them."""
-
-    @property
-    def written_steps(self) -> list[SearchRecord]:
-        """The same as a document holds them."""
-        return written(self.steps)
 
 
 def diagnose(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from commissioner.diagnose.contract import CONVENTION, CauseDocument, DiagnosisDocument, Measured
 from commissioner.diagnose.diagnosis import NEVER_NAMEABLE, Diagnosis
 from commissioner.diagnose.points.diagnosis import PointsDiagnosis
+from commissioner.diagnose.search.journal import written
 from commissioner.diagnose.verdict.causes import Cause
 from commissioner.diagnose.verdict.detection_limits import detection_limits
 from commissioner.errors import DataRefused
@@ -52,7 +53,7 @@ def as_document(seen: Diagnosis) -> DiagnosisDocument:
         "audit": list(seen.audit.sentences),
         "remarks": list(seen.remarks),
         "is_complete": seen.is_complete,
-        "search": seen.written_steps,
+        "search": written(seen.steps),
         "next_experiment": seen.next_experiment,
         "model_file": None,
     }

@@ -11,7 +11,9 @@ import numpy as np
 from commissioner.monitor.chain import Observation, Refused
 from commissioner.monitor.contract import (
     AuditDocument,
+    FindingRow,
     Indicators,
+    LineRow,
     LoadTorque,
     Measured,
     MonitoringDocument,
@@ -149,7 +151,7 @@ def partial_document(part: Partial, stretches: list[State], audited: Audited) ->
         "mean_speed_rad_per_s": None if speed is None else quantity(speed.value, speed.std),
         "mean_torque_nm": None if torque is None else quantity(torque.value, torque.std),
         "parameters": None,
-        "periods": [{"frequency_hz": line.frequency_hz, "above_floor": line.above_floor} for line in part.lines],
+        "periods": [cast("LineRow", asdict(line)) for line in part.lines],
         "indicators": {"supply_frequency_hz": part.supply_hz, **part.indicators},
         "withheld": dict(part.withheld),
         "trend": None,
@@ -203,15 +205,7 @@ def indicator_document(observation: Observation, pulses: Pulses | None, indicato
         observation.slip,
         float(abs(observation.lines.current_a[0])),
     )
-    document["rotor_side_bands"] = (
-        None
-        if bands is None
-        else {
-            "offset_hz": bands.offset_hz,
-            "level_db": bands.level_db,
-            "above_floor_db": bands.above_floor_db,
-        }
-    )
+    document["rotor_side_bands"] = None if bands is None else cast("SideBands", asdict(bands))
     return document
 
 
@@ -243,10 +237,7 @@ def audit_document(audited: Audited, findings: tuple[Finding, ...]) -> AuditDocu
     return {
         "sample_period_s": audited.sample_period_s,
         "channels": dict(audited.channel_map),
-        "findings": [
-            {"code": f.code, "kind": f.kind, "what": f.what, "value": f.value, "limit": f.limit, "remedy": f.remedy}
-            for f in findings
-        ],
+        "findings": [cast("FindingRow", asdict(f)) for f in findings],
     }
 
 

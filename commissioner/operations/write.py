@@ -8,8 +8,9 @@ from pathlib import Path
 from commissioner.link.drive.facts import WriteReport
 from commissioner.operations.events import Began, Observe, nobody
 from commissioner.operations.recordings.identify import Identified
-from commissioner.run.archive.catalogue import RunSummary, find_run
+from commissioner.run.archive.catalogue import find_run
 from commissioner.run.archive.report import mark_restored, mark_written
+from commissioner.run.archive.summary import RunSummary
 from commissioner.run.commission import Commissioned
 from commissioner.run.restore import Restored
 from commissioner.run.restore import restore as write_snapshot

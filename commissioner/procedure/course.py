@@ -7,10 +7,10 @@ from typing import Any
 
 from commissioner.procedure.energised.excite import excite
 from commissioner.procedure.energised.staircase import measure_resistance
-from commissioner.procedure.findings import RunEnded, StateEntered
-from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
-from commissioner.procedure.steps import Findings, Job, Step, check, connect, judge, write
-from commissioner.safety.commands import Command, Tell
+from commissioner.procedure.findings import RunEnded
+from commissioner.procedure.states import State
+from commissioner.procedure.steps import Findings, Job, Step, check, connect, judge, through, write
+from commissioner.safety.commands import Command
 
 __all__ = ["Findings", "Job", "course"]
 
@@ -26,15 +26,4 @@ _STEPS: dict[State, Callable[[Job, Findings], Step]] = {
 
 def course(job: Job, findings: Findings) -> Generator[Command, Any, RunEnded]:
     """Yields every command of a run; what it learns is in `findings`, also when it is stopped half-way."""
-    state = follow(State.IDLE, Event.START)
-    because = Event.START
-    while state not in ENDED:
-        yield Tell(
-            StateEntered(
-                state.value, because.value, job.plan.tests_deg[findings.tests_done] if state in ENERGISED else None
-            )
-        )
-        because = yield from _STEPS[state](job, findings)
-        state = follow(state, because)
-    reason = findings.verdict.reason if findings.verdict else because.value
-    return RunEnded(state.value, reason, 0.0)
+    return (yield from through(_STEPS, job, findings))

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any
 
-from commissioner.errors import CheckFailed
-from commissioner.procedure.checks import judge_idle
-from commissioner.procedure.findings import ChecksJudged, RunEnded, StateEntered, VerdictReached
-from commissioner.procedure.states import ENDED, Event, State, follow
-from commissioner.procedure.steps import Findings, Job, Step, connect, write
+from commissioner.procedure.checks import check_failed, judge_idle
+from commissioner.procedure.findings import ChecksJudged, RunEnded
+from commissioner.procedure.states import Event, State
+from commissioner.procedure.steps import Findings, Job, Step, connect, through, told, write
 from commissioner.procedure.verdict import Decision, decide, evidence_of, match_of
 from commissioner.records import DriveStatus
 from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, TakeSnapshot, Tell
@@ -17,12 +16,7 @@ from commissioner.safety.commands import Command, ReadNameplate, ReadStatus, Tak
 
 def recorded_course(job: Job, findings: Findings) -> Generator[Command, Any, RunEnded]:
     """As `course`, for a job whose `findings.identification` came from a recording."""
-    state, because = follow(State.IDLE, Event.START), Event.START
-    while state not in ENDED:
-        yield Tell(StateEntered(state.value, because.value))
-        because = yield from _STEPS[state](job, findings)
-        state = follow(state, because)
-    return RunEnded(state.value, findings.verdict.reason if findings.verdict else because.value, 0.0)
+    return (yield from through(_STEPS, job, findings))
 
 
 def _check(job: Job, findings: Findings) -> Step:
@@ -31,11 +25,9 @@ def _check(job: Job, findings: Findings) -> Step:
     status: DriveStatus = yield ReadStatus()
     findings.checks = judge_idle(status, plate, job.nameplate)
     yield Tell(ChecksJudged(findings.checks))
-    failed = next((result for result in findings.checks if not result.has_passed), None)
-    if failed is not None:
-        raise CheckFailed(
-            f"check failed: {failed.name}", step="check", value=failed.value, limit=failed.limit, remedy=failed.remedy
-        )
+    failure = check_failed(findings.checks)
+    if failure is not None:
+        raise failure
     findings.snapshot = yield TakeSnapshot()
     return Event.MEASURED_BEFORE
 
@@ -45,8 +37,7 @@ def _judge(job: Job, findings: Findings) -> Step:
     evidence = evidence_of(findings.identification)
     verdict = decide(evidence, job.nameplate, job.plan.acceptance, write_back=job.write_back)
     findings.verdict, findings.plate_match = verdict, match_of(evidence.combined, job.nameplate)
-    value, limit, remedy = next(((o.value, o.limit, o.remedy) for o in verdict.objections), (None, None, ""))
-    yield Tell(VerdictReached(verdict.decision.value, verdict.reason, value, limit, remedy))
+    yield Tell(told(verdict))
     return Event.WRITE_BACK if verdict.decision is Decision.WRITE_BACK else Event.REJECT
 
 

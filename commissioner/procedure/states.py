@@ -81,9 +81,3 @@ def follow(state: State, event: Event) -> State:
         return TRANSITIONS[state, event]
     except KeyError:
         raise IllegalTransition(f"{event.name} is not legal in {state.name}") from None
-
-
-def diagram() -> str:
-    """The table as a Mermaid state diagram; ABORT and FAULT, legal everywhere, are left out."""
-    rows = [f"    {a.name} --> {b.name}: {event.value}" for (a, event), b in _COURSE.items()]
-    return "\n".join(["stateDiagram-v2", *rows])

@@ -6,7 +6,7 @@ Nothing here knows a socket, a file or a clock; a scripted drive tests every pat
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -20,10 +20,17 @@ from commissioner.motor.nameplate import Nameplate, prior, rated_flux
 from commissioner.motor.plate_match import PlateMatch
 from commissioner.procedure.assembly import assemble, highest_stator_flux_wb
 from commissioner.procedure.checks import CheckResult, DriveLimits, check_failed, judge_drive
-from commissioner.procedure.findings import ChecksJudged, DriveIdentified, LinkPlanned, VerdictReached
+from commissioner.procedure.findings import (
+    ChecksJudged,
+    DriveIdentified,
+    LinkPlanned,
+    RunEnded,
+    StateEntered,
+    VerdictReached,
+)
 from commissioner.procedure.link_plan import LinkPlan, StreamPace, plan_link
 from commissioner.procedure.plan import ProcedurePlan
-from commissioner.procedure.states import Event
+from commissioner.procedure.states import ENDED, ENERGISED, Event, State, follow
 from commissioner.procedure.verdict import Decision, Objection, Verdict, decide, evidence_of, match_of
 from commissioner.records import DriveIdentity, DriveStatus, ParameterSnapshot, SampleBlock, WrittenParameter
 from commissioner.safety.commands import (
@@ -192,6 +199,19 @@ class Findings:
         return box.typical.stator_resistance_ohm
 
 
+def through(
+    steps: Mapping[State, Callable[[Job, Findings], Step]], job: Job, findings: Findings
+) -> Generator[Command, Any, RunEnded]:
+    """From state to state by the transition table, each carried out by its step, until one that has ended."""
+    state, because = follow(State.IDLE, Event.START), Event.START
+    while state not in ENDED:
+        axis_deg = job.plan.tests_deg[findings.tests_done] if state in ENERGISED else None
+        yield Tell(StateEntered(state.value, because.value, axis_deg))
+        because = yield from steps[state](job, findings)
+        state = follow(state, because)
+    return RunEnded(state.value, findings.verdict.reason if findings.verdict else because.value, 0.0)
+
+
 def connect(job: Job, findings: Findings) -> Step:
     """Who is at the other end."""
     identity: DriveIdentity = yield Identify()
@@ -230,11 +250,12 @@ def check(job: Job, findings: Findings) -> Step:
 def reject(findings: Findings, objections: tuple[Objection, ...]) -> Generator[Command, Any, Event]:
     """End here, for these reasons; nothing more is energised or written."""
     findings.verdict = Verdict(Decision.REJECT, objections)
-    yield Tell(_told(findings.verdict))
+    yield Tell(told(findings.verdict))
     return Event.REJECT
 
 
-def _told(verdict: Verdict) -> VerdictReached:
+def told(verdict: Verdict) -> VerdictReached:
+    """The verdict as the journal has it: with its gravest objection."""
     value, limit, remedy = next(((o.value, o.limit, o.remedy) for o in verdict.objections), (None, None, ""))
     return VerdictReached(verdict.decision.value, verdict.reason, value, limit, remedy)
 
@@ -254,7 +275,7 @@ def judge(job: Job, findings: Findings) -> Step:
     highest_wb = highest_stator_flux_wb(findings.blocks, identification.parameters)
     limit_wb = findings.flux_limit_wb or job.flux_limit_wb(findings.resistance_ohm(job))
     findings.peak_flux_fraction = max(findings.peak_flux_fraction, highest_wb / limit_wb)
-    yield Tell(_told(verdict))
+    yield Tell(told(verdict))
     return {Decision.WRITE_BACK: Event.WRITE_BACK, Decision.KEEP: Event.KEEP, Decision.REJECT: Event.REJECT}[
         verdict.decision
     ]

@@ -11,7 +11,7 @@ from typing import Any
 from commissioner.encoding import read_json
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.trend.trend import Entry, History, State, Verdict, judge
-from commissioner.recordings.whole import whole_file
+from commissioner.recordings.whole import write_text
 
 VERSION = 1
 MAX_BYTES = 50_000_000
@@ -64,8 +64,7 @@ def write(path: Path, history: History) -> None:
         "healthy": [asdict(entry) for entry in history.healthy],
         "judged": [asdict(entry) for entry in history.judged],
     }
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(document, indent=1, allow_nan=False), "utf-8")
+    write_text(path, json.dumps(document, indent=1, allow_nan=False))
 
 
 def _entry(raw: dict[str, Any]) -> Entry:

@@ -25,7 +25,7 @@ from commissioner.recordings.table import (
     to_running,
     write_table,
 )
-from commissioner.recordings.whole import whole_file
+from commissioner.recordings.whole import write_text
 from commissioner.records import ReadingNote
 from commissioner.report import band
 from commissioner.report.page import BLUE, GREEN, ORANGE, PLOT_STYLE, Page, Picture, Section, picture, render
@@ -108,8 +108,7 @@ def store(table: Table, document: Understood, out: Path) -> dict[str, str]:
     metadata |= {"imported_from": Path(table.source).name} | ({"import_changes": changes} if changes else {})
     write_table(out, kept, metadata)
     page = out.with_name(out.name.split(".")[0] + "_import.html")
-    with whole_file(page) as temporary:
-        temporary.write_text(render(page_of(table, document)), encoding="utf-8")
+    write_text(page, render(page_of(table, document)))
     return {"recording": str(out), "picture": str(page)}
 
 
@@ -128,7 +127,7 @@ def page_of(table: Table, document: Understood) -> Page:
         ("rows", str(document["rows"])),
         ("sample period", f"{period:.6g} s" if period else "-"),
     ]
-    sections = [Section("Columns", parts), *([Section("Signals", pictures)] if pictures else [])]
+    sections = [Section("Columns", *parts), *([Section("Signals", *pictures)] if pictures else [])]
     return Page("Recording", Path(table.source).name, "plain", facts, sections)
 
 

@@ -298,7 +298,7 @@ def _missing(kept: Mapping[str, Signal]) -> list[str]:
     out = [] if "time_s" in kept else ["time (a time column or a sample rate)"]
     phases = [phase for phase in "uvw" if f"current_{phase}_a" not in kept]
     if len(phases) > 1:
-        out.append("the current" + ("s" if len(phases) > 1 else "") + " of phase " + ", ".join(phases))
+        out.append("the currents of phase " + ", ".join(phases))
     star = all(f"voltage_{phase}_v" in kept for phase in "uvw")
     if not star and sum(f"voltage_{pair}_v" in kept for pair in ("uv", "vw", "wu")) < 2:
         out.append("three phase voltages or two line-to-line voltages")

@@ -8,7 +8,7 @@ import numpy as np
 
 from commissioner.monitor.chain import Observation
 from commissioner.recordings.table import write_table
-from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.recordings.whole import folder_to_write, write_text
 from commissioner.records import Signal
 from commissioner.report.page import Page, render
 
@@ -21,8 +21,7 @@ def write_results(folder: Path, observation: Observation, page: Page) -> dict[st
     folder_to_write(folder)
     csv, report = folder / CSV_NAME, folder / REPORT_NAME
     write_table(csv, columns_of(observation), {})
-    with whole_file(report) as temporary:
-        temporary.write_text(render(page), "utf-8")
+    write_text(report, render(page))
     return {"characteristic_period": str(csv), "report": str(report)}
 
 

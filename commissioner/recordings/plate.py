@@ -10,7 +10,7 @@ import numpy as np
 from commissioner.encoding import read_json
 from commissioner.errors import ConfigurationError, UsageError
 from commissioner.monitor.machine.fit import PRIOR_FROM_COMMISSIONING, Start
-from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.nameplate import RATED_VALUES, Nameplate, check, connection_of
 from commissioner.motor.running import equal_leakages
 
@@ -61,12 +61,11 @@ def start_from(path: Path) -> Start:
             limit="the result.json of a run",
             remedy="give the result.json of a commissioning run",
         )
-    names = ("stator_resistance_ohm", "rotor_resistance_ohm", "leakage_inductance_h", "magnetizing_inductance_h")
     try:
         document = read_json(path.read_text("utf-8"))
         parameters, kind = document["parameters"], str(document.get("kind", "commissioning result"))
-        values = [float(parameters[name]["value"]) for name in names]
-        stds = [float(parameters[name].get("std") or 0.0) for name in names]
+        values = [float(parameters[name]["value"]) for name in PARAMETERS]
+        stds = [float(parameters[name].get("std") or 0.0) for name in PARAMETERS]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigurationError(
             file=str(path),

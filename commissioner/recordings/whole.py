@@ -39,8 +39,13 @@ def folder_to_write(path: Path) -> Path:
     return path
 
 
+def write_text(path: Path, text: str) -> None:
+    """The text in UTF-8, whole."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     """Each text under its name, whole."""
     for name, text in texts.items():
-        with whole_file(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_text(folder / name, text)

@@ -141,13 +141,9 @@ def decode_window(words: Sequence[int], cursor: StreamCursor, asked: int | None 
     if len(words) != wanted:
         return WindowRefusal(Refusal.LENGTH, f"{len(words)} registers", f"{wanted} registers")
     packed = struct.pack(f">{len(words)}H", *words)
-    header = _decode_header(layout, packed)
+    header = dict(zip(layout.header_names, layout.header_form.unpack_from(packed), strict=True))
     refusal = _examine(packed, header, cursor)
     return refusal or _accept(packed, header, cursor)
-
-
-def _decode_header(layout: WindowLayout, packed: bytes) -> dict[str, int]:
-    return dict(zip(layout.header_names, layout.header_form.unpack_from(packed), strict=True))
 
 
 def _examine(packed: bytes, header: dict[str, int], cursor: StreamCursor) -> WindowRefusal | None:

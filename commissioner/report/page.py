@@ -73,10 +73,11 @@ class Picture:
     caption: str
 
 
-@dataclass(frozen=True)
 class Section:
-    title: str
-    parts: Sequence[str | Table | Picture]
+    """Paragraphs, tables and pictures under a title."""
+
+    def __init__(self, title: str, *parts: str | Table | Picture) -> None:
+        self.title, self.parts = title, parts
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from commissioner.procedure.plan import ProcedurePlan
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.summary import summarise
-from commissioner.run.archive.folder import RunFolder, archive_lost
+from commissioner.run.archive.documents import archive_lost
+from commissioner.run.archive.folder import RunFolder
 from commissioner.run.archive.report import write_report
 from commissioner.run.ending import as_error, ended_by, note
 from commissioner.run.holding.drive_lock import ACT, DriveLock
@@ -61,7 +62,6 @@ class Order:
 @dataclass(frozen=True)
 class Origin:
     """Who asked for a run: under which names of drive and motor (`facts`, kept with the request), what is told the folder as soon
-
     as there is one, and by what others end the run (None: the terminal's signals alone).
     """
 

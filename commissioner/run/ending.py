@@ -21,7 +21,8 @@ from commissioner.errors import (
 from commissioner.link.drive.facts import DisarmReport
 from commissioner.link.drive.inverter import Inverter
 from commissioner.procedure.findings import RunEnded
-from commissioner.run.archive.folder import RunFolder, archive_lost
+from commissioner.run.archive.documents import archive_lost
+from commissioner.run.archive.folder import RunFolder
 
 LATE_SHARE = 0.5
 """Of the watchdog's time: in a run on a host at rest no gap is a tenth of it."""

@@ -13,7 +13,7 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.link.wire.modbus import ModbusPort
 from commissioner.link.wire.url import parse_url
-from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.nameplate import RATED_VALUES, Nameplate
 from commissioner.procedure.checks import CheckResult, NotChecked, judge_drive, judge_idle
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.steps import Job
@@ -99,7 +99,6 @@ def _others(inverter: Inverter) -> Iterator[CheckResult]:
 
 WHICH = "which drive this is: nothing in its registers tells two of this type apart"
 TELLING = ("serial_number", "drive_type", "magic")
-PLATE = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
 
 
 def _not_checked(profile: DriveProfile) -> Iterator[NotChecked]:
@@ -112,7 +111,7 @@ def _not_checked(profile: DriveProfile) -> Iterator[NotChecked]:
     if "status_word" not in profile.items or profile.status_decoder == "none":
         why = profile.unknown.get("status_word", "the drive file knows no status word")
         yield NotChecked("no fault, output off", why)
-    for name in PLATE:
+    for name in RATED_VALUES:
         if name not in profile.items:
             yield NotChecked(
                 f"{name} in the drive", profile.unknown.get(name, "the drive file knows no register for it")

@@ -18,9 +18,11 @@ from commissioner.records import ParameterSnapshot, WrittenParameter
 from commissioner.registers.codec import encode_item
 from commissioner.registers.convention import staged_words_crc
 from commissioner.registers.profile import DriveProfile
-from commissioner.run.archive.catalogue import RunSummary
-from commissioner.run.archive.folder import RunFolder, damaged, read_journal, read_saved
+from commissioner.run.archive.documents import damaged, read_saved
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
+from commissioner.run.archive.summary import RunSummary
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import DriveLock
 from commissioner.run.holding.mastery import Mastery

@@ -23,9 +23,11 @@ from commissioner.registers.convention import drive_values, our_values
 from commissioner.registers.profile import DriveProfile
 from commissioner.report.run.contract import PlanRow, WritePlan
 from commissioner.report.run.standing import ACCEPTED, RESTORED_SINCE
-from commissioner.run.archive.catalogue import RunSummary
-from commissioner.run.archive.folder import RunFolder, read_journal, read_saved
+from commissioner.run.archive.documents import read_saved
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import read_snapshot
+from commissioner.run.archive.summary import RunSummary
 from commissioner.run.ending import note, write_lost
 from commissioner.run.holding.drive_lock import LOOK, DriveLock
 from commissioner.run.holding.mastery import Mastery

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -14,6 +13,7 @@ from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.plan import ProcedurePlan
 from commissioner.procedure.recorded import recorded_course
 from commissioner.procedure.steps import Findings
+from commissioner.run.archive.seal import cover
 from commissioner.run.commission import Commissioned, Order, carry_out, close_run
 from commissioner.run.holding.drive_lock import ACT, DriveLock
 from commissioner.run.runner import Present
@@ -37,13 +37,8 @@ def write_recorded(
     order = Order(url, profile, nameplate, plan, write_back=True)
     findings = Findings(identification=identification)
     with DriveLock.take(parse_url(url), profile, ACT) as lock:
-        folder = order.open_folder(runs, lock, recordings={str(path): _sha256(path) for path in recordings})
+        folder = order.open_folder(runs, lock, recordings={str(path): cover(path)["sha256"] for path in recordings})
         with closing(folder), OperatorStop() as stop:
             ended = carry_out(order, folder, findings, present, recorded_course, "job_on_recordings", stop, lock)
             result = close_run(order, folder, findings, ended)
     return Commissioned(ended, folder.path, result)
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

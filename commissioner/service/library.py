@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from commissioner.encoding import JsonObject, read_json
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.motor.nameplate import Nameplate, check
+from commissioner.recordings.whole import write_text
 from commissioner.service.configuration import DriveTable, Settings
 from commissioner.service.contract.plates import JudgedField, JudgedPlate
 from commissioner.service.problems import Refusal
@@ -225,6 +226,4 @@ def _read_json(path: Path) -> JsonObject | None:
 
 def _write(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    write_text(path, text)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from commissioner.encoding import HIDDEN
-from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.recordings.whole import folder_to_write, write_text
 from commissioner.settings import load
 from commissioner.study.commissioning import require_drawable
 from commissioner.study.rows import Rows
@@ -78,7 +78,6 @@ def carry_out(request: StudyRequest, observe: Callable[[CaseEnded], None] = lamb
         table = rows.close() if rows.ended else None
     ordered = [rows.ended[number] for number in sorted(rows.ended)]
     seen, report = summarise(ordered), request.out / PAGE
-    with whole_file(report) as temporary:
-        temporary.write_text(page(ordered, seen, f"Study {request.file.name}"), "utf-8")
+    write_text(report, page(ordered, seen, f"Study {request.file.name}"))
     minutes = max(time.monotonic() - began, 1e-9) / 60.0
     return Studied(seen.cases, dict(seen.outcomes), len(missing) / minutes, str(table), str(report), seen)

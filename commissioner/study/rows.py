@@ -12,7 +12,7 @@ from typing_extensions import TypedDict
 from commissioner.encoding import plain, read_json
 from commissioner.errors import UsageError
 from commissioner.monitor.contract import Measured
-from commissioner.recordings.whole import whole_file
+from commissioner.recordings.whole import whole_file, write_text
 
 ENDED, TABLE, ASKED = "ended.jsonl", "cases.parquet", "study.json"
 DEFECT = "defect"
@@ -72,8 +72,7 @@ class Rows:
                     remedy="give another --out",
                 )  # fmt: skip
             self.ended = {row["case"]: row for row in _whole_lines(lines)}
-        with whole_file(known) as temporary:
-            temporary.write_text(json.dumps(plain(asked), indent=2) + "\n", "utf-8")
+        write_text(known, json.dumps(plain(asked), indent=2) + "\n")
         is_torn = lines.is_file() and not lines.read_bytes().endswith(b"\n") and lines.stat().st_size > 0
         self._file = lines.open("a", encoding="utf-8", newline="\n")
         if is_torn:  # what a kill cut off must not swallow the next line

@@ -31,8 +31,11 @@ from commissioner.link.wire.modbus import ModbusPort, open_port
 from commissioner.link.wire.url import parse_url
 from commissioner.procedure.steps import Findings
 from commissioner.records import SampleBlock
-from commissioner.run.archive.catalogue import RunSummary, find_run
-from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal
+from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
+from commissioner.run.archive.summary import RunSummary
 from commissioner.run.job import bounds, watch_limits
 from commissioner.run.restore import restore
 from commissioner.run.runner import Runner

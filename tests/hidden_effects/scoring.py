@@ -187,7 +187,6 @@ def _spread_of_largest(sizes: dict[str, Any]) -> float:
 
 def quantiles_of_noise(spreads: Sequence[float], shares: Sequence[float]) -> list[float]:
     """Quantiles of absolute errors that are normal, each with a standard deviation of its own: what no estimator is better than
-
     where these are the Cramér-Rao bound's.
     """
     known = np.array(spreads)

@@ -112,7 +112,6 @@ def test_flux_left_before_every_segment_has_its_size_where_none_is_carried_over(
 )
 def test_a_sagging_link_has_its_size_whatever_its_lags(named, lag_s, again_s):
     """Lags between those of the dictionary: the sum of several had been up to 19 % off. Two lags one behind the other are a
-
     difference of two: from sums alone 0.2 of the noise was left, and five other causes were named in turn.
     """
     seen, names = named(Machine(sag=0.4, sag_s=lag_s, again_s=again_s), 1.5)
@@ -167,7 +166,6 @@ def test_an_offset_is_named_beside_a_remanence_thirty_times_larger(named):
 @pytest.mark.parametrize("foot", [0.25, long(0.1)])
 def test_a_sheet_that_is_less_permeable_at_little_flux_is_saturation_alone(named, foot):
     """On twice the knots the foot of the curve was cut off: hysteresis and a sagging link were named beside it, 0.82 and 0.76 sure. Where
-
     it could not reach beyond 0.4 of the flux, hysteresis was, 0.97 sure.
     """
     seen, names = named(Machine(knee_wb=0.9, foot=foot, foot_wb=0.25), 1.5)
@@ -185,7 +183,6 @@ def test_iron_whose_loops_meet_in_saturation_is_hysteresis_alone(named, meet_wb)
 @pytest.mark.parametrize("loop_a", [0.3, long(0.1)])
 def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(named, loop_a):
     """Where every segment had to begin demagnetized, a moving shaft, a drift and both anisotropies stood in for the flux that the loops
-
     keep, 0.15 of the noise was left and the loops were 27 % too wide.
     """
     seen, names = named(Machine(loop_a=loop_a, meet_wb=3.0, remembers=True), 2.0)
@@ -197,7 +194,6 @@ def test_iron_that_remembers_the_segment_before_is_hysteresis_alone(named, loop_
 @pytest.mark.parametrize("legs", [(0.97, 1.08, 0.95), (1.6, 0.4, 1.0), long((1.4, -0.3, 0.8))])
 def test_legs_that_differ_are_told_apart(named, legs):
     """Where all three had to be alike, legs 8 % apart were an error without a name; where they might differ by 40 %, what lay beyond was
-
     unequal phases, a shaft, a sag and a bent sensor, up to 0.99 sure.
     """
     seen, names = named(Machine(leg_v=4.0, legs=legs))

@@ -19,7 +19,6 @@ def test_ideal_pulses_are_their_averages():
 @pytest.mark.parametrize("lag_us", [12.0, 40.0])
 def test_a_filter_before_the_converter_has_its_lag(lag_us):
     """The slope at the converter's instant is that of the zero vector: taken for that of the mean voltage, a lag of 12.5 us was
-
     2.1 us and something `unexplained`.
     """
     seen, names = named(Drive(lag_s=1e-6 * lag_us))

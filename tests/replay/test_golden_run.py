@@ -14,7 +14,9 @@ from commissioner.procedure import steps
 from commissioner.procedure.energised import excite
 from commissioner.procedure.steps import Findings
 from commissioner.run.archive import replay as replaying
-from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal
+from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import replay
 from tests.replay.golden import GOLDEN, SEED, short_run, unpack
 from tests.support.sim_process import SimProcess

@@ -50,7 +50,11 @@ def runs_list(
     json: Json = False,
 ) -> None:
     """Every run in the archive, newest first, also those that were cut off."""
-    runs_find([], motor, drive, serial, person, outcome, since, until, limit, out, archive, runs, json)
+    from commissioner.cli.verbs.archived.runs import find
+    from commissioner.operations.history.runs import Archive, Wanted
+
+    wanted = Wanted(motor, drive, serial, person, outcome, since, until)
+    find(Archive(runs, archive), wanted, limit, out, as_json=json)
 
 
 @runs_app.command("find")
@@ -72,15 +76,11 @@ def runs_find(
     json: Json = False,
 ) -> None:
     """The runs that hold all of these words."""
-    from commissioner.cli.verbs.archived.runs import SHOWN, list_runs, write_table
-    from commissioner.operations.history.runs import Wanted
+    from commissioner.cli.verbs.archived.runs import find
+    from commissioner.operations.history.runs import Archive, Wanted
 
-    most = limit if limit is not None else 0 if json or out else SHOWN
-    wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text), most)
-    if out is not None:
-        write_table(runs, out, as_json=json, wanted=wanted, database=archive)
-        return
-    list_runs(runs, as_json=json, wanted=wanted, database=archive)
+    wanted = Wanted(motor, drive, serial, person, outcome, since, until, " ".join(text))
+    find(Archive(runs, archive), wanted, limit, out, as_json=json)
 
 
 @runs_app.command("index")

@@ -7,6 +7,7 @@ import math
 from commissioner.conformance.drive import Drive, is_close
 from commissioner.conformance.records import Broken, NotTested, Steps
 from commissioner.conformance.registry import rules_of
+from commissioner.motor.nameplate import RATED_VALUES
 
 RULES, rule = rules_of("The commissioning map: identity, status")
 
@@ -14,7 +15,6 @@ CONTROL_PERIOD_S = (2e-5, 1e-3)
 """1 to 50 kHz: what drives have."""
 SHORTEST_RING_S = 0.25
 """A reader is up to 50 ms late, and once in a while more: `Truths about the link`, 4."""
-PLATE = ("rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor")
 
 
 @rule
@@ -115,7 +115,7 @@ def interlocks_are_the_files(drive: Drive) -> Steps[None]:
 @rule
 def plate_of_the_motor(drive: Drive) -> Steps[None]:
     """The nameplate in the drive belongs together: apparent power covers the shaft's, the speed lies below synchronism."""
-    names = (*PLATE, "pole_pairs")
+    names = (*RATED_VALUES, "pole_pairs")
     if not all(name in drive.profile.items for name in names):
         raise NotTested("the drive file describes no whole nameplate")
     plate = dict(zip(names, (yield from drive.numbers(*names)), strict=True))

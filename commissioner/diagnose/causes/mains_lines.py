@@ -39,7 +39,6 @@ def with_clearer_lines(
     record: Record, model: Model, layout: Layout, noise: Noise, lines: Mapping[str, float], kept: Mapping[str, str]
 ) -> tuple[Record, Mapping[str, float]]:
     """The record with the lines that a better model shows where they differ from `lines`: a strong cause that was not in the
-
     model hides them. Lines of the kinds that are `kept`, whose causes the model has, stay near where they are.
     """
     # what the model has of a line is in the residual as well where the line is looked for
@@ -87,7 +86,6 @@ def found_lines(
 
 def recorded_sag(record: Record) -> list[Array]:
     """Of a recorded DC link, for every segment, what it deviates from its median without its ripple, (n,); empty where it was not
-
     recorded. A line that two tones make together is no ripple.
     """
     swings = [s.link_swing for s in record.segments if s.link_swing is not None]
@@ -139,7 +137,6 @@ def courses_of(record: Record, lines: Mapping[str, float]) -> list[Named]:
 @dataclass(frozen=True)
 class _Along:
     """A segment's residual along its axis, seen through the four-parameter machine; `power` (bins,) of its noise, `is_free` (bins,)
-
     of the lines beside the tones: an error at one tone, times another, is no ripple.
     """
 
@@ -170,7 +167,6 @@ def _along(record: Record, segment: Segment, residual: Array, model: Model, nois
 
 def _ripple_drive(record: Record, residuals: Sequence[Array], model: Model, noise: Noise, tones: Array) -> list[Array]:
     """The residual as seen by a ripple: through the conjugate admittance over the noise's power, times the command (matched
-
     filter: G. Turin, IRE Trans. Inf. Theory 6(3), 1960); a ripple line stands out at its frequency.
     """
     out = []
@@ -207,7 +203,6 @@ def _ripple_gains(
 
 def _peaks(record: Record, signals: Sequence[Array], base: float) -> list[tuple[float, float]]:
     """The frequencies near `base` where the signals are strongest, the strongest first, each with its power over the median beside
-
     the search.
     """
     period = record.facts.sample_period_s

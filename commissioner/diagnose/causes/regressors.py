@@ -24,14 +24,12 @@ SWINGING, DRAWN, ROOT, HELD = (
     tuple(f"sag_{of}{lag * 1e3:g}ms" for lag in SAG_LAGS_S) for of in ("", "drawn_", "root_", "held_")
 )
 """Lagged powers: with their sign, from a source that takes back what it gave; without what is given back; the root of that, as of a
-
 rectifier whose current flows in gaps; and of a capacitor behind diodes, which holds what is given back until it is drawn.
 """
 RECORDED_LINK, LEAST_SWING = "link_recorded", 1e-5
 """The swing of a recorded link, without its ripple; and what counts as none, of the link."""
 HEAT_LEAKS_S = {"": np.inf, "_20s": 20.0, "_6s": 6.0}
 """Time constants (s) with which heat leaks away, by how the names end: in sums of these every course with one of 5 s or more is
-
 there to 1 % of its power, from 20 s on to 0.03 %."""
 STATOR_HEAT = (*(f"{kind}{leak}" for kind in ("own", "mean") for leak in HEAT_LEAKS_S), "time", "settling")
 CAGE_HEAT = tuple(f"rotor_heat{kind}" for kind in (*HEAT_LEAKS_S, "_time", "_settling"))
@@ -43,7 +41,6 @@ SETTLED = 4.0
 SPEED_SPLINE, FINE_SPEED_SPLINE = "hat_", "hat_fine_"
 SPEED_KNOTS_S = {SPEED_SPLINE: (0.4, 40), FINE_SPEED_SPLINE: (0.1, 80)}
 """Spacing of a speed's cubic splines, and the most intervals of a segment. A shaft held by its load swings below about 1 Hz, which the
-
 wide ones follow to a per cent; the fine ones follow 2.5 Hz to a per cent."""
 
 
@@ -97,7 +94,6 @@ def _three_phases(segment: Segment) -> Array:
 
 def _heat(record: Record, rotor: Sequence[Array]) -> Named:
     """Doses in minutes at rated current, carried over segments: own phase, and mean of phases, each with every leak; plain time
-
     and time towards a settled temperature (to the same end as the mean); own phase since the segment's start; the same of the rotor.
     """
     rates = [_heat_rates(record, s, current) for s, current in zip(record.segments, rotor, strict=True)]

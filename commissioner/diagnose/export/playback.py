@@ -67,7 +67,6 @@ def play(
     seed: int = 0,
 ) -> dict[str, Array]:
     """Columns of the contract's standstill table. Heat and lagged power follow the model's own currents; of a speed or a line what
-
     these segments are too short for, or not there for, is left out. IndexError where a number points beyond its dictionary.
     """
     record = _blank(facts, segments)

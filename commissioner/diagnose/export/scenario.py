@@ -13,19 +13,16 @@ from typing import Any
 from commissioner.diagnose.causes import CATALOGUE, Setting
 from commissioner.diagnose.export.contract import Entry, Scenario
 from commissioner.diagnose.plant.model import Model
+from commissioner.identify.intake.plate import NAMEPLATE_KEYS
 from commissioner.motor.nameplate import Plate
 
-PLATE = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor",
-    "pole_pairs",
-)  # fmt: skip
 FULL_SCALE = 3.0
 """Sensor range of the scenario over the rated peak current; half again what the diagnosis calls full scale."""
 
 
 def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> Scenario:
     """The document `python -m sim --scenario` reads: an ideal drive but for the causes."""
-    plate = {k: setting.facts.metadata[k] for k in PLATE if k in setting.facts.metadata}
+    plate = {k: setting.facts.metadata[k] for k in NAMEPLATE_KEYS if k in setting.facts.metadata}
     if "pole_pairs" in plate:
         plate["pole_pairs"] = int(plate["pole_pairs"])
     effects: dict[str, Entry] = {}
@@ -39,7 +36,7 @@ def scenario(model: Model, setting: Setting, causes: Sequence[Any]) -> Scenario:
 
 def plain_scenario(nominal: Iterable[float], plate: Mapping[str, Any]) -> Scenario:
     """Of a motor by its four numbers alone, behind an ideal drive."""
-    kept = {k: plate[k] for k in PLATE if k in plate}
+    kept = {k: plate[k] for k in NAMEPLATE_KEYS if k in plate}
     peak_a = sqrt(2.0) * float(plate["rated_current_a"])
     return _document(kept, {**gamma_machine(nominal), "saturation_at_rated_flux": 0.0}, peak_a, {})
 

@@ -42,7 +42,6 @@ class Fit:
 
     def set_apart(self, effect: str, prefix: str = "") -> tuple[Array, NDArray[np.intp], NDArray[np.intp], Array]:
         """Information of all numbers, the rows of one effect's (whose names begin so), the rows of the others that can move,
-
         and their inverse.
         """
         is_mine = np.array([False] * 4 + [t.effect == effect and t.symbol.startswith(prefix) for t in self.model.terms])
@@ -105,7 +104,6 @@ def _square_root(gram: Array, slope: Array) -> tuple[Array, Array]:
 
 def limits(model: Model, layout: Layout) -> tuple[Array, Array]:
     """Bounds of theta: the four within a factor 3 per step and within their box, the terms as physics says; numbers of several
-
     causes that say where one iron lies share what is left to either side.
     """
     box = np.log(np.maximum(np.array(layout.nominal_box), 1e-12))
@@ -137,7 +135,6 @@ def fit(
     wanted_chi2: float = np.inf,
 ) -> Fit:
     """Gauss-Newton with bounds; damping grows while a step does not lower chi2. Stops when a step gains < tolerance (or a
-
     share of what the numbers would take from noise alone), or less than a trifle of what the noise does not explain: a model
     that lacks a cause need not fit to the last digit. Gives up where `wanted_chi2` is out of reach. A start that runs away on
     this record comes back with an infinite chi2.

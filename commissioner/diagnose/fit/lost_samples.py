@@ -61,7 +61,6 @@ def mend(
     record: Record, model: Model, layout: Layout, noise: Noise, *, is_first: bool
 ) -> tuple[Record, tuple[Loss, ...]]:
     """The record with unmarked losses masked and re-aligned, spikes masked, and the list of them. `is_first`: the model was
-
     fitted to data with all their losses, and is right in their middle rather than at the start.
     """
 
@@ -237,7 +236,6 @@ def _drifts_evenly(seen: Array, predicted: Array, shifts: NDArray[np.int64]) -> 
 
 def _suspects(residual: Array, slope: Array, segment: Segment, model: Model, noise: Noise) -> Iterator[int]:
     """Instants worth trying: the strongest jump of the residual, the best step in delay beside a drifting one, and the best
-
     pulse of voltage, for that is what rows that vanished look like to the machine.
     """
     jump = np.abs(np.diff(residual, axis=1))

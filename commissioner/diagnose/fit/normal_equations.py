@@ -156,7 +156,6 @@ class NormalEquations:
 
     def _averaged(self, k: int, here: Sequence[int], block: int) -> Directions:
         """`_directions` with `block` neighbours averaged, some numbers at a time: all of a screening at every sample would be half a
-
         gigabyte a segment.
         """
         segment = self._record.segments[k]

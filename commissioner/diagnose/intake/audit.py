@@ -299,7 +299,6 @@ def _is_at_rest(currents: NDArray[np.float64], facts: Facts) -> bool:
 
 def _on_grid(segment: Segment, index: NDArray[np.int64], period: float) -> Segment:
     """Rows at `index` of the period's grid, whatever the time stamps were rounded to. Missing ones are put back as masked samples; the
-
     command there is the smooth curve through its neighbours.
     """
     every = np.arange(index[-1] + 1)
@@ -325,7 +324,6 @@ def _on_grid(segment: Segment, index: NDArray[np.int64], period: float) -> Segme
 
 def excited_lines(record: Record) -> list[float]:
     """Frequencies the command excites, Hz: spectral peaks within 40 dB of the largest, merged over segments; none where most of its
-
     power lies between them, as a sweep's does; a segment with more than tones are, as a random binary command has, adds none.
     """
     found: list[float] = []

@@ -36,7 +36,6 @@ def bursts_sigma(residuals: Sequence[Array], record: Record, noise: Noise, *, ha
 
 def _jumps_sigma(residuals: Sequence[Array], record: Record, noise: Noise) -> float:
     """Root mean square of the levels, medians of neighbouring stretches, where some jump by far more than most move: an offset that has
-
     two values. Noise of any colour moves from stretch to stretch as a normal number does. From the first stretch of a segment,
     which holds its start, no move is counted.
     """

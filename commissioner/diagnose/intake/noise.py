@@ -28,7 +28,6 @@ SLOW_MARGIN = 1.6
 """Power margin on the extrapolated part: one recording shows few periods of the slowest noise."""
 RESOLVED = 3e-5
 """Share of the current's peak below which nothing counts: 15 bits. No drive's converter resolves more, nor does a law's form, where a
-
 simulation adds no noise.
 """
 NOTHING_MORE = 1e-6
@@ -82,7 +81,6 @@ class Noise:
 
     def with_converter_step(self, step_a: Array, resting: float = 0.0) -> Noise:
         """What coarse steps hide from the noise's measurement is added: the rounding error of a signal that moves is step^2/12
-
         in all, of which repeats of one test show only what differs between them, and a current that rests shows less, or, at
         the edge of a step (as zero is to a converter that cuts off), up to step^2/4: of the `resting` share of all samples it
         was seen.
@@ -119,7 +117,6 @@ class Noise:
 
 def _repeating(ratio: float) -> float:
     """Mean square, in steps, of the rounding error that repeats with the signal; `ratio`: noise rms over the step (B. Widrow,
-
     I. Kollar, Quantization Noise, 2008, ch. 4: a sawtooth of the signal, smoothed by the noise).
     """
     k = np.arange(1.0, 40.0)
@@ -379,7 +376,6 @@ def _noise(
 
 def _stands_out(spectra: Sequence[tuple[Array, Array]], hz: float) -> bool:
     """Whether mains hum stands above what is around it in these spectra, (b,) Hz and (phases, b): in a stretch of a third of a second its
-
     skirts are the whole neighbourhood, and what is hum would be noise.
     """
     power, bins = 0.0, 0

@@ -45,7 +45,6 @@ def replayed(path, radius):
 @kernel
 def at_rest(pa, pb, z, stiffness, radius, l_m):
     """Flux at which the memory's current and that of L_M cancel, no voltage and no current being left, from flux (pa, pb) and states
-
     `z` (s, 2), which follow; `stiffness` (s,) of each operator, A/Wb.
     """
     share = 0.5 / (1.0 + l_m * stiffness.sum())
@@ -67,7 +66,6 @@ def at_rest(pa, pb, z, stiffness, radius, l_m):
 @kernel
 def loop_width(pa, pb, rate):
     """Factor on a memory current at flux (pa, pb), and its derivative by |flux|^2: `rate` |flux|^2 where loops widen with flux, as measured
-
     ones do below the knee; (1 + `rate` |flux|^2)^2, `rate` < 0, where they narrow, as the branches of a loop meet in saturation; else 1.
     """
     if rate == 0.0:
@@ -79,7 +77,6 @@ def loop_width(pa, pb, rate):
 @kernel
 def susceptibility(za, zb, da, db, qa, qb, radius):
     """Derivative of `remembered` by (da, db), symmetric aa, ab, bb, and by (za, zb) likewise; (qa, qb) is the direction of
-
     motion where (da, db) is still zero.
     """
     if radius > 0.0:

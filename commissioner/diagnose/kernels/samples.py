@@ -15,7 +15,6 @@ from commissioner.diagnose.kernels.trajectory import EDDY, ROTOR, SQRT3, branch_
     IRON_AT, IRON_U, PATH_AT, PATH_U, ROWS,
 ) = range(35)  # fmt: skip
 """Rows of what is known at a sample, alpha and beta or a tensor's aa, ab, bb: voltage, terminal current, R_R, speed, flux of the
-
 leakage and of the iron, magnetizing current and its derivative without what remembers, flux of the saturating path, its current and
 derivative, current into the cage, derivative of all magnetizing currents, growth of loops that widen; places in the curves.
 """

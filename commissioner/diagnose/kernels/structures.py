@@ -12,7 +12,6 @@ Array = NDArray[np.float64]
 
 class Drive(NamedTuple):
     """What drives the machine through a segment: commanded voltage alpha and beta (n,), V, and known functions of time: factors on
-
     voltage, link and rotor resistance (n,) and on the phase resistances (n, 3), electrical speed (n,), rad/s.
     """
 
@@ -27,7 +26,6 @@ class Drive(NamedTuple):
 
 class Machine(NamedTuple):
     """Constants (`plant.prediction` makes `base`) and curves as cells (intervals, 4), those without any size empty, each over its
-
     range; memory operators at work with gain (s,) and radius (s, 2), extra branches with gain and time constant (b,).
     """
 
@@ -48,7 +46,6 @@ class Machine(NamedTuple):
 
 class Asked(NamedTuple):
     """The parameters (P,) whose derivatives are asked for: kinds and indices; B-spline weights of leg curves (K, width), cells of iron
-
     and leakage curves (K, intervals, 4), empty where no parameter needs them; d (psi_s, psi_R) / d parameter at the start (P, 4).
     """
 
@@ -62,7 +59,6 @@ class Asked(NamedTuple):
 
 class Samples(NamedTuple):
     """What is known at the samples of a block, row 0 the sample before it: `at` (ROWS, B+1); `before`, `now` (B+1, 3) phase currents at
-
     the ends of the period, `secant` (B+1, 3) resistance of phase and leg between them, `leg_mean` (B+1, 2, width) mean weights of the
     leg curve, `lost` (B+1, 3) mean voltage of a leg that is as the mean of the three, `memory` (B+1, s, 7) derivatives of the memory
     operators at work: factor, by the flux (aa, ab, bb), by the state before.
@@ -95,7 +91,6 @@ class Matrices(NamedTuple):
 
 class Pushes(NamedTuple):
     """What a parameter pushes at each sample of a block: into the magnetizing and the stator current, straight into the terminal
-
     current, and into w (`rotor`), each (2, B+1); into d psi_s/dt and d psi_R/dt over the period before (`flux`, (4, B+1)).
     """
 
@@ -108,7 +103,6 @@ class Pushes(NamedTuple):
 
 class Carried(NamedTuple):
     """What parameters (p,) that meet memory take from sample to sample: state x (p, 4), derivatives of memory operators z (p, s, 2) and
-
     rotor branches q (p, b, 2), the iron's `flux` and the w (`rate`) that fed them (p, 2), and what they pushed into current and w
     (`fed`, (p, 4)); `own` (p,): 1 where the iron's flux itself depends on the parameter.
     """

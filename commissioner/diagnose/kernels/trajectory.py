@@ -90,7 +90,6 @@ def _rotor_rates(x, k, ca, cb, rr, omega, base, branch_time):
 @inlined
 def _rates(x, k, voltage, resistance, rr, omega, machine, legs, memory):
     """Right-hand side (1)-(7) at x into k, with `voltage`, `memory` current (alpha, beta) and `resistance` (u, v, w); `legs` are those at
-
     the link's voltage. Returns the terminal current and the paths' derivatives.
     """
     base, iron, leak = machine.base, machine.iron, machine.leak
@@ -357,7 +356,6 @@ def _resistances(base, phase_factor, a):
 @kernel
 def propagate_varying(drive, period, steps, order, whole_step, machine, initial_state):
     """As `propagate` for a model that is linear at every instant: Taylor series of the exact step, `order` terms; or where nothing
-
     varies the exact step itself, `whole_step` (size, size + 2) of states and held voltage (empty otherwise).
     """
     voltage_a, voltage_b, voltage_factor = drive.voltage_a, drive.voltage_b, drive.voltage_factor

@@ -21,7 +21,6 @@ PATH_STEPS, MOST_OF_THE_PATH = 6000, 20_000
 
 def with_flux_before(record: Record, model: Model, layout: Layout) -> Record:
     """Every segment told the rotor flux at which the one before it ended (same file), above what the iron keeps, and the iron's
-
     flux since the file's first, by the model, one after the other.
     """
     before, path, file = np.zeros(2), np.zeros((2, 1)), -1

@@ -15,7 +15,6 @@ SKIRT_BINS = 4
 
 def impedance_starts(record: Record, delay_s: float = 0.0) -> list[tuple[float, float, float, float]]:
     """From the command's spectrum: resistance at the lowest line and at the median tone, reactance at the highest; two
-
     spreads of L_M. A tone is read in its strongest bin: the skirts beside it are anyone's.
     `delay_s` of the current, and the half period by which it follows a held command, are taken out of the phases first.
     Clipped samples count as they are: without them the lines would be further off.

@@ -59,7 +59,6 @@ class _Left:
 
 def initial_state(model: Model, segment: Segment, machine: Machine) -> tuple[Array, Array]:
     """(psi_s, psi_R) at the first sample: index 0, 1 sets both alike (a flux without current), 2-5 one component; and (s, 2) what
-
     the memory operators at work remember.
     """
     memory = _memory(model, segment, machine.stop_radius)

@@ -41,7 +41,6 @@ def _discrete(lag: float, shape: float) -> tuple[Array, Array]:
 @dataclass(frozen=True)
 class Between:
     """A current (rows, n) at the samples and between them: cubic with its slopes per sample `after` and `before` each, and a
-
     part `held` from each sample on.
     """
 

@@ -71,7 +71,6 @@ class Layout:
 
     def penalty(self, terms: Sequence[Term]) -> Array:
         """(4 + terms)^2 prior: a leg curve hardly rises at large current (that slope is R_s, which no terminal data
-
         tell apart): each rise in the tail is about `legs_slack_v` or less.
         """
         size = 4 + len(terms)
@@ -114,7 +113,6 @@ def even_vectors(intervals: int) -> Array:
 
 def with_halved_intervals(vectors: Array, weights: Array, finer: Array) -> Array:
     """The weights in a dictionary of twice the intervals that make the same cubic spline (knot insertion: E. Cohen, T. Lyche,
-
     R. Riesenfeld, Comput. Graph. Image Process. 14, 1980).
     """
     c = weights @ vectors
@@ -165,7 +163,6 @@ class Model:
 
     def moved(self, theta: Array) -> Model:
         """The model at `theta`. Beside rotor branches R_R moves by its conductance: a step that gives the branches what it takes
-
         from R_R leaves the resistance at rest as it is, however long.
         """
         r_s, r_r, l_sigma, l_m = (float(x) for x in np.exp(theta[:4]))

@@ -155,7 +155,6 @@ def trajectory(model: Model, record: Record, position: int, layout: Layout, want
 
 def exact_step(nominal: tuple[float, float, float, float], period_s: float) -> tuple[Array, Array, Array, Array]:
     """Of the four-parameter machine, per axis, states (stator, rotor flux): (2, 2) transition over one period, (2,) gain of
-
     the held voltage, (2,) current of the states, (3,) slope of the current by states and voltage.
     """
     r_s, r_r, l_sigma, l_m = nominal
@@ -282,7 +281,6 @@ def _fastest(model: Model, branch_gain: Array, branch_time: Array) -> float:
 
 def _whole_step(drive: Drive, period_s: float, machine: Machine) -> Array:
     """The exact step of a linear machine in which nothing varies, (size, size + 2) of states and held voltage; empty where
-
     something does. Strong paths beside a cage of hardly any conductance are a hundred times faster than the sampling.
     """
     phase_factor, rotor_factor, omega = drive.phase_factor, drive.rotor_factor, drive.omega
@@ -305,7 +303,6 @@ def _taylor_order(rate_times_step: float) -> int:
 
 def _substeps(model: Model, layout: Layout, segment: Segment, asked: Sequence[Term]) -> int:
     """Enough Runge-Kutta steps that rate x step stays below 0.25 (local error 1e-5 of the fastest mode); below 2.5, which is stable,
-
     for a second path that is asked for and has no size yet, and for what strong ones make of one another.
     """
     r_s, r_r, l_sigma, l_m = model.nominal

@@ -27,7 +27,6 @@ SHAPE, RIPPLED = 1, 2
 @dataclass(frozen=True)
 class Reading:
     """`late` (n,) in samples; the filter's `lag` in samples, 0 for none, and its `shape`; `turns` and `clock` (k, n) delays in s
-
     per unit of their numbers.
     """
 
@@ -146,7 +145,6 @@ def _delays(segment: Segment) -> Array:
 
 def clock_courses(segment: Segment) -> Array:
     """Delay (s) that each unit of a clock's rate error makes from the start of the segment: constant, and wandering once to
-
     and fro within it (cosine and sine); and constant from the start of the recording, of a clock that runs on over segments.
     """
     elapsed = segment.time_s - segment.time_s[0]

@@ -13,7 +13,6 @@ COUNT = 1 + len(KNEES)
 
 def even(share: Array) -> tuple[Array, Array]:
     """Relative errors (COUNT, ...) at currents of this share of full scale, odd in it, so that the reported current's error is even;
-
     and the slopes of that error.
     """
     roots = [np.sqrt(share**2 + knee**2) for knee in KNEES]

@@ -121,7 +121,6 @@ def _at_the_end(model: Model, sensed: Array, ends_a: Array, jacobian: Array, lis
 
 def _ages(record: Record, segment: Segment) -> list[Array]:
     """Minutes since the first sample, the same settling within a quarter and a sixteenth of the recording, and swinging once to
-
     and fro within it (cosine and sine, zero and of slope one or zero at the start).
     """
     first, last = record.segments[0].time_s[0], record.segments[-1].time_s[-1]

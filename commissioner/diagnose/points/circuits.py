@@ -109,7 +109,6 @@ def _locked(x: Array, points: Points, factor: Factor, scale: Mapping[str, float]
 
 def _no_load(x: Array, points: Points, factor: Factor, scale: Mapping[str, float]) -> tuple[Array, Array]:
     """i_m = psi/L (1 + b (psi/psi_0)^S) and P = P_loss + 3 R_s I^2; P_loss = P_0 (1 - g) (f/f_0)^2 of friction and
-
     P_0 g (f/f_0)^1.5 (V f_0 / V_0 f)^n of iron.
     """
     stator = np.zeros(points.count) if points.resistance_ohm is None else points.resistance_ohm

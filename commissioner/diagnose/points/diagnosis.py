@@ -103,7 +103,8 @@ def _compare(
     x, _, left = fit_points(points, [*accepted, candidate], scale)
     after = float((left**2).sum())
     freedom = left.size - x.size
-    if freedom < 2 or not _has_right_sign(x, candidate):
+    has_right_sign = x[-candidate.does.numbers] > 1e-6
+    if freedom < 2 or not has_right_sign:
         return 1.0, 0.0
     ratio = (before - after) / candidate.does.numbers / max(after / freedom, LEAST_VARIANCE)
     p_value = float(fdtrc(candidate.does.numbers, freedom, max(ratio, 0.0)))
@@ -112,10 +113,6 @@ def _compare(
     held_before = float((held_out(points, accepted, scale) ** 2).sum())
     held_after = float((held_out(points, [*accepted, candidate], scale) ** 2).sum())
     return p_value, 1.0 - held_after / max(held_before, 1e-300)
-
-
-def _has_right_sign(x: Array, candidate: Extension) -> bool:
-    return bool(x[-candidate.does.numbers] > 1e-6)
 
 
 def _conclude(

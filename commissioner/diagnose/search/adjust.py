@@ -67,7 +67,6 @@ def adjusted(state: State, problem: Problem, name: str) -> Steps:
 
 def _from_other_starts(state: State, problem: Problem) -> Steps:
     """The best fit of the same causes beside what the impedance at the tones says of the four: dead times of 3.5 and of thirty times
-
     the noise had left them in a valley without a magnetizing inductance.
     """
     starts = [replace(state.model, nominal=start) for start in impedance_starts(state.record)]

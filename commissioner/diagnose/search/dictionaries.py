@@ -56,7 +56,6 @@ def following(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Settin
 
 def respread(model: Model, setting: Setting) -> tuple[Model, Setting]:
     """The model in new dictionary ranges where it reaches other fluxes (closer radii that were found stay where the flux fills them), with closer time
-
     constants where a second path acts, and the ratio of the inductances and the slack of the legs as they are now; the same setting
 
     where nothing is new.
@@ -142,7 +141,6 @@ def with_faster_speed(
     current: Fit, full: Record, setting: Setting, noise: Noise
 ) -> tuple[Fit, Record, Setting, Refined] | None:
     """A shaft's speed on closer knots, where that gains what its numbers cost: a load that swings at 2 Hz. Not tried where less than that
-
     is left across the axes, along which no speed moves anything to first order.
     """
     record = with_fine_speed_splines(full, setting.lines_hz)
@@ -179,7 +177,6 @@ def left_across(model: Model, setting: Setting, noise: Noise) -> float:
 
 def finer_curve(current: Fit, setting: Setting, noise: Noise, kind: int) -> tuple[Fit, Setting, Refined] | None:
     """Curves of a kind with a knot between every two, if that gains what its numbers cost: iron with a sharp knee leaves 1e-3 of its gain
-
     on ten intervals. None: there is no such curve, or it is fine already.
     """
     name, make = CURVES[kind]
@@ -198,7 +195,6 @@ def finer_curve(current: Fit, setting: Setting, noise: Noise, kind: int) -> tupl
 
 def with_closer_radii(current: Fit, setting: Setting, noise: Noise) -> tuple[Fit, Setting, Refined]:
     """Loops of radii beside those that act, if they make most of what is left: iron of one radius between two of the
-
     dictionary's leaves a tenth of its gain. Loops that gain less only share the size among more of them.
     """
     model, layout = with_closer_loops(current.model, setting.layout, CLOSER[0])

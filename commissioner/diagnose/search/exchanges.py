@@ -96,7 +96,6 @@ def _in_other_forms(state: State, problem: Problem) -> Steps:
 
 def _regrouped(state: State, problem: Problem) -> Exchange:
     """The accepted linear causes exchanged for another one or two of them, where that fits clearly better: one by one they
-
     are taken in the order of their gain, and the first may have stood for two others.
     """
     rules, noise, setting, current = problem.rules, problem.noise, state.setting, state.fit
@@ -148,7 +147,6 @@ def _promised(screening: Screening, mine: Sequence[str]) -> list[tuple[float, tu
 
 def with_closer_paths(trial: Fit, setting: Setting, noise: Noise, wanted_chi2: float) -> tuple[Fit, Setting]:
     """The fit with closer time constants where second paths act, and its dictionaries: on the first ones a bar, or a sheet of iron,
-
     leaves some thousandths of its gain.
     """
     model, there = with_closer_branches(trial.model, setting)

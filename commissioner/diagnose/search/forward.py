@@ -104,7 +104,6 @@ def _attempts(
 
 def _tried(state: State, problem: Problem, score: Score, wanted_chi2: float) -> Fit:
     """The refit with one more cause; lines looked for meanwhile concern only their own causes. One that was given up is begun again
-
     only where less is wanted of it.
     """
     last, out_of_reach = state.known.get(score.name, (None, -np.inf))

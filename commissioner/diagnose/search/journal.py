@@ -70,7 +70,6 @@ class Beside:
 
     def guard(self, name: str, rules: Rules) -> tuple[float, str]:
         """What a cause must gain beside others, and why: no more than nearly all of a large rest, for what the form of another cause
-
         leaves behind no simple cause takes entirely.
         """
         left, by = guards(self.losses, name, ripple_meets_tones=self.ripple_meets_tones, rules=rules)

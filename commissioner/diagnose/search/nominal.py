@@ -31,7 +31,6 @@ MOST_LEAK_RATIO = 0.35
 """Of L_sigma over L_M: no more is believed where L_M is hardly seen."""
 DROP_SHARE, TAIL_SHARE, LEAST_SLACK = 0.003, 0.03, 0.03
 """Rise at one knot of a leg's tail, over the voltage across R_s at the peak and over the leg's loss before the tail; and the least, over
-
 the first. A slack as large as the loss let the tail take 15 to 27 % more than there was, off R_s, for rises cannot be negative.
 """
 STOP_SHARES = (0.01, 0.025, 0.06, 0.14, 0.3, 0.6, -0.03, -0.1, -0.3)
@@ -67,7 +66,6 @@ def leak_ratio(model: Model) -> float:
 
 def legs_slack_v(model: Model, layout: Layout, peak_a: float) -> float:
     """By how much a leg's loss may rise at each knot of its tail: a small part of what it loses before, where a leg's loss is known;
-
     else of the voltage across R_s, as which more would pass.
     """
     most = DROP_SHARE * peak_a * model.nominal[0]
@@ -104,7 +102,6 @@ def with_ranges(layout: Layout, iron_flux_wb: float, leakage_flux_wb: float) -> 
 
 def bare_layout(record: Record) -> Layout:
     """No dictionary yet, only where the four parameters can be: around what the impedance at the tones says. The reactance of
-
     a single slow tone is the magnetizing inductance's for the most part.
     """
     stator, rotor, leakage, _ = impedance_starts(record)[0]

@@ -36,7 +36,6 @@ def refined(
     current: Fit, record: Record, layout: Layout, noise: Noise, *, has_leakage_side: bool
 ) -> tuple[Fit, Layout]:
     """The last fit and its dictionaries: iron on its side (unless `has_leakage_side` beside the same causes already), loops of the radii
-
     they have, no idle numbers. All that is found on the first part of every segment, and fitted to the whole once.
     """
     started, part = on_part(current, record, layout, noise, REFINED_SAMPLES)
@@ -84,7 +83,6 @@ def with_closer_loops(model: Model, layout: Layout, ratio: float) -> tuple[Model
 
 def without_springs(model: Model, layout: Layout, iron_flux_wb: float) -> tuple[Model, Layout]:
     """The model and its dictionary without memory operators that a flux of `iron_flux_wb` does not fill: they do not yield, and are part
-
     of 1 / L_M.
     """
     radii = layout.stop_radius_wb
@@ -117,7 +115,8 @@ def leakage_side(current: Fit, record: Record, layout: Layout, noise: Noise) -> 
     """
     started, part = on_part(current, record, layout, noise, LEAKAGE_SIDE_SAMPLES)
     share = part.samples / record.samples
-    if not all(shows(started, share, n, loss_without(current, n)) for n in _effects_with_a_side(current.model)):
+    with_a_side = {t.effect for t in current.model.terms if t.kind == kinds.NU}
+    if not all(shows(started, share, n, loss_without(current, n)) for n in with_a_side):
         started, part = current, record
     best = started if started.has_converged else fit(started.model, part, layout, noise)
     for side in SIDES:
@@ -139,10 +138,6 @@ def without_curves(model: Model) -> Model:
     curves = (kinds.IRON_CURVE, kinds.LEAKAGE_CURVE, kinds.STOP)
     values = tuple(0.0 if t.kind in curves else v for t, v in zip(model.terms, model.values, strict=True))
     return replace(model, values=values)
-
-
-def _effects_with_a_side(model: Model) -> set[str]:
-    return {t.effect for t in model.terms if t.kind == kinds.NU}
 
 
 def _side(model: Model) -> float:
@@ -204,7 +199,6 @@ def without_idle_numbers(current: Fit, record: Record, layout: Layout, noise: No
 
 def _spare(model: Model, record: Record) -> list[list[int]]:
     """Rows of theta that may as well be zero: each memory operator, second path and course of heat; what only refines a clock, a
-
     delay, a lag or the legs; and of what a segment may begin with, the flux that is left there anew, or what it inherits.
     """
     rows = list(enumerate(model.terms, 4))

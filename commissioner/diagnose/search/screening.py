@@ -69,7 +69,6 @@ def screen(
     model: Model, record: Record, layout: Layout, noise: Noise, setting: Setting, absent: Sequence[str]
 ) -> Screening:
     """Scores of the effects in `absent` at `model`, one pass over the data; of a long recording over the first part of each
-
     segment, and what it promises for the whole: all directions of all of it would fill the memory.
     """
     whole = record.samples
@@ -95,7 +94,6 @@ def score(
     model: Model, normal: Normal, candidates: Mapping[str, tuple[Term, ...]], setting: Setting, times: float = 1.0
 ) -> Screening:
     """Scores from normal equations whose columns are the model's numbers, then the candidates' in order; promised for so
-
     many `times` the data.
     """
     gram, slope = normal.total_gram, normal.total_slope

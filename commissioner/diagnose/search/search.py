@@ -81,7 +81,6 @@ def search(
     rules: Rules = RULES,
 ) -> Search:
     """Accepted causes of the whole record. Where lost samples were put right first and much is left, another cause may have looked
-
     like them: sought again in the data as they came.
 
     `check` sees the nominal fit first and may raise to spare the search.
@@ -233,7 +232,6 @@ def _mended(
     record: Record, current: Fit, layout: Layout, problem: Problem, least: float = 0.0
 ) -> Generator[Step, None, tuple[Record, Fit, Losses]]:
     """Unmarked losses put right, and spikes left out, until a better fit shows no more; none where most of the misfit stays, or where they
-
     gain less than `least`. A cause that is not in the model yet, like the kinks of a dead time, can look like many small losses.
     """
     losses: Losses = ()
@@ -285,7 +283,6 @@ def _on_more(reached: State, setting: Setting, noise: Noise) -> tuple[Fit, Setti
 
 def _without_unseen_speed(model: Model, part: Record, record: Record) -> Model:
     """The model with splines of the speed at zero that lie for the most part beyond the part it was fitted to: the part's last samples
-
     held them, at anything.
     """
     uids = [s.uid for s in record.segments]

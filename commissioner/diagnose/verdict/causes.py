@@ -90,7 +90,6 @@ def _may_be_named(found: Found, name: str, lack: LackOfFit, trust: float) -> boo
 
 def _is_dominant(gain: float, lack: LackOfFit, count: float) -> bool:
     """Whether so much is left that nothing like it was among what the confidence learned from, and yet one cause alone takes nearly all of
-
     the error that is not another's: then it is there, whatever else is.
     """
     return RULES.much_left_sigma**2 * count < lack.sigma**2 * count < (1.0 - RULES.dominant_share) * gain
@@ -159,7 +158,6 @@ def _cause(
 
 def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> list[Cause]:
     """Sizes whose spread holds half of what they move by if a tied cause beside them is the other one, or if they have another form: either
-
     may be true.
     """
     out = []
@@ -182,7 +180,6 @@ def _with_open_ties(causes: Sequence[Cause], without: Mapping[str, Dropped]) -> 
 
 def _more_numbers(found: Found, name: str, rival: str) -> float:
     """What the numbers are worth (G. Schwarz, Ann. Statist. 6(2), 1978) that a rival has more, where it can only imitate: a drift that
-
     has settled at once, a sensor's bend that has.
     """
     if name not in CATALOGUE[rival].imitates:
@@ -209,7 +206,6 @@ def _audit_causes(
     audit: Audit, found: Found, noise: Noise, named: Collection[str], losses: Sequence[Loss]
 ) -> list[Cause]:
     """Causes that leave no waveform: coarse converter steps, clipped and missing samples. `losses` without a gap in time: none where
-
     errors come and go that samples put right do not take away.
     """
     unmarked = float(sum(x.samples for x in losses))
@@ -225,7 +221,6 @@ def _audit_causes(
 
 def confidence_factor(lack: LackOfFit, share: float) -> float:
     """Factor on every confidence where what is left is small, yet more than noise makes around the tones or in a state, and a
-
     larger part of all there was to explain than a right name leaves: 1 at the most that one may leave.
     """
     is_trace = (

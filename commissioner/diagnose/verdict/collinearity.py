@@ -18,7 +18,6 @@ ALIKE, MOST_SHOWN = 0.5, 16
 @dataclass(frozen=True)
 class Alike:
     """`share[i, k]`: part of the error power that cause `names[i]` makes which cause `names[k]` could imitate, 0 to 1,
-
     after the four motor parameters have taken what they can (a cosine squared). Causes that resemble each other stand
     together. `alone`: causes that no other imitates.
     """

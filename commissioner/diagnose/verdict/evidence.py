@@ -38,7 +38,6 @@ SHORTER_STEPS = 12
 @dataclass(frozen=True)
 class HeldOut:
     """Error on segments the fit did not see, and noise, rms over phases and samples, A; `share` of the structured error power
-
     removed there. `is_measured` False with a single segment: then these are in-sample figures. `noise_a` None: it would be more than
     all that is left, as where slow parts of the test itself count as noise at quiet frequencies.
     """
@@ -103,7 +102,6 @@ class Rival:
 @dataclass(frozen=True)
 class Dropped:
     """A fit without one cause: the loss in chi2, scaled to the whole recording, and what of the rest takes its place; `forms`: the
-
     cause's own other ones that do.
     """
 

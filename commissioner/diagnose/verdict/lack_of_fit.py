@@ -1,5 +1,4 @@
 """What is left of the error after the fit, judged against the measured noise: in all, line by line, around the tones, and
-
 by the current, its slope and the time.
 """
 
@@ -55,7 +54,6 @@ def lack_of_fit(
     model: Model, record: Record, layout: Layout, noise: Noise, numbers: int, tones_hz: Sequence[float] = ()
 ) -> LackOfFit:
     """Five measures, the largest counts: total power above the noise (beyond three standard errors of the noise
-
     estimate), power in single frequencies that noise would not show once in a thousand recordings, power around
     each excited tone, all segments and phases together, where what a model misses piles up first, and power that goes with the
     state: a law that is met in a few instants only, like a slew limit, shows in no line; and moments in which much more is left
@@ -97,7 +95,6 @@ def lack_of_fit(
 
 def _by_state(record: Record, predicted: Sequence[Array], whitened: Sequence[Array], noise: Noise) -> float:
     """Power of the `whitened` residual's means over states of a phase, beyond chance and material (else 0): over its current,
-
     over its slope, over both, or over time, whichever shows most.
     """
     bins = len(STATE_EDGES) + 1

@@ -35,7 +35,6 @@ class Curve:
 @dataclass(frozen=True)
 class Spectrum:
     """Lines of the error (A rms) of the longest segment, the largest of each of at most SPECTRUM_POINTS neighbourhoods,
-
     and the error by class of frequency over all segments, as a multiple of what noise alone would make there.
     """
 
@@ -137,7 +136,6 @@ LABELS: Mapping[str, str] = {
 
 def _collect(parts: dict[str, list[Array]], error: _Errors) -> None:
     """Phase by phase against the phase's own current and slope; along the axis against its voltage; of all phases against the flux,
-
     for along the axis two sensors show their noise larger on some axes than on others.
     """
     segment, prediction = error.segment, error.prediction

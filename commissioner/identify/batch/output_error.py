@@ -128,7 +128,6 @@ def _current_at_end(
     power: Array,
 ) -> tuple[float, float, float, float, float, float]:
     """(i, w, dw/di0, dw/di, g, g') with i = free - beta w(i) + g(c1 - b1 w(i)), w the mean loss from i0 to i; Newton's steps, kept
-
     inside what is known to hold the root.
     """
     at0 = _locate(table.size, per_a, i0)

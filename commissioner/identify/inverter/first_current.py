@@ -96,7 +96,6 @@ def _step(
 
 def _doubt_as(level: HeldLevel, heading_std_a: float, time_constant_s: float, period_s: float) -> float:
     """Standard error of the integral of the current that `_moved_wb` takes off: of the samples' noise, of the mean at the end, and of where
-
     the current is heading, which counts for all of the time.
     """
     count, tail = level.samples_a.size, _tail(level)

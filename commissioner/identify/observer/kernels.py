@@ -216,7 +216,6 @@ def update_factors(first: int, r: float, ff: Array, v: Array, upper: Array, diag
 @njit(inline="always")
 def worth_of_white_noise(c0: float, c1: float, beta: float) -> float:
     """Variance times the (AR(1)) length of its correlation, so that an error of the model, which is coloured, is not taken for
-
     information. `c0`, `c1`: mean square and lagged product of the error; 1 / `beta` the samples they remember.
     """
     rho = c1 / (c0 + 1e-300) - 2.0 * math.sqrt(beta)

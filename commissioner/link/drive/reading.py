@@ -7,22 +7,14 @@ from collections.abc import Mapping
 
 from commissioner.errors import IdentityMismatch, RequestRefused
 from commissioner.link.drive.items import Items, number
+from commissioner.motor.nameplate import RATED_VALUES
 from commissioner.records import DriveIdentity, DriveStatus
 from commissioner.registers.codec import Value
 from commissioner.registers.profile import IDENTITY_ITEMS, STATUS_ITEMS, DriveProfile
 from commissioner.registers.status import DriveState, decode_bits, decode_state
 
 BUS_CONTROL = "bus_control"
-NAMEPLATE_ITEMS = (
-    "rated_power_w",
-    "rated_voltage_v",
-    "rated_frequency_hz",
-    "rated_current_a",
-    "rated_speed_rpm",
-    "power_factor",
-    "pole_pairs",
-    "pole_count",
-)
+NAMEPLATE_ITEMS = (*RATED_VALUES, "pole_pairs", "pole_count")
 
 
 def read_identity(items: Items) -> DriveIdentity:

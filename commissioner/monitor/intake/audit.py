@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from commissioner.monitor.intake import channels, clock, columns, levels
-from commissioner.monitor.intake.findings import Audited, Finding, Fundamental
+from commissioner.monitor.intake.findings import Audited, Finding, Findings, Fundamental
 from commissioner.monitor.intake.sensors import evened, trust_of
 from commissioner.monitor.signals.supply import (
     SupplyAngle,
@@ -34,7 +34,7 @@ def inspect(recording: RunningRecording, plate: Nameplate, start: TCircuit, lag_
 
     `lag_deg`: the order of the channels is known to be that of this lag of the currents.
     """
-    findings = [Finding(note.code, "note", note.what) for note in recording.notes]
+    findings = Findings(Finding(note.code, "note", note.what) for note in recording.notes)
     recording, exchanged = columns.sort_by_kind(recording, plate)
     recording, completed = columns.complete(recording)
     findings += [*exchanged, *completed]

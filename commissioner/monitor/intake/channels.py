@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.findings import Finding, Findings
 from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.motor.nameplate import Nameplate
 from commissioner.motor.running import TCircuit, slip_at_current, stator_impedance
@@ -78,7 +78,7 @@ def pair(
     lag_deg: float | None = None,
 ) -> Pairing:
     """The order and polarity of all channels, or findings that refuse; with `lag_deg` the order of that lag."""
-    findings: list[Finding] = []
+    findings = Findings()
     v, i = read_triple(voltages), read_triple(currents)
     _spacing("voltage", v, SPACING_TOLERANCE_DEG, findings)
     voltage_order, turned = _voltage_order(v.sequence, line_to_line)
@@ -104,28 +104,24 @@ def pair(
         if least < o[2] < 90.0 + RIVAL_MARGIN_DEG and abs(o[2] - expected) < LAG_TOLERANCE_DEG and o[2] != lag
     )
     if v.sequence < 0:
-        findings.append(
-            Finding(
-                "phase_order",
-                "corrected",
-                "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
-                "u-w-v",
-                "u-v-w",
-                "exchange two phases of all channels if the motor turns forwards",
-            )
+        findings.add(
+            "phase_order",
+            "corrected",
+            "the voltages follow each other as u-w-v: taken as a motor that turns backwards",
+            "u-w-v",
+            "u-v-w",
+            "exchange two phases of all channels if the motor turns forwards",
         )
     _report_currents(current_order, current_sign, (0, 1, 2) if v.sequence > 0 else (0, 2, 1), findings)
     if v.sign != (1, 1, 1):
         flipped = [name for name, sign in zip("uvw", v.sign, strict=True) if sign < 0]
-        findings.append(
-            Finding(
-                "polarity",
-                "corrected",
-                "voltage channel " + ", ".join(flipped) + " is inverted",
-                "inverted",
-                "same polarity",
-                "turn the probe round",
-            )
+        findings.add(
+            "polarity",
+            "corrected",
+            "voltage channel " + ", ".join(flipped) + " is inverted",
+            "inverted",
+            "same polarity",
+            "turn the probe round",
         )
     mapping = {
         f"phase {name}": f"current {'-' if current_sign[k] < 0 else ''}{'uvw'[current_order[k]]}, "
@@ -188,17 +184,15 @@ def _explained_deg(currents: list[complex], star: list[complex], start: TCircuit
     return float(np.degrees(np.arcsin(min(share, 1.0))))
 
 
-def _spacing(name: str, triple: Triple, limit_deg: float, findings: list[Finding]) -> None:
+def _spacing(name: str, triple: Triple, limit_deg: float, findings: Findings) -> None:
     if triple.deviation_deg > limit_deg:
-        findings.append(
-            Finding(
-                "phase_spacing",
-                "refused",
-                f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
-                triple.deviation_deg,
-                limit_deg,
-                "check that three different phases are measured",
-            )
+        findings.add(
+            "phase_spacing",
+            "refused",
+            f"the {name} channels are not 120 degrees apart (off by {triple.deviation_deg:.0f} degrees)",
+            triple.deviation_deg,
+            limit_deg,
+            "check that three different phases are measured",
         )
 
 
@@ -230,7 +224,7 @@ def _choose(
     expected_deg: float,
     tolerance_deg: float,
     backwards: bool,
-    findings: list[Finding],
+    findings: Findings,
 ) -> Option:
     """The simplest plausible assignment; refused where none is. Currents of foreign size say nothing of the lag, so any is plausible
     then: it is their scale that is refused."""
@@ -239,16 +233,14 @@ def _choose(
     ]
     if not plausible:
         order, sign, lag = min(options, key=lambda option: abs(option[2] - expected_deg))
-        findings.append(
-            Finding(
-                "pairing",
-                "refused",
-                "no order of the current channels makes a motor: the current's lag is "
-                f"{lag:.0f} degrees where {expected_deg:.0f} are expected",
-                lag,
-                "0 ... 90 degrees",
-                "check which current belongs to which voltage, and the polarities",
-            )
+        findings.add(
+            "pairing",
+            "refused",
+            "no order of the current channels makes a motor: the current's lag is "
+            f"{lag:.0f} degrees where {expected_deg:.0f} are expected",
+            lag,
+            "0 ... 90 degrees",
+            "check which current belongs to which voltage, and the polarities",
         )
         return order, sign, lag
     preferred: Order = (0, 2, 1) if backwards else (0, 1, 2)
@@ -259,25 +251,23 @@ def _choose(
     return min(plausible, key=lambda option: (mistakes(option), abs(option[2] - expected_deg)))
 
 
-def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: list[Finding]) -> None:
+def _report_currents(order: Order, sign: Sign, voltage_order: Order, findings: Findings) -> None:
     """One sentence per kind of mistake."""
     if order != voltage_order or any(s < 0 for s in sign):
         names = ", ".join(
             f"{'uvw'[k]} from {'inverted ' if sign[k] < 0 else ''}current_{'uvw'[order[k]]}_a" for k in range(3)
         )
         crossed = order != voltage_order
-        findings.append(
-            Finding(
-                "crossed_channels" if crossed else "polarity",
-                "corrected",
-                (
-                    "the current channels are crossed against the voltages; "
-                    if crossed
-                    else "a current channel is inverted; "
-                )
-                + f"taken: phase {names} (exchanging the voltages instead would explain it as well)",
-                names,
-                "u, v, w in order",
-                "correct the wiring or the column names",
+        findings.add(
+            "crossed_channels" if crossed else "polarity",
+            "corrected",
+            (
+                "the current channels are crossed against the voltages; "
+                if crossed
+                else "a current channel is inverted; "
             )
+            + f"taken: phase {names} (exchanging the voltages instead would explain it as well)",
+            names,
+            "u, v, w in order",
+            "correct the wiring or the column names",
         )

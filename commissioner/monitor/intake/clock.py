@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.monitor.intake.findings import Finding, Fundamental
+from commissioner.monitor.intake.findings import Findings, Fundamental
 from commissioner.monitor.signals.supply import SupplyAngle, Vector
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
@@ -24,19 +24,17 @@ LARGEST_HIDDEN_JITTER = 0.5
 """Of a sample period, seen in the voltage where the stamps show none: white jitter below it averages out like noise."""
 
 
-def whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tuple[int, int]:
+def whole_stretch(recording: RunningRecording, findings: Findings) -> tuple[int, int]:
     """The longest run of samples without a hole or a number that is none."""
     time = recording.time_s
     if time.size < LEAST_SAMPLES:
-        findings.append(
-            Finding(
-                "too_short",
-                "refused",
-                f"the recording holds {time.size} samples",
-                time.size,
-                LEAST_SAMPLES,
-                RECORD_LONGER,
-            )
+        findings.add(
+            "too_short",
+            "refused",
+            f"the recording holds {time.size} samples",
+            time.size,
+            LEAST_SAMPLES,
+            RECORD_LONGER,
         )
         return 0, time.size
     signals = [time, *recording.currents_a, *recording.voltages_v]
@@ -51,15 +49,13 @@ def whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tuple
     if holes.size and good.all() and abs((time[-1] - time[0]) / period + 1 - time.size) < 0.25 * holes.size:
         holes = holes[:0]  # as many rows as the time asks for: the stamps jitter, nothing is lost
     if np.any(np.diff(time) <= 0):
-        findings.append(
-            Finding(
-                "time_order",
-                "refused",
-                "time does not run forward",
-                float(np.nanmin(np.diff(time))),
-                "steps above 0 s",
-                "sort the rows by time",
-            )
+        findings.add(
+            "time_order",
+            "refused",
+            "time does not run forward",
+            float(np.nanmin(np.diff(time))),
+            "steps above 0 s",
+            "sort the rows by time",
         )
     edges = np.unique(np.concatenate([[0], holes, np.flatnonzero(broken), np.flatnonzero(broken) + 1, [time.size]]))
     lengths = np.diff(edges)
@@ -69,28 +65,24 @@ def whole_stretch(recording: RunningRecording, findings: list[Finding]) -> tuple
     lost = _lost(steps, holes) + int(broken.sum())
     if lost or broken.any():
         kept = (high - low) / time.size
-        findings.append(
-            Finding(
-                "missing_samples",
-                "note",
-                f"{lost} samples are missing in {max(holes.size, 1)} places; only the longest whole "
-                f"stretch is used ({(high - low) * period:.2f} s, {kept:.0%} of the recording)",
-                lost,
-                0,
-                "record without gaps",
-            )
+        findings.add(
+            "missing_samples",
+            "note",
+            f"{lost} samples are missing in {max(holes.size, 1)} places; only the longest whole "
+            f"stretch is used ({(high - low) * period:.2f} s, {kept:.0%} of the recording)",
+            lost,
+            0,
+            "record without gaps",
         )
     if (high - low + 1) * period < SHORTEST_S * ROUNDED:  # to a sample, and the digits of printed times
         reason = "missing samples leave" if lost else "the recording holds"
-        findings.append(
-            Finding(
-                "too_short" if not lost else "missing_samples",
-                "refused",
-                f"{reason} {(high - low) * period:.4g} s without a break: too few load periods",
-                (high - low) * period,
-                f"at least {SHORTEST_S:g} s, better 30-60 s",
-                RECORD_LONGER,
-            )
+        findings.add(
+            "too_short" if not lost else "missing_samples",
+            "refused",
+            f"{reason} {(high - low) * period:.4g} s without a break: too few load periods",
+            (high - low) * period,
+            f"at least {SHORTEST_S:g} s, better 30-60 s",
+            RECORD_LONGER,
         )
     return low, high
 
@@ -99,7 +91,7 @@ def _lost(steps: Signal, holes: NDArray[np.int64]) -> int:
     return int(np.sum(np.round(steps[holes - 1]) - 1)) if holes.size else 0
 
 
-def sample_clock(recording: RunningRecording, part: slice, findings: list[Finding]) -> float:
+def sample_clock(recording: RunningRecording, part: slice, findings: Findings) -> float:
     """The sample period from the time stamps; jitter is what is left after a straight line and the printed digits."""
     time = recording.time_s[part]
     if time.size < 16 or any(finding.code == "time_order" for finding in findings):
@@ -107,55 +99,47 @@ def sample_clock(recording: RunningRecording, part: slice, findings: list[Findin
     slope, deviation = _straight(time)
     rms = 0.0 if _is_printed_line(time) else float(deviation.std())
     if rms > LARGEST_JITTER:
-        findings.append(
-            Finding(
-                "clock_jitter",
-                "refused",
-                f"the time stamps wander by {rms:.1%} of a sample period rms",
-                rms,
-                LARGEST_JITTER,
-                "record with a hardware clock at a fixed rate",
-            )
+        findings.add(
+            "clock_jitter",
+            "refused",
+            f"the time stamps wander by {rms:.1%} of a sample period rms",
+            rms,
+            LARGEST_JITTER,
+            "record with a hardware clock at a fixed rate",
         )
     elif rms > NOTED_JITTER:
-        findings.append(
-            Finding(
-                "clock_jitter",
-                "note",
-                f"the time stamps wander by {rms:.1%} of a sample period rms",
-                rms,
-                NOTED_JITTER,
-                "record with a hardware clock",
-            )
+        findings.add(
+            "clock_jitter",
+            "note",
+            f"the time stamps wander by {rms:.1%} of a sample period rms",
+            rms,
+            NOTED_JITTER,
+            "record with a hardware clock",
         )
     named = recording.metadata.get("sample_period_s")
     if isinstance(named, float) and abs(named / slope - 1) > 1e-3:
-        findings.append(
-            Finding(
-                "clock_rate",
-                "note",
-                "sample_period_s and the time stamps disagree; the stamps are used",
-                named,
-                float(slope),
-                "correct sample_period_s",
-            )
+        findings.add(
+            "clock_rate",
+            "note",
+            "sample_period_s and the time stamps disagree; the stamps are used",
+            named,
+            float(slope),
+            "correct sample_period_s",
         )
     return float(slope)
 
 
-def fast_enough(sample_period_s: float, plate: Nameplate, findings: list[Finding]) -> None:
+def fast_enough(sample_period_s: float, plate: Nameplate, findings: Findings) -> None:
     """Refuses a rate at which the supply itself cannot be followed, which is what milliseconds read as seconds look like."""
     per_period = 1 / (plate.rated_frequency_hz * sample_period_s) if sample_period_s > 0 else 0.0
     if per_period < SLOWEST_RATE:
-        findings.append(
-            Finding(
-                "sample_rate",
-                "refused",
-                f"{per_period:.3g} samples in a period of the rated frequency",
-                per_period,
-                SLOWEST_RATE,
-                "record at 2 kHz or faster, and give the time in seconds",
-            )
+        findings.add(
+            "sample_rate",
+            "refused",
+            f"{per_period:.3g} samples in a period of the rated frequency",
+            per_period,
+            SLOWEST_RATE,
+            "record at 2 kHz or faster, and give the time in seconds",
         )
 
 
@@ -182,9 +166,7 @@ def _printed_step(time: Signal) -> float:
     return 0.0
 
 
-def hidden_jitter(
-    v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: list[Finding]
-) -> None:
+def hidden_jitter(v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: Findings) -> None:
     """Jitter that the stamps do not show: it moves the voltage along the circle only, noise moves it in and out as well.
 
     From second differences (they drop harmonics): omega V sigma_t = sqrt((var_along - var_across) / 6).
@@ -199,13 +181,11 @@ def hidden_jitter(
     jitter = np.sqrt(excess) / (2 * np.pi * fundamental.frequency_hz * abs(fundamental.voltage_v)) / period
     if jitter > NOTED_JITTER * 5:
         kind = "refused" if jitter > LARGEST_HIDDEN_JITTER else "note"
-        findings.append(
-            Finding(
-                "clock_jitter",
-                kind,
-                f"the samples were taken off their time by {jitter:.0%} of a sample period rms",
-                float(jitter),
-                LARGEST_HIDDEN_JITTER,
-                "record with a hardware clock",
-            )
+        findings.add(
+            "clock_jitter",
+            kind,
+            f"the samples were taken off their time by {jitter:.0%} of a sample period rms",
+            float(jitter),
+            LARGEST_HIDDEN_JITTER,
+            "record with a hardware clock",
         )

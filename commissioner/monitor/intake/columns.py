@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.findings import Finding, Findings
 from commissioner.motor.computed import is_negative_sum
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
@@ -79,36 +79,32 @@ def complete(recording: RunningRecording) -> tuple[RunningRecording, list[Findin
 
     Without a neutral the three sum to zero. A phase voltage's missing third is not known: the star point may move.
     """
-    findings: list[Finding] = []
+    findings = Findings()
     groups = [list(recording.currents_a), list(recording.voltages_v)]
     for group, kind in zip(groups, ("current", "voltage"), strict=True):
         if is_computed := _is_computed(group, kind, recording.voltages_are_line_to_line):
             group[2] = -(group[0] + group[1])
-            findings.append(
-                Finding(
-                    f"computed_{kind}",
-                    "note",
-                    f"third {kind} computed from two: not used as a sensor. Which of the three was computed cannot be told from the sum: the "
-                    "gain of a sensor stands in it as well",
-                    3,
-                    2,
-                    f"record all three {kind}s",
-                )
+            findings.add(
+                f"computed_{kind}",
+                "note",
+                f"third {kind} computed from two: not used as a sensor. Which of the three was computed cannot be told from the sum: the "
+                "gain of a sensor stands in it as well",
+                3,
+                2,
+                f"record all three {kind}s",
             )
         absent = [] if is_computed else [k for k, signal in enumerate(group) if not np.any(np.nan_to_num(signal))]
         if len(absent) != 1 or (kind == "voltage" and not recording.voltages_are_line_to_line):
             continue
         k = absent[0]
         group[k] = -(group[k - 1] + group[k - 2])
-        findings.append(
-            Finding(
-                f"third_{kind}",
-                "corrected",
-                f"one {kind} was not recorded: taken as minus the sum of the other two",
-                k + 1,
-                3,
-                f"record all three {kind}s",
-            )
+        findings.add(
+            f"third_{kind}",
+            "corrected",
+            f"one {kind} was not recorded: taken as minus the sum of the other two",
+            k + 1,
+            3,
+            f"record all three {kind}s",
         )
     i, v = groups
     return replace(recording, currents_a=(i[0], i[1], i[2]), voltages_v=(v[0], v[1], v[2])), findings

@@ -29,6 +29,15 @@ class Finding:
         return self.kind == "refused"
 
 
+class Findings(list[Finding]):
+    """What an audit has found so far, in order."""
+
+    def add(
+        self, code: str, kind: str, what: str, value: float | str | None, limit: float | str | None, remedy: str
+    ) -> None:
+        self.append(Finding(code, kind, what, value, limit, remedy))
+
+
 def miswired(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """What was put right here and should be put right at the probes."""
     return tuple(f for f in findings if f.kind == "corrected" and f.code in WIRING)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from commissioner.monitor.intake.findings import Finding, Fundamental
+from commissioner.monitor.intake.findings import Findings, Fundamental
 from commissioner.monitor.intake.sensors import OPEN_SUM
 from commissioner.monitor.signals.supply import Vector
 from commissioner.motor.nameplate import Nameplate
@@ -25,67 +25,59 @@ LARGEST_RIPPLE = 0.35
 """Share of the voltage's rms that is not its fundamental: beyond it the voltage is a switched one, sampled without filter."""
 
 
-def channel_levels(currents: list[Signal], voltages: list[Signal], findings: list[Finding]) -> None:
+def channel_levels(currents: list[Signal], voltages: list[Signal], findings: Findings) -> None:
     """Dead channels and clipped ones."""
     for group, kind in ((currents, "current"), (voltages, "voltage")):
         rms = np.array([signal.std() for signal in group])
         for name, value in zip("uvw", rms, strict=True):
             if value < 0.2 * rms.max() or rms.max() == 0.0:
-                findings.append(
-                    Finding(
-                        "dead_channel",
-                        "refused",
-                        f"{kind} channel {name} carries {value:.3g} rms where the largest has {rms.max():.3g}",
-                        float(value),
-                        float(0.2 * rms.max()),
-                        "check the sensor and its wiring",
-                    )
+                findings.add(
+                    "dead_channel",
+                    "refused",
+                    f"{kind} channel {name} carries {value:.3g} rms where the largest has {rms.max():.3g}",
+                    float(value),
+                    float(0.2 * rms.max()),
+                    "check the sensor and its wiring",
                 )
         for name, signal in zip("uvw", group, strict=True):
             share = clipped_share(signal)
             if share > LARGEST_CLIPPED:
-                findings.append(
-                    Finding(
-                        "clipped_channel",
-                        "refused",
-                        f"{kind} channel {name} is clipped: {share:.1%} of its samples sit on a limit",
-                        share,
-                        LARGEST_CLIPPED,
-                        "use a larger range",
-                    )
+                findings.add(
+                    "clipped_channel",
+                    "refused",
+                    f"{kind} channel {name} is clipped: {share:.1%} of its samples sit on a limit",
+                    share,
+                    LARGEST_CLIPPED,
+                    "use a larger range",
                 )
 
 
-def unlike_gains(difference: Signal, kind: str, findings: list[Finding]) -> None:
+def unlike_gains(difference: Signal, kind: str, findings: Findings) -> None:
     """Says so where the gains of three channels, whose sum should be zero, were made alike by more than a per cent."""
     largest = float(np.abs(difference).max())
     if largest > NOTED_GAIN:
-        findings.append(
-            Finding(
-                "unlike_gains",
-                "corrected",
-                f"the {kind}s do not sum to zero: their gains were taken to differ by "
-                + ", ".join(f"{100 * d:+.1f}" for d in difference)
-                + " % from their mean",
-                largest,
-                NOTED_GAIN,
-                f"calibrate the {kind} sensors against each other",
-            )
+        findings.add(
+            "unlike_gains",
+            "corrected",
+            f"the {kind}s do not sum to zero: their gains were taken to differ by "
+            + ", ".join(f"{100 * d:+.1f}" for d in difference)
+            + " % from their mean",
+            largest,
+            NOTED_GAIN,
+            f"calibrate the {kind} sensors against each other",
         )
 
 
-def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], findings: list[Finding]) -> None:
+def open_sum(odd: tuple[int, float] | None, kind: str, names: Sequence[str], findings: Findings) -> None:
     """A refusal where three channels cannot be the lines of one motor; `odd` as in `Evened`."""
     if odd is None:
         return
     channel, gain = odd
-    findings.append(
-        Finding(
-            "open_sum", "refused",
-            f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
-            gain, f"{(1 - 2 * OPEN_SUM) / (1 + OPEN_SUM):.2f} ... {(1 + 2 * OPEN_SUM) / (1 - OPEN_SUM):.2f}",
-            f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
-        )
+    findings.add(
+        "open_sum", "refused",
+        f"the three {kind}s do not add up to zero: {kind} {names[channel]} is {gain:.3g} times what the other two leave for it",
+        gain, f"{(1 - 2 * OPEN_SUM) / (1 + OPEN_SUM):.2f} ... {(1 + 2 * OPEN_SUM) / (1 - OPEN_SUM):.2f}",
+        f"check range, ratio and turns of its sensor; and that the three {kind}s are the three lines of one motor",
     )  # fmt: skip
 
 
@@ -104,75 +96,65 @@ def clipped_share(signal: Signal) -> float:
     return share
 
 
-def switched_voltage(v: Vector, fundamental: Fundamental, findings: list[Finding]) -> None:
+def switched_voltage(v: Vector, fundamental: Fundamental, findings: Findings) -> None:
     known = abs(fundamental.voltage_v) ** 2 + abs(fundamental.voltage_negative_v) ** 2
     share = float(np.sqrt(max(np.mean(np.abs(v) ** 2) - known, 0.0) / known))
     if share > LARGEST_RIPPLE:
-        findings.append(
-            Finding(
-                "switched_voltage",
-                "refused",
-                f"{share:.0%} of the voltage is not its fundamental",
-                share,
-                LARGEST_RIPPLE,
-                "filter the voltage before sampling, or give the mean over each switching period",
-            )
+        findings.add(
+            "switched_voltage",
+            "refused",
+            f"{share:.0%} of the voltage is not its fundamental",
+            share,
+            LARGEST_RIPPLE,
+            "filter the voltage before sampling, or give the mean over each switching period",
         )
 
 
-def supply_range(frequency_hz: float, plate: Nameplate, findings: list[Finding]) -> None:
+def supply_range(frequency_hz: float, plate: Nameplate, findings: Findings) -> None:
     if not 0.1 * plate.rated_frequency_hz < frequency_hz < 2.0 * plate.rated_frequency_hz:
-        findings.append(
-            Finding(
-                "supply_frequency",
-                "refused",
-                f"the strongest voltage line is at {frequency_hz:.4g} Hz",
-                frequency_hz,
-                f"{0.1 * plate.rated_frequency_hz:.3g} ... {2 * plate.rated_frequency_hz:.3g} Hz",
-                "check the voltage channels",
-            )
+        findings.add(
+            "supply_frequency",
+            "refused",
+            f"the strongest voltage line is at {frequency_hz:.4g} Hz",
+            frequency_hz,
+            f"{0.1 * plate.rated_frequency_hz:.3g} ... {2 * plate.rated_frequency_hz:.3g} Hz",
+            "check the voltage channels",
         )
 
 
-def plausible_size(fundamental: Fundamental, plate: Nameplate, findings: list[Finding]) -> None:
+def plausible_size(fundamental: Fundamental, plate: Nameplate, findings: Findings) -> None:
     """A current in other units or of a probe's scale; line-to-line voltages under the names of phase voltages, or the reverse:
     root three too large or too small, and 30 degrees off.
     """
     share = abs(fundamental.current_a) / (np.sqrt(2) * plate.rated_current_a)
     if not LEAST_CURRENT < share < LARGEST_CURRENT:
-        findings.append(
-            Finding(
-                "current_level",
-                "refused",
-                f"the currents are {share:.3g} times the rated one",
-                float(share),
-                f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
-                "give the currents in ampere (probe factor, mA?), or correct the plate",
-            )
+        findings.add(
+            "current_level",
+            "refused",
+            f"the currents are {share:.3g} times the rated one",
+            float(share),
+            f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
+            "give the currents in ampere (probe factor, mA?), or correct the plate",
         )
     per_hertz = abs(fundamental.voltage_v) / fundamental.frequency_hz
     rated = plate.rated_voltage_v * np.sqrt(2 / 3) / plate.rated_frequency_hz
     if abs(per_hertz / rated * np.sqrt(3.0) - 1) < 0.05:
-        findings.append(
-            Finding(
-                "voltage_level",
-                "refused",
-                "the voltages are root three too small for this motor: phase voltages under the names of line-to-line ones?",
-                float(per_hertz / rated),
-                f"0.61 ... {LARGEST_FROM_HALF:g}",
-                "name the columns voltage_u_v, voltage_v_v, voltage_w_v, or correct the plate",
-            )
+        findings.add(
+            "voltage_level",
+            "refused",
+            "the voltages are root three too small for this motor: phase voltages under the names of line-to-line ones?",
+            float(per_hertz / rated),
+            f"0.61 ... {LARGEST_FROM_HALF:g}",
+            "name the columns voltage_u_v, voltage_v_v, voltage_w_v, or correct the plate",
         )
     is_slow = fundamental.frequency_hz < 0.5 * plate.rated_frequency_hz
     largest = LARGEST_VOLTS_PER_HERTZ if is_slow else LARGEST_FROM_HALF
     if per_hertz > largest * rated:
-        findings.append(
-            Finding(
-                "voltage_level",
-                "refused",
-                "the voltages are too large for this motor: line-to-line under the names of phase voltages, or peak for rms?",
-                float(per_hertz / rated),
-                largest,
-                "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
-            )
+        findings.add(
+            "voltage_level",
+            "refused",
+            "the voltages are too large for this motor: line-to-line under the names of phase voltages, or peak for rms?",
+            float(per_hertz / rated),
+            largest,
+            "name the columns voltage_uv_v, voltage_vw_v, voltage_wu_v, or correct the plate",
         )

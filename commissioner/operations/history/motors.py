@@ -11,11 +11,12 @@ from commissioner.errors import DataRefused, UsageError
 from commissioner.identify.estimate.axes import Comparison, Identity, compare
 from commissioner.identify.estimate.common_ground import brought_together
 from commissioner.operations.history.runs import Archive, Wanted, find_runs
-from commissioner.run.archive.catalogue import RunSummary, find_run, read_run
-from commissioner.run.archive.folder import RunFolder, read_journal
+from commissioner.run.archive.catalogue import find_run, read_run
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.origin import this_process
 from commissioner.run.archive.seal import CLOSED
-from commissioner.run.archive.summary import NAMED
+from commissioner.run.archive.summary import NAMED, RunSummary
 from commissioner.run.index.results import has_result, result_of
 from commissioner.run.index.rows import Row
 from commissioner.run.index.years import rows_of

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commissioner.errors import UsageError
-from commissioner.run.archive.catalogue import RunSummary, find_folder, read_run
+from commissioner.run.archive.catalogue import find_folder, read_run
 from commissioner.run.archive.documents import Loss, read_result
-from commissioner.run.archive.summary import STANDINGS
+from commissioner.run.archive.summary import STANDINGS, RunSummary
 from commissioner.run.index.index import Found, Refreshed
 from commissioner.run.index.index import find as look_up
 from commissioner.run.index.index import refresh as bring_into_step

@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from commissioner.errors import UsageError
+from commissioner.identify.intake.plate import NAMEPLATE_KEYS
 from commissioner.motor.circuit import PARAMETERS
 from commissioner.recordings.whole import whole_file
 
 TEXTS = (
     "run", "started_utc", "ended_utc", "outcome", "standing", "reason", "written", "drive", "url", "profile", "person", "host",
     "version", "motor_tag", "motor_serial", "motor_name", "folder",
-)  # fmt: skip
-PLATE = (
-    "rated_power_w", "rated_voltage_v", "rated_frequency_hz", "rated_current_a", "rated_speed_rpm", "power_factor", "pole_pairs",
 )  # fmt: skip
 QUANTITIES = (*PARAMETERS, "rotor_time_constant_s")
 ENDINGS = (".csv", ".parquet")
@@ -41,7 +39,7 @@ def _row(summary: Mapping[str, Any]) -> dict[str, str | float | None]:
     row["drive_serial"] = "" if summary.get("serial_number") is None else str(summary["serial_number"])
     row["energised_s"] = _number(summary.get("energised_s"))
     plate, found = summary.get("motor") or {}, summary.get("parameters") or {}
-    row |= {name: _number(plate.get(name)) for name in PLATE}
+    row |= {name: _number(plate.get(name)) for name in NAMEPLATE_KEYS}
     for name in QUANTITIES:
         quantity = found.get(name) or {}
         row |= {name: _number(quantity.get("value")), f"{name}_std": _number(quantity.get("std"))}

@@ -14,6 +14,7 @@ from typing import BinaryIO
 from commissioner.errors import CommissionerError, UsageError
 from commissioner.run.archive.catalogue import find_folder, run_folders
 from commissioner.run.archive.documents import open_no_link
+from commissioner.run.archive.seal import cover
 from commissioner.run.archive.verify import DAMAGED, verify
 from commissioner.run.index.index import JOURNAL, note
 
@@ -144,7 +145,7 @@ def _copy_file(source: Path, target: Path) -> int:
     """Bytes copied, on the disk when this returns. A beginning that is not ours is copied anew."""
     begun = target.stat().st_size if target.is_file() else 0
     with source.open("rb") as origin:
-        if begun and _digest(origin, begun) != _digest_of(target):
+        if begun and _digest(origin, begun) != cover(target)["sha256"]:
             begun = 0
         origin.seek(begun)
         with open(target, "r+b" if begun else "wb", opener=open_no_link) as file:
@@ -164,11 +165,6 @@ def _digest(file: BinaryIO, count: int) -> str:
         found.update(piece)
         count -= len(piece)
     return found.hexdigest()
-
-
-def _digest_of(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _put_in_place(incoming: Path, there: Path) -> None:

@@ -23,7 +23,6 @@ from commissioner.errors import DataRefused
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
 from commissioner.motor.computed import COMPUTED, other_pairs
-from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.events import GoOn, Observe, always, nobody
 from commissioner.operations.ranges import require_distinct
 from commissioner.operations.recordings import catalogue
@@ -37,12 +36,12 @@ from commissioner.operations.recordings.sheets import (
     with_line_values,
 )
 from commissioner.operations.recordings.sheets import diagnosed as of_three_tests
-from commissioner.operations.recordings.trust import Trust, refused, trust_from, trusted_data
+from commissioner.operations.recordings.trust import Trust, judged, trust_from
 from commissioner.recordings.catalogue.reading import sheet_of
 from commissioner.recordings.importers import contract_table
 from commissioner.recordings.reading.mapping import read_mapping
 from commissioner.recordings.table import Table
-from commissioner.recordings.whole import folder_to_write, whole_file
+from commissioner.recordings.whole import folder_to_write, write_texts
 from commissioner.records import StandstillRecording
 from commissioner.running.diagnosis import Diagnosis as RunningDiagnosis
 
@@ -168,14 +167,8 @@ def _against_plate(document: DiagnosisDocument, plate: Mapping[str, float | str]
     values = document["parameters_after"]
     if any(key not in plate for key in NAMEPLATE_KEYS) or any(name not in values for name in PARAMETERS):
         return []
-    nameplate = nameplate_from(plate)
-    rated = rated_point(InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS)), nameplate)
-    found, said = contradiction(rated, nameplate), doubt(rated, nameplate)
-    if found is None:
-        return [said] if said else []
-    if trust != "data":
-        raise refused(found)
-    return [trusted_data(found)]
+    circuit = InverseGamma(*(float(values[name]["value"] or 0.0) for name in PARAMETERS))
+    return judged(circuit, nameplate_from(plate), trust)
 
 
 def _write_recordings(out: Path, seen: Diagnosis, document: DiagnosisDocument, tables: Sequence[Table]) -> None:
@@ -249,6 +242,4 @@ def _write(out: Path, document: Mapping[str, Any], model: ModelDocument | None, 
     texts = {page_name: page, "diagnosis.json": json.dumps(plain(document), indent=2)}
     if model is not None:
         texts["model.json"] = json.dumps(plain(model), indent=1)
-    for name, text in texts.items():
-        with whole_file(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    write_texts(out, texts)

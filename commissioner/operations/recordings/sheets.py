@@ -15,9 +15,8 @@ from commissioner.errors import DataRefused
 from commissioner.identify.contract import Measured, ThreeTestsDocument
 from commissioner.identify.intake.plate import NAMEPLATE_KEYS, nameplate_from
 from commissioner.motor.circuit import PARAMETERS
-from commissioner.motor.plate_match import contradiction, doubt, rated_point
 from commissioner.operations.recordings.intake import plate_metadata
-from commissioner.operations.recordings.trust import Trust, refused, trusted_data
+from commissioner.operations.recordings.trust import Trust, judged
 from commissioner.recordings.sheet_names import missing_of_sheet
 from commissioner.recordings.table import Table
 from commissioner.records import ReadingNote
@@ -116,14 +115,7 @@ def diagnosed(tables: Sequence[Table], motor: str | None, trust: Trust | None) -
 def _against_plate(found: ThreeTests, plate: Mapping[str, float | str], trust: Trust | None) -> list[str]:
     if any(not isinstance(plate.get(key), float | int) for key in NAMEPLATE_KEYS):
         return []
-    nameplate = nameplate_from(plate)
-    rated = rated_point(found.circuit, nameplate)
-    against, said = contradiction(rated, nameplate), doubt(rated, nameplate)
-    if against is None:
-        return [said] if said else []
-    if trust != "data":
-        raise refused(against)
-    return [trusted_data(against)]
+    return judged(found.circuit, nameplate_from(plate), trust)
 
 
 def notes_of(tables: Sequence[Table]) -> list[str]:

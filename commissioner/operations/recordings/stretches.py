@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
+from typing import cast
 
 from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
@@ -109,10 +110,7 @@ def said_by_terminals(seen: Refused, stretches: list[State]) -> Partial | None:
 
 
 def as_state(stretch: Stretch, *, used: bool) -> State:
-    return {
-        "state": stretch.state, "start_s": stretch.start_s, "end_s": stretch.end_s, "current_a": stretch.current_a,
-        "frequency_hz": stretch.frequency_hz, "used": used,
-    }  # fmt: skip
+    return cast("State", {**asdict(stretch), "used": used})
 
 
 def _span(stretch: Stretch) -> str:

@@ -6,7 +6,9 @@ from dataclasses import replace
 from typing import Literal, cast
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.motor.plate_match import Contradiction
+from commissioner.motor.circuit import InverseGamma
+from commissioner.motor.nameplate import Nameplate
+from commissioner.motor.plate_match import Contradiction, contradiction, doubt, rated_point
 from commissioner.records import Signal, StandstillRecording
 
 Trust = Literal["plate", "data"]
@@ -32,6 +34,17 @@ def refused(found: Contradiction) -> DataRefused:
 def trusted_data(found: Contradiction) -> str:
     """What a result says whose user trusts the data."""
     return f"{found.what} ({found.value}): the data were trusted, as told"
+
+
+def judged(circuit: InverseGamma, plate: Nameplate, trust: Trust | None) -> list[str]:
+    """What the circuit says against the plate; DataRefused where they contradict each other, unless the data are to be trusted."""
+    rated = rated_point(circuit, plate)
+    against, said = contradiction(rated, plate), doubt(rated, plate)
+    if against is None:
+        return [said] if said else []
+    if trust != "data":
+        raise refused(against)
+    return [trusted_data(against)]
 
 
 def trusted_plate(factor: float) -> str:

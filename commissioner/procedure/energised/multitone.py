@@ -109,7 +109,7 @@ class UnderTest:
             voltage_v, current, self._estimate, self._present_scale, block.lost_before, block.age_s
         )
         self._lost += block.lost_before
-        self.peak_fraction = max(self.peak_fraction, self._measured_fraction(reading))
+        self.peak_fraction = max(self.peak_fraction, max(reading.observer_wb, reading.model_free_wb) / self.limit_wb)
         self._findings.peak_flux_fraction = max(self._findings.peak_flux_fraction, self.peak_fraction)
         return reading
 
@@ -191,9 +191,6 @@ class UnderTest:
         )  # fmt: skip
         r_s, r_r, l_s, l_m = (p / 100 for p in percent)
         return settled(self._history, 0.2 * self._seconds, (r_s, r_r, l_s, l_m))
-
-    def _measured_fraction(self, reading: FluxReading) -> float:
-        return max(reading.observer_wb, reading.model_free_wb) / self.limit_wb
 
 
 def plate_machine(job: Job, findings: Findings) -> InverseGamma:

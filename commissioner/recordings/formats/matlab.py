@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commissioner.recordings.bounds import MAX_BYTES, NUMBER_BYTES, too_large, unpacked_limit
+from commissioner.recordings.bounds import NUMBER_BYTES, bounded_bytes, too_large, unpacked_limit
 from commissioner.recordings.formats.stretch import Stretch
 from commissioner.records import Signal
 
@@ -61,10 +61,7 @@ class _Bytes(Stretch):
 
 def vectors(path: Path) -> dict[str, Signal]:
     """Every real numeric vector, matrix column and scalar, by its dotted path. DataRefused: damaged, or too large."""
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise too_large(path, size, MAX_BYTES)
-    raw = path.read_bytes()
+    raw = bounded_bytes(path)
     order = {b"IM": "<", b"MI": ">"}.get(raw[_HEADER - 2 : _HEADER], "")
     file = _Bytes(memoryview(raw)[_HEADER:], order, path)
     if not order or raw[:10] == b"MATLAB 7.3" or _HDF5 in raw[512:520]:

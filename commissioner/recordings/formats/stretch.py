@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from commissioner.errors import DataRefused
-from commissioner.recordings.bounds import MAX_BYTES, too_large
+from commissioner.recordings.bounds import bounded_bytes
 
 
 class Stretch:
@@ -19,10 +19,7 @@ class Stretch:
     @classmethod
     def of_file(cls, path: Path, form: str) -> Stretch:
         """The whole file, up to the size limit of recordings."""
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise too_large(path, size, MAX_BYTES)
-        return cls(memoryview(path.read_bytes()), path, form)
+        return cls(memoryview(bounded_bytes(path)), path, form)
 
     @property
     def is_at_end(self) -> bool:

@@ -25,20 +25,18 @@ def where(document: Document, left: Residuals, has_causes: bool) -> Section:
     )
     return Section(
         "Where the simulation is wrong" if document["verdict"] != "nothing_significant" else "The error is noise",
-        [
-            f"Orange: measured minus simulated current, with the four numbers fitted as well as they can be.{after} The fit hides a part of "
-            "every cause, so these shapes are a hint and no proof; the names come from trying every cause of the catalogue.",
-            picture(
-                figures.over_quantities(left, has_causes),
-                f"Error over current, voltage, flux and how fast the current changes.{shade} "
-                "A steep step at zero current is the inverter's; curves that differ between plus and minus come from a sensor or a DC bias.",
-            ),
-            picture(
-                figures.over_time_and_axis(left, has_causes, document["gain"]["noise_floor_a"]),
-                "Size of the error over time and for each tested axis. A rise "
-                "that goes on from test to test is warming or a drifting clock; unequal axes are unequal sensors or an unequal machine.",
-            ),
-        ],
+        f"Orange: measured minus simulated current, with the four numbers fitted as well as they can be.{after} The fit hides a part of "
+        "every cause, so these shapes are a hint and no proof; the names come from trying every cause of the catalogue.",
+        picture(
+            figures.over_quantities(left, has_causes),
+            f"Error over current, voltage, flux and how fast the current changes.{shade} "
+            "A steep step at zero current is the inverter's; curves that differ between plus and minus come from a sensor or a DC bias.",
+        ),
+        picture(
+            figures.over_time_and_axis(left, has_causes, document["gain"]["noise_floor_a"]),
+            "Size of the error over time and for each tested axis. A rise "
+            "that goes on from test to test is warming or a drifting clock; unequal axes are unequal sensors or an unequal machine.",
+        ),
     )
 
 
@@ -46,17 +44,15 @@ def frequencies(left: Residuals, has_causes: bool, tones_hz: Sequence[float]) ->
     """Spectrum before and after, and the classes of lines."""
     return Section(
         "At which frequencies",
-        [
-            picture(
-                figures.spectrum(left.spectrum, tones_hz, has_causes),
-                "Left: every frequency (to the right many "
-                "share one point, and the largest is drawn). Right: the test's own frequencies, those "
-                "that distortion adds, and all others; bars at 1 (dashed) are pure noise. Odd distortion comes from the inverter and "
-                "from saturation, even distortion from a curved sensor or a DC bias; an error at the test's frequencies alone is a "
-                "delay, skin effect or iron loss.",
-                raster=True,
-            ),
-        ],
+        picture(
+            figures.spectrum(left.spectrum, tones_hz, has_causes),
+            "Left: every frequency (to the right many "
+            "share one point, and the largest is drawn). Right: the test's own frequencies, those "
+            "that distortion adds, and all others; bars at 1 (dashed) are pure noise. Odd distortion comes from the inverter and "
+            "from saturation, even distortion from a curved sensor or a DC bias; an error at the test's frequencies alone is a "
+            "delay, skin effect or iron loss.",
+            raster=True,
+        ),
     )
 
 
@@ -97,7 +93,7 @@ def for_experts(document: Document, left: Residuals, has_causes: bool, alike: Al
                 [f"Never told apart at the terminals of a motor at standstill: {never}."],
             )
         )
-    return Section("For experts", parts)
+    return Section("For experts", *parts)
 
 
 def _levels(document: Document) -> list[str]:

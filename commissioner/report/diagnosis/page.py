@@ -33,7 +33,7 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
             sections.parameters(document),
             evidence.for_experts(document, left, has, alike),
         ]
-    parts.append(Section("The data", [*(document["audit"] or ("Nothing unusual was found in the file.",))]))
+    parts.append(Section("The data", *(document["audit"] or ("Nothing unusual was found in the file.",))))
     return Page(
         title=f"Diagnosis: {name}",
         headline=headline(document),
@@ -97,12 +97,10 @@ def _over_points(document: Document) -> list[Section]:
     return [
         Section(
             "Where the circuit is wrong",
-            [
-                picture(
-                    drawn,
-                    "Simulated against measured, every test point. Dots: the circuit was fitted to all points. Rings: it was "
-                    f"fitted to the other points and had to predict this one. {over}; what is left should scatter about zero.",
-                ),
-            ],
+            picture(
+                drawn,
+                "Simulated against measured, every test point. Dots: the circuit was fitted to all points. Rings: it was "
+                f"fitted to the other points and had to predict this one. {over}; what is left should scatter about zero.",
+            ),
         )
     ]

@@ -39,7 +39,7 @@ def what_it_means(document: Document) -> list[Section]:
     rows = [(who.replace(" ", "\u00a0"), coded(what)) for who, what in actions(document)]
     table = [Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else []
     words = [coded(s) for s in (*meaning(document), *remarks(document))]
-    return [Section("What it means", [*words, *table])] if words or table else []
+    return [Section("What it means", *words, *table)] if words or table else []
 
 
 def causes(document: Document) -> list[Section]:
@@ -54,7 +54,7 @@ def causes(document: Document) -> list[Section]:
             if document.get("uncertain")
             else ("What these data would have shown is listed further down")
         )
-        return [Section("Causes", [f"{tried} {below}."])]
+        return [Section("Causes", f"{tried} {below}.")]
     largest = max(c["gain_share"] for c in found)
     rows, tones = [], list[Tone]()
     for cause in found:
@@ -79,24 +79,22 @@ def causes(document: Document) -> list[Section]:
     return [
         Section(
             "Causes",
-            [
-                Table(
-                    (
-                        "cause",
-                        "size",
-                        "part of the error",
-                        "its error",
-                        "sure of the name",
-                        "next best name",
-                        "smallest detectable",
-                    ),
-                    rows,
-                    tones,
-                    caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
-                    "not add up to 100 %. Next best name: the other cause that explains most of the same.",
+            Table(
+                (
+                    "cause",
+                    "size",
+                    "part of the error",
+                    "its error",
+                    "sure of the name",
+                    "next best name",
+                    "smallest detectable",
                 ),
-                *dict.fromkeys(said_of_others),
-            ],
+                rows,
+                tones,
+                caption=f"{PLUS_MINUS} Rest the pointer on the part to see its number; causes partly do the same, so parts do "
+                "not add up to 100 %. Next best name: the other cause that explains most of the same.",
+            ),
+            *dict.fromkeys(said_of_others),
         )
     ]
 
@@ -125,7 +123,7 @@ def uncertain_names(document: Document) -> list[Section]:
         ]
         if rows:
             tones: list[Tone] = ["warn" if is_seen else "good"] * len(rows)
-            out.append(Section(title, [Table(("perhaps", "why it is uncertain", "what would decide it"), rows, tones)]))
+            out.append(Section(title, Table(("perhaps", "why it is uncertain", "what would decide it"), rows, tones)))
     return out
 
 
@@ -139,7 +137,7 @@ def next_test(document: Document) -> list[Section]:
     rows = [("how often", next_promise(plan))]
     if plan.get("changes_values"):
         rows.append(("does it change the motor's values?", plan["changes_values"]))
-    return [Section("What to measure next", [coded(next_sentence(plan)), *steps, *command, Table(("", ""), rows)])]
+    return [Section("What to measure next", coded(next_sentence(plan)), *steps, *command, Table(("", ""), rows))]
 
 
 def not_found(document: Document) -> Section:
@@ -154,7 +152,7 @@ def not_found(document: Document) -> Section:
     caption = "Smallest size that these data show beside the named causes."
     title = "Looked for and not found" if is_finished(document) else "Not found yet, and not all looked for"
     return Section(
-        title, [Table(("looked for", "smallest detectable", "what would show it better"), rows, caption=caption)]
+        title, Table(("looked for", "smallest detectable", "what would show it better"), rows, caption=caption)
     )
 
 
@@ -175,12 +173,10 @@ def parameters(document: Document) -> Section:
             )
     return Section(
         "How far the four-parameter values were off",
-        [
-            coded(
-                f"For judging the error only: do not enter these in a drive; use `commissioner identify`.{_flux_of(document)}"
-            ),
-            Table(("", "plain simulation", "with the causes", "plain one was off by"), rows),
-        ],
+        coded(
+            f"For judging the error only: do not enter these in a drive; use `commissioner identify`.{_flux_of(document)}"
+        ),
+        Table(("", "plain simulation", "with the causes", "plain one was off by"), rows),
     )
 
 
@@ -188,7 +184,7 @@ def circuit(document: Document) -> Section:
     """The circuit of three tests, which nothing is left over to judge."""
     after = document["parameters_after"]
     rows = [(title, _plain(after[key], scale, unit)) for key, title, scale, unit in NAMES if key in after]
-    return Section("The circuit", [Table(("inverse-Gamma, per star phase", "value"), rows)])
+    return Section("The circuit", Table(("inverse-Gamma, per star phase", "value"), rows))
 
 
 def _flux_of(document: Document) -> str:
@@ -209,7 +205,7 @@ def points_causes(document: Document) -> Section:
     """The causes of a points table, with the chance that scatter alone made them up."""
     found = ordered(document)
     if not found:
-        return Section("Causes", ["No cause was found in these points."])
+        return Section("Causes", "No cause was found in these points.")
     largest = max(c["gain_share"] for c in found)
     rows = [
         (
@@ -223,14 +219,12 @@ def points_causes(document: Document) -> Section:
     others = [of_cause(c) for c in found[1:]]
     return Section(
         "Causes",
-        [
-            str(document["reason"]),
-            Table(
-                ("cause", "size", "part of the error", "chance that scatter made it up"),
-                rows,
-                ["good"] * len(rows),
-                caption=PLUS_MINUS,
-            ),
-            *others,
-        ],
+        str(document["reason"]),
+        Table(
+            ("cause", "size", "part of the error", "chance that scatter made it up"),
+            rows,
+            ["good"] * len(rows),
+            caption=PLUS_MINUS,
+        ),
+        *others,
     )

@@ -35,13 +35,11 @@ def catalogue_page(document: Mapping[str, Any], name: str) -> Page:
         for v in document["values"]
     ]  # fmt: skip
     sections = [
-        Section(
-            "Parameters", [Table(HEADER, rows, caption="Inverse-Gamma circuit, per phase of the star equivalent.")]
-        ),
-        Section("The sheet's values", [Table(("", "on the sheet", "of the circuit", "unit", "off by"), met)]),
-        Section("T circuit at rated frequency", [Table(HEADER, circuits)]),
-        Section("Losses at rated load", [Table(HEADER, losses)]),
-        Section("What was assumed and what a sheet cannot tell", list(document["remarks"])),
+        Section("Parameters", Table(HEADER, rows, caption="Inverse-Gamma circuit, per phase of the star equivalent.")),
+        Section("The sheet's values", Table(("", "on the sheet", "of the circuit", "unit", "off by"), met)),
+        Section("T circuit at rated frequency", Table(HEADER, circuits)),
+        Section("Losses at rated load", Table(HEADER, losses)),
+        Section("What was assumed and what a sheet cannot tell", *document["remarks"]),
     ]
     headline = (
         "The circuit that meets the manufacturer's sheet"

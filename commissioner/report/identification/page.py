@@ -8,7 +8,6 @@ from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from commissioner.identify.analysis import Identification
@@ -50,16 +49,8 @@ class Recorded(Subject):
 
 
 def _sessions(stretches: Sequence[Any], batch: Any) -> Iterator[Session]:
-    """Where the current was not measured nothing is left over: such a stretch has no residual to draw."""
     for stretch, flux, residual in zip(stretches, batch.stator_flux_wb, batch.residuals, strict=True):
-        current = stretch.current_a
-        time = np.arange(current.size, dtype=np.float64) * np.float64(batch.sample_period_s)
-        yield Session(
-            time,
-            current,
-            flux if flux.size == current.size else None,
-            residual if residual.size == current.size else None,
-        )
+        yield Session.fitted(stretch.current_a, batch.sample_period_s, flux, residual)
 
 
 def identification_page(found: Identification, result: Mapping[str, Any], name: str) -> str:
@@ -129,16 +120,7 @@ def _rows(parameters: Record) -> Iterator[tuple[Text, ...]]:
 
 def _pictures(subject: Subject) -> Markup:
     """The same drawings as of a run; where there are no limits none is drawn."""
-    shown = subject.tests[: evidence.MOST_TESTS]
-    titles = [f"Test {test.number}, axis {test.axis_deg:g}°" for test in shown]
-    currents = evidence.panels_over_time(shown, "current_a", None, "", "Current along the axis")
-    fluxes = evidence.panels_over_time(shown, "stator_flux_wb", None, "", "Stator flux")
-    drawn = marks.multiples(zip(titles, currents, strict=True), 4) + marks.multiples((("", f) for f in fluxes), 4)
     caption = f"Filled: smallest to largest of each {1e3 * evidence.WINDOW_S:.0f} ms. Flux is that of the fitted model."
-    aside = "current along the axis in A (above), stator flux in Wb (below), over energised time"
-    beside = Markup('<div class="p3">{}{}{}</div>').format(
-        evidence.tests_apart(subject), evidence.leg_loss(subject), evidence.iron(subject)
-    )
-    parts = [Markup("<h2>The evidence</h2>"), marks.figure("What was measured", drawn, caption, aside=aside),
-             evidence.against_simulation(subject), beside]  # fmt: skip
+    measured = marks.figure("What was measured", evidence.over_time(subject), caption, aside=evidence.ABOVE_AND_BELOW)
+    parts = [Markup("<h2>The evidence</h2>"), measured, evidence.against_simulation(subject), evidence.beside(subject)]
     return Markup("\n").join(parts)

@@ -95,13 +95,11 @@ def _states(document: Mapping[str, Any]) -> list[Section]:
     return [
         Section(
             "What the motor did",
-            [
-                picture(
-                    band.strip(stretches),
-                    "The states of the recording, by its terminals. The answer is of the stretch that was used.",
-                ),
-                Table(("state", "from, to", "used"), rows),
-            ],
+            picture(
+                band.strip(stretches),
+                "The states of the recording, by its terminals. The answer is of the stretch that was used.",
+            ),
+            Table(("state", "from, to", "used"), rows),
         )
     ]
 
@@ -110,39 +108,37 @@ def _shaft(seen: Observation) -> Section:
     known = "" if seen.period.load_torque_nm is not None else f" Load torque: {why_no_load_torque(seen)}."
     return Section(
         "What the shaft does within the period",
-        [
-            picture(
-                figures.over_angle(seen),
-                "Speed, electromagnetic and load torque over shaft angle with two standard deviations." + known,
+        picture(
+            figures.over_angle(seen),
+            "Speed, electromagnetic and load torque over shaft angle with two standard deviations." + known,
+        ),
+        picture(
+            figures.polar(seen),
+            "The same around the shaft: distance from the centre is load torque (left) and speed (right).",
+        ),
+        Table(
+            (
+                "what repeats",
+                "frequency / Hz",
+                "of the shaft",
+                "speed ripple rms / (1/min)",
+                "harmonics",
+                "periods averaged",
+                "varies with",
             ),
-            picture(
-                figures.polar(seen),
-                "The same around the shaft: distance from the centre is load torque (left) and speed (right).",
-            ),
-            Table(
+            [
                 (
-                    "what repeats",
-                    "frequency / Hz",
-                    "of the shaft",
-                    "speed ripple rms / (1/min)",
-                    "harmonics",
-                    "periods averaged",
-                    "varies with",
-                ),
-                [
-                    (
-                        p.name,
-                        f"{p.frequency_hz:.5f} ± {p.frequency_std_hz:.5f}",
-                        f"{p.ratio_to_shaft:.4f}",
-                        f"{p.speed_ripple_rad_per_s * RPM:.3g}",
-                        str(p.harmonics),
-                        f"{p.periods_averaged:.0f}",
-                        p.follows,
-                    )
-                    for p in seen.load_periods
-                ],
-            ),
-        ],
+                    p.name,
+                    f"{p.frequency_hz:.5f} ± {p.frequency_std_hz:.5f}",
+                    f"{p.ratio_to_shaft:.4f}",
+                    f"{p.speed_ripple_rad_per_s * RPM:.3g}",
+                    str(p.harmonics),
+                    f"{p.periods_averaged:.0f}",
+                    p.follows,
+                )
+                for p in seen.load_periods
+            ],
+        ),
     )
 
 
@@ -160,33 +156,29 @@ def _proof(seen: Observation, document: Mapping[str, Any]) -> Section:
             f"Against the speed column of the recording (never an input): mean off by {r['mean_speed_relative_error']:+.4%}, "
             f"ripple off by {r['ripple_relative_error']:.1%} of its rms."
         )
-    return Section("Check: the current simulated at this speed against the measured one", parts)
+    return Section("Check: the current simulated at this speed against the measured one", *parts)
 
 
 def _spectrum(seen: Observation) -> Section:
     return Section(
         "What the currents show",
-        [
-            picture(
-                figures.spectrum(seen),
-                "Side bands of the current in the supply's frame, over their local floor, with the lines named. "
-                "Below: what is left after all named combs and mains harmonics are taken out.",
-            ),
-        ],
+        picture(
+            figures.spectrum(seen),
+            "Side bands of the current in the supply's frame, over their local floor, with the lines named. "
+            "Below: what is left after all named combs and mains harmonics are taken out.",
+        ),
     )
 
 
 def _pulses(pulses: Pulses) -> Section:
     return Section(
         "Torque pulses laid over each other",
-        [
-            picture(
-                figures.superimposed(pulses),
-                f"{pulses.per_turn} pulses a turn, normalised. Area between them: "
-                f"{pulses.dissimilarity.value:.2f} ± {pulses.dissimilarity.std:.2f} % of a pulse; difference of their areas: "
-                f"{pulses.area_difference.value:.2f} ± {pulses.area_difference.std:.2f} %.",
-            ),
-        ],
+        picture(
+            figures.superimposed(pulses),
+            f"{pulses.per_turn} pulses a turn, normalised. Area between them: "
+            f"{pulses.dissimilarity.value:.2f} ± {pulses.dissimilarity.std:.2f} % of a pulse; difference of their areas: "
+            f"{pulses.area_difference.value:.2f} ± {pulses.area_difference.std:.2f} %.",
+        ),
     )
 
 
@@ -209,14 +201,12 @@ def _trend(verdict: Verdict, history: History, indicators: Sequence[Indicator]) 
     )
     return Section(
         "Against this machine's past",
-        [
-            picture(
-                figures.trend(history, indicators, verdict),
-                "Healthy recordings, those judged since, and this one (last point), with two standard deviations of a recording. "
-                "Shaded: the range outside which an indicator alarms.",
-            ),
-            Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
-        ],
+        picture(
+            figures.trend(history, indicators, verdict),
+            "Healthy recordings, those judged since, and this one (last point), with two standard deviations of a recording. "
+            "Shaded: the range outside which an indicator alarms.",
+        ),
+        Table(("indicator", "now", "healthy", "standard deviations away", "threshold"), rows, tones, caption=note),
     )
 
 
@@ -224,17 +214,15 @@ def _motor(seen: Observation, document: Mapping[str, Any]) -> Section:
     parameters = document["parameters"]
     return Section(
         "The motor as it runs now",
-        [
-            Table(
-                ("parameter (inverse-Gamma circuit)", "value", "standard deviation"),
-                [
-                    (words, f"{factor * q['value']:.4g} {unit}", f"{q['std'] / q['value']:.1%}")
-                    for (key, q), (words, factor, unit) in zip(parameters.items(), _MOTOR, strict=True)
-                ],
-                caption=f"Fitted to this recording, started from: {seen.start.origin}.",
-            ),
-            document["cannot_be_fixed"]["sentence"],
-        ],
+        Table(
+            ("parameter (inverse-Gamma circuit)", "value", "standard deviation"),
+            [
+                (words, f"{factor * q['value']:.4g} {unit}", f"{q['std'] / q['value']:.1%}")
+                for (key, q), (words, factor, unit) in zip(parameters.items(), _MOTOR, strict=True)
+            ],
+            caption=f"Fitted to this recording, started from: {seen.start.origin}.",
+        ),
+        document["cannot_be_fixed"]["sentence"],
     )
 
 
@@ -244,11 +232,9 @@ def _audit(seen: Observation) -> Section:
     channels = "; ".join(f"{phase}: {channel}" for phase, channel in seen.audited.channel_map.items())
     return Section(
         "What was found in the recording",
-        [
-            Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
-            f"Channels as used: {channels}.",
-            f"Sensors are trusted to {trust.gain_std:.1%} in gain. The currents were found to lag the voltages by "
-            f"{1e6 * seen.fitted.delay_s:.0f} ± {1e6 * seen.fitted.delay_std_s:.0f} us of sensor delay (taken before: 0 ± "
-            f"{trust.skew_std_s * 1e6:.0f} us). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
-        ],
+        Table(("", "finding"), [(f.kind, f.what) for f in seen.findings], tones),
+        f"Channels as used: {channels}.",
+        f"Sensors are trusted to {trust.gain_std:.1%} in gain. The currents were found to lag the voltages by "
+        f"{1e6 * seen.fitted.delay_s:.0f} ± {1e6 * seen.fitted.delay_std_s:.0f} us of sensor delay (taken before: 0 ± "
+        f"{trust.skew_std_s * 1e6:.0f} us). Beyond what was corrected, channels may differ by {trust.asymmetry:.1%}.",
     )

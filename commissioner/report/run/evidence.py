@@ -21,6 +21,7 @@ WINDOW_S = 0.03
 """Of the envelope that stands for a line of many samples."""
 STRETCH_S = 0.25
 """Of the samples shown one by one."""
+ABOVE_AND_BELOW = "current along the axis in A (above), stator flux in Wb (below), over energised time"
 MOST_TESTS = 8
 """With panels of their own; more would leave the page."""
 
@@ -34,38 +35,43 @@ def evidence(subject: Subject) -> Markup:
         _limits_kept(subject),
         against_simulation(subject),
         _while_measuring(subject),
-        Markup('<div class="p3">{}{}{}</div>').format(tests_apart(subject), leg_loss(subject), iron(subject)),
+        beside(subject),
     ]
     return Markup("\n").join(parts)
 
 
 def _limits_kept(subject: Subject) -> Markup:
-    tests, trip, flux_limit = subject.tests[:MOST_TESTS], subject.trip_current_a, subject.guard.get("limit_wb")
-    currents = panels_over_time(
-        tests, "current_a", trip, f"limit {digits(trip, 3)} A" if trip else "", "Current along the axis"
-    )
-    fluxes = panels_over_time(
-        tests, "stator_flux_wb", flux_limit, f"limit {digits(flux_limit, 3)} Wb" if flux_limit else "", "Stator flux"
-    )
-    titles = [f"Test {test.number}, axis {test.axis_deg:g}°" for test in tests]
-    drawn = marks.multiples(zip(titles, currents, strict=True), 4) + marks.multiples((("", f) for f in fluxes), 4)
-    peak = subject.peak_flux_wb
+    peak, undrawn = subject.peak_flux_wb, len(subject.tests) - MOST_TESTS
     acted = "took the amplitude back" if subject.guard.get("acted") else "had no cause to act"
     caption = (
         "Each test: direct currents, tones, small tones on a direct current (test 1 looks first). Filled: smallest to largest of "
         f"each {1e3 * WINDOW_S:.0f} ms. Flux is that of the fitted model. "
         + (f"The highest of all energised samples is {digits(peak, 3)} Wb; the guard {acted}." if peak else "")
-        + (f" {len(subject.tests) - len(tests)} more tests are not drawn." if len(subject.tests) > len(tests) else "")
+        + (f" {undrawn} more tests are not drawn." if undrawn > 0 else "")
     )
-    return marks.figure(
-        "Limits kept",
-        drawn,
-        caption,
-        aside="current along the axis in A (above), stator flux in Wb (below), over energised time",
-    )
+    drawn = over_time(subject, subject.trip_current_a, subject.guard.get("limit_wb"))
+    return marks.figure("Limits kept", drawn, caption, aside=ABOVE_AND_BELOW)
 
 
-def panels_over_time(tests: Sequence[Test], what: str, limit: float | None, named: str, label: str) -> list[Markup]:
+def beside(subject: Subject) -> Markup:
+    """The three small figures that stand beside each other."""
+    return Markup('<div class="p3">{}{}{}</div>').format(tests_apart(subject), leg_loss(subject), iron(subject))
+
+
+def over_time(subject: Subject, trip: float | None = None, flux_limit: float | None = None) -> Markup:
+    """Currents above fluxes, a column each test, with their limits where there are any."""
+    tests = subject.tests[:MOST_TESTS]
+    currents = _panels_over_time(
+        tests, "current_a", trip, f"limit {digits(trip, 3)} A" if trip else "", "Current along the axis"
+    )
+    fluxes = _panels_over_time(
+        tests, "stator_flux_wb", flux_limit, f"limit {digits(flux_limit, 3)} Wb" if flux_limit else "", "Stator flux"
+    )
+    titles = [f"Test {test.number}, axis {test.axis_deg:g}°" for test in tests]
+    return marks.multiples(zip(titles, currents, strict=True), 4) + marks.multiples((("", f) for f in fluxes), 4)
+
+
+def _panels_over_time(tests: Sequence[Test], what: str, limit: float | None, named: str, label: str) -> list[Markup]:
     """One panel a test, all with one scale, the limit named in the first."""
     series = [test.joined(what) for test in tests]
     largest = max((float(np.max(np.abs(value))) for _, value in series if value.size), default=1.0)

@@ -34,6 +34,16 @@ class Session:
     stator_flux_wb: Signal | None
     residual_a: Signal | None
 
+    @classmethod
+    def fitted(cls, current: Signal, sample_period_s: float, flux: Signal, residual: Signal) -> Session:
+        """Where the current was not measured nothing is left over: such a stretch has no residual to draw."""
+        return cls(
+            np.arange(current.size, dtype=np.float64) * np.float64(sample_period_s),
+            current,
+            flux if flux.size == current.size else None,
+            residual if residual.size == current.size else None,
+        )
+
 
 @dataclass(frozen=True)
 class Gaps:
@@ -206,12 +216,7 @@ class Subject:
             fit = axis.batch
             mine, currents = currents[: len(fit.residuals)], currents[len(fit.residuals) :]
             sessions = tuple(
-                Session(
-                    np.arange(current.size, dtype=np.float64) * np.float64(fit.sample_period_s),
-                    current,
-                    flux if flux.size == current.size else None,
-                    residual if residual.size == current.size else None,
-                )
+                Session.fitted(current, fit.sample_period_s, flux, residual)
                 for current, flux, residual in zip(mine, fit.stator_flux_wb, fit.residuals, strict=False)
             )
             tests.append(Test(number, axis.axis_deg, sessions, fit.noise_a))

@@ -34,11 +34,11 @@ def page_of(seen: Identified, document: Document, name: str) -> Page:
         raster=True,
     )  # fmt: skip
     parts = [
-        Section("Parameters", [Table(("", "value", "95 % interval"), [row for row in rows if row])]),
-        Section("Measured against simulated", [drawn]),
+        Section("Parameters", Table(("", "value", "95 % interval"), [row for row in rows if row])),
+        Section("Measured against simulated", drawn),
     ]
     if document["remarks"]:
-        parts.append(Section("Remarks", list(document["remarks"])))
+        parts.append(Section("Remarks", *document["remarks"]))
     return Page(f"Identification of a running motor: {name}", document["reason"], "plain", facts, parts,
                 "± holds the true value in 19 of 20 cases. SI, per phase of the star equivalent.")  # fmt: skip
 

@@ -34,7 +34,8 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
     parts = [
         Section(
             "What it means",
-            [*meaning(document), *([Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else [])],
+            *meaning(document),
+            *([Table(("", "what to do"), rows, [tone(document)] * len(rows))] if rows else []),
         )
     ]
     if seen.found is not None:
@@ -45,7 +46,7 @@ def page_of(seen: Diagnosis, document: Mapping[str, Any], name: str) -> Page:
             _not_found(document),
             _parameters(document),
         ]
-    parts.append(Section("The data", [_excitation(document), *document["remarks"]]))
+    parts.append(Section("The data", _excitation(document), *document["remarks"]))
     return Page(f"Diagnosis of a running motor: {name}", headline(document), tone(document), _facts(document), parts,
                 "± holds the true value in 19 of 20 cases. Sizes are SI, per phase of the star equivalent.")  # fmt: skip
 
@@ -65,7 +66,7 @@ def _facts(document: Document) -> list[tuple[str, str]]:
 
 def _causes(document: Document) -> Section:
     if not document["causes"]:
-        return Section("Causes", ["No cause can be named."])
+        return Section("Causes", "No cause can be named.")
     rows, tones = [], list[Tone]()
     for c in document["causes"]:
         sizes = "; ".join(f"{spoken(k)} {quantity(v)}" for k, v in c["parameters"].items())
@@ -95,7 +96,7 @@ def _causes(document: Document) -> Section:
         f"{CATALOGUE[c['name']].title}: {CATALOGUE[c['name']].physics}. Source: {CATALOGUE[c['name']].source}."
         for c in document["causes"]
     ]
-    return Section("Causes", [Table(header, rows, tones), *notes])
+    return Section("Causes", Table(header, rows, tones), *notes)
 
 
 def _next(document: Document) -> list[Section]:
@@ -103,7 +104,7 @@ def _next(document: Document) -> list[Section]:
     if not plan:
         return []
     return [
-        Section("What to measure next", [f"{k}. {step}" for k, step in enumerate(plan["steps"], 1)] + [plan["command"]])
+        Section("What to measure next", *(f"{k}. {step}" for k, step in enumerate(plan["steps"], 1)), plan["command"])
     ]
 
 
@@ -113,18 +114,16 @@ def _where(seen: Diagnosis, document: Document) -> Section:
     states = ", ".join(f"{n} {number(v, 2)}" for n, v in document["left_by_state_over_noise"].items())
     return Section(
         "Where the simulation is wrong",
-        [
-            picture(
-                figures.over_each_other(found),
-                "Measured and simulated current over each other, and what each simulation leaves.",
-            ),
-            picture(figures.over_time(found), "What is left over the noise, every 20 ms; 1 is chance."),
-            picture(
-                figures.over_frequency(found),
-                "What is left over frequency, 0 dB is chance. Left half: negative sequence.",
-            ),
-            f"Left over the noise, by state: {states}." if states else "",
-        ],
+        picture(
+            figures.over_each_other(found),
+            "Measured and simulated current over each other, and what each simulation leaves.",
+        ),
+        picture(figures.over_time(found), "What is left over the noise, every 20 ms; 1 is chance."),
+        picture(
+            figures.over_frequency(found),
+            "What is left over frequency, 0 dB is chance. Left half: negative sequence.",
+        ),
+        f"Left over the noise, by state: {states}." if states else "",
     )
 
 
@@ -136,13 +135,11 @@ def _not_found(document: Document) -> Section:
     ]  # fmt: skip
     return Section(
         "Looked for and not found",
-        [
-            Table(
-                ("looked for", "smallest detectable", "where it would show"),
-                rows,
-                caption="Six standard deviations beside the named causes.",
-            )
-        ],
+        Table(
+            ("looked for", "smallest detectable", "where it would show"),
+            rows,
+            caption="Six standard deviations beside the named causes.",
+        ),
     )
 
 
@@ -157,7 +154,7 @@ def _parameters(document: Document) -> Section:
             ]
             rows.append((title, *values, f"{100 * (before['value'] / after['value'] - 1):+.2f} %"))
     return Section(
-        "The machine's numbers", [Table(("", "plain simulation", "with the causes", "plain one was off by"), rows)]
+        "The machine's numbers", Table(("", "plain simulation", "with the causes", "plain one was off by"), rows)
     )
 
 

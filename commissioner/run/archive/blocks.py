@@ -71,8 +71,7 @@ def read_blocks(path: Path, damage: list[BlockDamage] | None = None) -> Iterator
     A block behind a damaged one counts the samples that are missing before it. DataRefused: a whole frame holds no block.
     """
     data = path.read_bytes() if path.is_file() else b""
-    blocks, _ = whole_blocks(data, damage)
-    yield from blocks
+    yield from _walk(data, [] if damage is None else damage)
 
 
 def follow_blocks(path: Path, offset: int, most: int) -> tuple[list[Placed], int]:
@@ -88,11 +87,6 @@ def follow_blocks(path: Path, offset: int, most: int) -> tuple[list[Placed], int
         found.append(_decode(payload))
         at += _FRAME.size + len(payload)
     return found, offset + at
-
-
-def whole_blocks(data: bytes, damage: list[BlockDamage] | None = None) -> tuple[Iterator[Placed], int]:
-    """As `read_blocks`, of bytes; and how many bytes there are."""
-    return _walk(data, [] if damage is None else damage), len(data)
 
 
 def _walk(data: bytes, damage: list[BlockDamage]) -> Iterator[Placed]:

@@ -8,27 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from commissioner.errors import CommissionerError, UsageError
-from commissioner.run.archive.summary import (
-    OLD_OR_NEW,
-    RESTORED,
-    RunSummary,
-    read_summary,
-    sound_result,
-    summarise,
-    unreadable,
-)
-
-__all__ = [
-    "OLD_OR_NEW",
-    "RESTORED",
-    "RunSummary",
-    "find_folder",
-    "find_run",
-    "read_run",
-    "read_runs",
-    "run_folders",
-    "summarise",
-]
+from commissioner.run.archive.summary import RunSummary, read_summary, sound_result, summarise, unreadable
 
 
 def read_runs(root: Path, *, with_results: bool = True) -> list[RunSummary]:

@@ -27,18 +27,13 @@ from commissioner.procedure.assembly import assemble, columns
 from commissioner.recordings.table import write_table
 from commissioner.records import SampleBlock
 from commissioner.run.archive.blocks import append_frame, frame, read_blocks
-from commissioner.run.archive.documents import archive_lost, damaged, open_no_link, read_document, read_saved
+from commissioner.run.archive.documents import damaged, open_no_link
 from commissioner.run.archive.journal import Journal, read_journal
 from commissioner.run.archive.origin import machine_part, this_process
 from commissioner.run.archive.seal import CLOSED, covers, seal
 from commissioner.run.archive.summary import NAME as SUMMARY
 from commissioner.run.archive.summary import NOT_KEPT, summary_of
 from commissioner.run.index.index import note
-
-__all__ = [
-    "RunFolder", "archive_lost", "damaged", "read_blocks", "read_document", "read_journal", "read_saved",
-    "write_recording",
-]  # fmt: skip
 
 
 class RunFolder:

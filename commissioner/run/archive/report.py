@@ -15,10 +15,10 @@ from commissioner.report.page import with_notice, with_notices_of
 from commissioner.report.run.contract import RunDocument
 from commissioner.report.run.page import run_page
 from commissioner.report.run.summary import summarise
-from commissioner.run.archive.catalogue import RunSummary
-from commissioner.run.archive.folder import RunFolder, read_journal
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.replay import learn_again
-from commissioner.run.archive.summary import read_file
+from commissioner.run.archive.summary import RunSummary, read_file
 from commissioner.run.index.years import over_years
 
 

@@ -12,7 +12,7 @@ from commissioner.errors import DataRefused
 from commissioner.identify.estimate.axes import Combined
 from commissioner.identify.estimate.common_ground import Result
 from commissioner.motor.circuit import PARAMETERS, InverseGamma
-from commissioner.run.archive.catalogue import RunSummary
+from commissioner.run.archive.summary import RunSummary
 
 
 def has_result(run: RunSummary) -> bool:

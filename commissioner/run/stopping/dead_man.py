@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import Aborted
-from commissioner.run.archive.folder import read_document
+from commissioner.run.archive.documents import read_document
 from commissioner.run.stopping.operator_stop import OperatorStop
 
 BEAT_S, SILENCE_S = 0.5, 2.0

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from commissioner.run.archive.folder import read_document
+from commissioner.run.archive.documents import read_document
 from commissioner.run.stopping.operator_stop import OperatorStop
 
 NAME = "stop.json"

@@ -9,7 +9,8 @@ from typing import Any
 
 from commissioner.motor.nameplate import Nameplate
 from commissioner.procedure.tuned import Earlier
-from commissioner.run.archive.catalogue import RunSummary, read_runs
+from commissioner.run.archive.catalogue import read_runs
+from commissioner.run.archive.summary import RunSummary
 
 MOST = 10
 """The newest so many runs with a result of this plate."""

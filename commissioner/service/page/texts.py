@@ -132,11 +132,6 @@ def texts_of(connection: HTTPConnection) -> Texts:
     return Texts(next((w[:2].lower() for w in wanted if w[:2].lower() in LANGUAGES), "en"))
 
 
-def sentence(text: str) -> str:
-    """With its first letter as a sentence has it."""
-    return text[:1].upper() + text[1:]
-
-
 def typeset(text: str) -> str:
     """What the core writes for every console, as a page has it: signs, and no break before a unit."""
     for plain, sign in (("+-", "±"), ("sqrt(3)", "√3"), ("cos(phi)", "cos φ"), ("cos phi", "cos φ")):

@@ -9,7 +9,8 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from commissioner.service.page.texts import NBSP, Texts, sentence, typeset
+from commissioner.report.sheet.marks import capitalised
+from commissioner.service.page.texts import NBSP, Texts, typeset
 
 SCRIPT_TEXTS = (
     "TAKE THE MOTOR AS LIVE", "This page has lost the service. The motor was energised", "cannot be sent: use the emergency stop",
@@ -85,7 +86,7 @@ class Words:
 
     def check_name(self, name: str) -> str:
         """`rated_power_w in the drive` -> `Rated power in the drive`."""
-        return sentence(self._t.tell(_plain(name)))
+        return capitalised(self._t.tell(_plain(name)))
 
     def check_value(self, check: Mapping[str, Any]) -> str:
         """With its unit."""
@@ -110,7 +111,7 @@ class Words:
     def sentence(self, text: object) -> str:
         """A sentence of the core, with its first letter as a sentence has it; one without translation says its language."""
         plain = _named(str(text))
-        said = with_symbols(typeset(sentence(self._t.tell(plain))))
+        said = with_symbols(typeset(capitalised(self._t.tell(plain))))
         return said if not plain or self._t.knows(plain) else Markup('<span lang="en">{}</span>').format(said)
 
     def cause(self, name: str) -> str:

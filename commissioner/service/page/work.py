@@ -12,6 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
 
+from commissioner.report.sheet.marks import capitalised
 from commissioner.run.archive.verify import losses_at_sight
 from commissioner.service.access.accounts import Role
 from commissioner.service.access.visitors import parts_of
@@ -21,7 +22,7 @@ from commissioner.service.library import PLATE_FIELDS, SIMULATOR, Drive, Motor, 
 from commissioner.service.page.band import Place
 from commissioner.service.page.frame import View, enter, enter_form, go, refused, render
 from commissioner.service.page.hold import NOT_MEANT, is_meant, to_the_run
-from commissioner.service.page.texts import UNIT_SIGNS, Texts, sentence, texts_of, typeset
+from commissioner.service.page.texts import UNIT_SIGNS, Texts, texts_of, typeset
 from commissioner.service.page.tuning import call_of, tuned_page, tuning_of, tuning_page
 from commissioner.service.parts import Parts
 from commissioner.service.problems import Refusal
@@ -149,7 +150,7 @@ def _motor_page(
 def say_plate(judged: JudgedPlate, t: Texts) -> SaidPlate:
     """A judged plate in words: per field what is wrong and what to do, then what the whole plate means."""
     fields = {
-        key: "" if field["ok"] else typeset(f"{sentence(t.tell(field['what']))}: {t.tell(field['remedy'])}")
+        key: "" if field["ok"] else typeset(f"{capitalised(t.tell(field['what']))}: {t.tell(field['remedy'])}")
         for key, field in judged["fields"].items()
     }
     if judged["efficiency"] is None or judged["usual_efficiency"] is None:
@@ -341,19 +342,11 @@ async def run(request: Request, run: str) -> Response:
 
 
 @router.get("/runs/{run}/write-back")
-async def write_back(request: Request, run: str) -> Response:
-    return await _table(request, run, "write-back")
-
-
 @router.get("/runs/{run}/restore")
-async def restore(request: Request, run: str) -> Response:
-    return await _table(request, run, "restore")
-
-
-async def _table(request: Request, run: str, what: Act) -> Response:
+async def written_table(request: Request, run: str) -> Response:
     """Register, now, will be: the table is the question."""
     enter(request, Role.OPERATOR)
-    parts = parts_of(request)
+    parts, what = parts_of(request), _act_of(request)
     place = _place(parts, run)
     try:
         table = await plan(parts, run, what)
@@ -363,18 +356,11 @@ async def _table(request: Request, run: str, what: Act) -> Response:
 
 
 @router.post("/runs/{run}/write-back")
-async def do_write_back(request: Request, run: str) -> Response:
-    return await _act(request, run, "write-back")
-
-
 @router.post("/runs/{run}/restore")
-async def do_restore(request: Request, run: str) -> Response:
-    return await _act(request, run, "restore")
-
-
-async def _act(request: Request, run: str, what: Act) -> Response:
+async def write_table(request: Request, run: str) -> Response:
+    """It was agreed to."""
     who, fields = await enter_form(request)
-    parts = parts_of(request)
+    parts, what = parts_of(request), _act_of(request)
     place = _place(parts, run)
     try:
         done = await act(parts, run, what, fields.get("token", ""), who)
@@ -391,6 +377,10 @@ async def _act(request: Request, run: str, what: Act) -> Response:
         who_wrote=who.person,
         motor=str((parts.archive.request(run).get("origin") or {}).get("motor", "")),
     )
+
+
+def _act_of(request: Request) -> Act:
+    return "restore" if request.url.path.endswith("/restore") else "write-back"
 
 
 def _units(drive: Drive | None) -> dict[str, str]:

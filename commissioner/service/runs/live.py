@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import cast
+
 from commissioner.service.contract.live import LiveDocument, LiveTest, LiveTuning
 from commissioner.service.runs.state import AxisTest, OwnTuning, RunState
 
@@ -41,13 +44,7 @@ def _tuning(tuning: OwnTuning | None) -> LiveTuning | None:
 
 
 def _test(test: AxisTest) -> LiveTest:
-    return {
-        "axis_deg": test.axis_deg,
-        "state": test.state,
-        "energised_s": round(test.energised_s, 2),
-        "parameters": test.parameters,
-        "std": test.std,
-    }
+    return cast("LiveTest", asdict(test) | {"energised_s": round(test.energised_s, 2)})
 
 
 def _rounded(value: float | None) -> float | None:

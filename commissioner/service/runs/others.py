@@ -8,7 +8,7 @@ from pathlib import Path
 
 from commissioner.encoding import JsonObject
 from commissioner.errors import CommissionerError
-from commissioner.run.archive.folder import read_document
+from commissioner.run.archive.documents import read_document
 from commissioner.service.library import Drive, Library
 
 FRESH_S = 5.0

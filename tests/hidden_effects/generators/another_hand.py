@@ -1,5 +1,4 @@
 """Recordings by another hand: a T circuit in complex numbers with iron loss beside its magnetizing branch, stepped by its own
-
 Runge-Kutta, behind its own sensors. Shares nothing with `sim`, whose physics the rest of the protocol comes from.
 """
 
@@ -31,7 +30,6 @@ FEW = 5
 TONES_HZ = (0.67, 3.0, 11.0, 42.0, 123.0, 327.0)
 LAYERS = ((np.arange(8) + 0.5) * np.pi) ** 2
 """Poles of tanh(x) / x, over the time of diffusion: r_r times the bar's admittance is the sum of 2 / (pole + s bar_s); what lies
-
 beyond the eighth is a conductance alone.
 """
 SHARE = 0.07
@@ -55,7 +53,6 @@ class Machine:
     foot_wb: float = 0.2
     loop_a: float = 0.0
     """Half the width of the iron's loops at no flux, far from their ends: along an axis a Preisach model, whose relays are 2 h wide,
-
     h exponentially distributed about `loop_wb`, and fewer the further their middle is from no flux: 1 / cosh^2 of it over `meet_wb`,
     so that the branches of a loop meet in saturation; in the plane its plays are vectors, dragged along at a distance h.
     """
@@ -279,6 +276,7 @@ def _rates(
     v,
     loops,
     r_s,
+    omega,
     r_r,
     l_s,
     l_r,
@@ -294,10 +292,8 @@ def _rates(
     turn,
     bar,
     diffusion,
-    omega,
 ):
     """x: stator, rotor, magnetizing flux, flux of the shunted leakage, behind the lag, the two states of the filter, and the
-
     currents of the bar's layers.
     """
     own = (1.0 - bar) * l_r
@@ -375,6 +371,9 @@ def _simulated(
     memory = np.zeros(late + 1, dtype=np.complex128)
     out = np.zeros(n, dtype=np.complex128)
     lost = np.zeros(n)
+    constant = (
+        r_r, l_s, l_r, l_m, knee, foot, foot_wb, iron, leg_v, leg_a, legs, lag, turn, bar, diffusion,
+    )  # fmt: skip
     at = 0
     v = 0.0j
     load = drops = 0.0
@@ -385,122 +384,17 @@ def _simulated(
         lost[k] = sag * drops - ripple * math.cos(2.0 * math.pi * ripple_hz * (k + 0.5) * period)
         for step in range(fine):
             # the sample shows what was before the voltage stepped
-            k1, seen, drawn = _rates(
-                x,
-                v,
-                loops,
-                r_s,
-                r_r,
-                l_s,
-                l_r,
-                l_m,
-                knee,
-                foot,
-                foot_wb,
-                iron,
-                leg_v,
-                leg_a,
-                legs,
-                lag,
-                turn,
-                bar,
-                diffusion,
-                omega,
-            )
+            k1, seen, drawn = _rates(x, v, loops, r_s, omega, *constant)
             memory[at % (late + 1)] = seen
             if step == after:
                 out[k] = memory[(at - late) % (late + 1)] if at >= late else 0.0j
             if step == 0:
                 v = volts[k] * (1.0 - sag * drops + ripple * math.cos(2.0 * math.pi * ripple_hz * k * period))
-                k1, seen, drawn = _rates(
-                    x,
-                    v,
-                    loops,
-                    r_s,
-                    r_r,
-                    l_s,
-                    l_r,
-                    l_m,
-                    knee,
-                    foot,
-                    foot_wb,
-                    iron,
-                    leg_v,
-                    leg_a,
-                    legs,
-                    lag,
-                    turn,
-                    bar,
-                    diffusion,
-                    omega,
-                )
+                k1, seen, drawn = _rates(x, v, loops, r_s, omega, *constant)
             at += 1
-            k2, seen, drawn = _rates(
-                x + 0.5 * h * k1,
-                v,
-                loops,
-                r_s,
-                r_r,
-                l_s,
-                l_r,
-                l_m,
-                knee,
-                foot,
-                foot_wb,
-                iron,
-                leg_v,
-                leg_a,
-                legs,
-                lag,
-                turn,
-                bar,
-                diffusion,
-                omega,
-            )
-            k3, seen, drawn = _rates(
-                x + 0.5 * h * k2,
-                v,
-                loops,
-                r_s,
-                r_r,
-                l_s,
-                l_r,
-                l_m,
-                knee,
-                foot,
-                foot_wb,
-                iron,
-                leg_v,
-                leg_a,
-                legs,
-                lag,
-                turn,
-                bar,
-                diffusion,
-                omega,
-            )
-            k4, seen, drawn = _rates(
-                x + h * k3,
-                v,
-                loops,
-                r_s,
-                r_r,
-                l_s,
-                l_r,
-                l_m,
-                knee,
-                foot,
-                foot_wb,
-                iron,
-                leg_v,
-                leg_a,
-                legs,
-                lag,
-                turn,
-                bar,
-                diffusion,
-                omega,
-            )
+            k2, seen, drawn = _rates(x + 0.5 * h * k1, v, loops, r_s, omega, *constant)
+            k3, seen, drawn = _rates(x + 0.5 * h * k2, v, loops, r_s, omega, *constant)
+            k4, seen, drawn = _rates(x + h * k3, v, loops, r_s, omega, *constant)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             if loop_a > 0.0:
                 flux = x[2] if iron > 0.0 else _middle(x, (1.0 - bar) * l_r, l_s, l_m, knee, foot, foot_wb, loops)

@@ -1,5 +1,4 @@
 """Recordings at the level of the switches: every pulse of a centre-aligned modulator, a linear machine, a capacitor behind a resistor,
-
 and currents taken where the carrier turns, behind a filter or not. Shares nothing with `sim`, nor with the averages it steps.
 """
 

@@ -5,6 +5,7 @@ import struct
 import subprocess
 import sys
 import time
+from unittest.mock import Mock
 
 import pytest
 from pymodbus import exceptions as pymodbus_exceptions
@@ -269,11 +270,7 @@ def test_the_list_of_pymodbus_errors_is_complete():
 def test_every_pymodbus_error_becomes_one_of_ours(kind, monkeypatch):
     with TcpDevice(Bank()) as device:
         port = connect(device)
-
-        def fail(*_, **__):
-            raise kind("made by a test")
-
-        monkeypatch.setattr(port._client, "read_holding_registers", fail)
+        monkeypatch.setattr(port._client, "read_holding_registers", Mock(side_effect=kind("made by a test")))
         with pytest.raises(LinkError) as caught:
             port.read(100, 1)
         assert isinstance(caught.value.__cause__, kind)
@@ -285,11 +282,7 @@ def test_every_pymodbus_error_becomes_one_of_ours(kind, monkeypatch):
 def test_errors_that_pymodbus_lets_through_become_ours(kind, monkeypatch):
     with TcpDevice(Bank()) as device:
         port = connect(device)
-
-        def fail(*_, **__):
-            raise kind("made by a test")
-
-        monkeypatch.setattr(port._client, "read_holding_registers", fail)
+        monkeypatch.setattr(port._client, "read_holding_registers", Mock(side_effect=kind("made by a test")))
         with pytest.raises(LinkError):
             port.read(100, 1)
         port.close()

@@ -18,8 +18,10 @@ from commissioner.errors import CommissionerError
 from commissioner.procedure.assembly import assemble
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
+from commissioner.run.archive.blocks import read_blocks
 from commissioner.run.archive.catalogue import read_runs
-from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.journal import read_journal
 
 FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 PERIOD_S = 2e-4

@@ -157,20 +157,24 @@ def test_the_last_argument_hides_its_secret_and_an_option_without_one_hides_noth
     assert Secrets([]).hide("anything") == "anything"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
-    """The verb waits at the pipe that it was given for its input."""
-    os.mkfifo(tmp_path / "pipe")
+def waiting_verb(pipe):
+    """A verb that waits at the pipe that it was given for its input."""
+    os.mkfifo(pipe)
     script = COMMAND[-1].replace(
         "main()",
-        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()",
+        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda archive, **_: open(archive.runs).read(); main()",
     )
-    call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
+    call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(pipe), "--json"]
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
     try:
-        process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
+    process = waiting_verb(tmp_path / "pipe")
     with (tmp_path / "pipe").open("w"):  # opens once the verb reads, and wakes it when it closes
         process.send_signal(number)
     out, err = process.communicate(timeout=60)
@@ -180,17 +184,7 @@ def test_a_signal_ends_a_verb_with_four_and_one_document(tmp_path, number):
 
 def test_signals_until_the_process_has_ended_change_nothing(tmp_path):
     """Ctrl-C again and again, while the first is answered and while the interpreter ends."""
-    os.mkfifo(tmp_path / "pipe")
-    script = COMMAND[-1].replace(
-        "main()",
-        "import commissioner.cli.verbs.archived.runs as r; r.list_runs = lambda *a, **k: open(a[0]).read(); main()",
-    )
-    call = [*COMMAND[:-1], script, "runs", "list", "--runs", str(tmp_path / "pipe"), "--json"]
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    process = waiting_verb(tmp_path / "pipe")
     with (tmp_path / "pipe").open("w"):
         sent = 0
         while process.poll() is None:

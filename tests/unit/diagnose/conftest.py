@@ -46,6 +46,17 @@ def setting_of(model, **about):
     return Setting(record, layout, flux, record.facts.current_peak_a * model.nominal[2], model.nominal, lines)
 
 
+def currents(model, setting, segment=1):
+    return predict(model, setting.record, segment, setting.layout).currents_a
+
+
+def central_slope(model, setting, row, h, segment=1):
+    """d current / d theta[row] by a central difference."""
+    step = h * np.eye(model.theta.size)[row]
+    more, less = (currents(model.moved(model.theta + sign * step), setting, segment) for sign in (1.0, -1.0))
+    return (more - less) / (2.0 * h)
+
+
 @pytest.fixture(scope="session")
 def nominal():
     return Model(NOMINAL)

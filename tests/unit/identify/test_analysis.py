@@ -96,16 +96,16 @@ def test_the_document_is_json_with_the_contracts_keys():
     assert {"axis_deg", "parameters", "whiteness", "peak_rotor_flux_wb"} <= set(again["axes"][0])
 
 
+def of_rows(whole, keep):
+    columns = {name: column[keep] for name, column in vars(whole).items() if isinstance(column, np.ndarray)}
+    return dataclasses.replace(whole, **columns)
+
+
 def test_gaps_are_counted_and_leave_no_bias():
     whole = recording(seconds=8.0)
     keep = np.ones(whole.time_s.size, dtype=bool)
     keep[9000:9300] = keep[20000:20050] = False
-    columns = {
-        f.name: getattr(whole, f.name)[keep]
-        for f in dataclasses.fields(whole)
-        if isinstance(getattr(whole, f.name), np.ndarray)
-    }
-    result = identify(dataclasses.replace(whole, **columns))
+    result = identify(of_rows(whole, keep))
     assert (result.gaps, result.lost_samples) == (2, 350)
     assert np.all(np.abs(np.array(result.parameters.as_tuple()) - TRUTH) < 4.5 * np.array(result.std))
 
@@ -212,12 +212,7 @@ def test_time_in_other_units_and_a_recording_in_shreds_are_refused():
     good = recording()
     assert "sample period" in str(refused(changed(time_s=1e3 * good.time_s)))
     keep = np.arange(good.time_s.size) % 50 != 0
-    columns = {
-        f.name: getattr(good, f.name)[keep]
-        for f in dataclasses.fields(good)
-        if isinstance(getattr(good, f.name), np.ndarray)
-    }
-    assert "pieces" in str(refused(dataclasses.replace(good, **columns)))
+    assert "pieces" in str(refused(of_rows(good, keep)))
 
 
 def test_clipped_currents_are_refused_and_the_channel_named():

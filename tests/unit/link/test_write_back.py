@@ -15,29 +15,18 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.motor.circuit import InverseGamma
 from commissioner.settings import load_motor
-from tests.support.scripted_port import PARAMETERS, ScriptedDrive
+from tests.support.scripted_port import PARAMETERS
+from tests.unit.link.test_inverter import Bench as Wired
 
 PROFILE = load_profile("simulated")
 OLD = {"stator_resistance": 3.0, "rotor_resistance": 2.0, "leakage_inductance": 0.020, "magnetizing_inductance": 0.300}
 NEW = {"stator_resistance": 3.3, "rotor_resistance": 1.9, "leakage_inductance": 0.024, "magnetizing_inductance": 0.310}
 
 
-class Bench:
+class Bench(Wired):
     def __init__(self) -> None:
-        self.drive = ScriptedDrive()
-        self.now = 0.0
-        self.journal = []
-        self.inverter = Inverter(
-            self.drive,
-            PROFILE,
-            lambda i: self.journal.append((i.action, dict(i.values), len(self.drive.log))),
-            sleep=self.sleep,
-            clock=lambda: self.now,
-        )
+        super().__init__()
         self.snapshot = self.inverter.snapshot()
-
-    def sleep(self, seconds) -> None:
-        self.now += seconds
 
     def held(self, prefix="") -> dict:
         scale = {name: 1e-3 if "inductance" in name else 1.0 for name in PARAMETERS}

@@ -10,7 +10,7 @@ import pytest
 from commissioner.monitor.chain import Refused, Wishes, observe
 from commissioner.monitor.intake.audit import inspect
 from commissioner.monitor.intake.clock import whole_stretch
-from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.findings import Findings
 from commissioner.monitor.intake.levels import clipped_share
 from commissioner.motor.running import from_nameplate
 from commissioner.operations.recordings.stretches import in_its_states
@@ -275,7 +275,7 @@ def test_two_seconds_are_two_seconds_to_a_sample(samples: int, is_enough: bool) 
     period = 2e-3 * (1.0 - 1e-13)
     time = np.arange(samples) * period
     waves = tuple(np.cos(314.0 * time - 2.0 * k) for k in range(3))
-    findings: list[Finding] = []
+    findings = Findings()
     whole_stretch(RunningRecording(time, waves, waves, False, None, period), findings)
     assert ([f.code for f in findings] == []) == is_enough
     assert is_enough or "holds 1.98 s" in findings[0].what

@@ -18,9 +18,12 @@ from commissioner.operations.history.runs import Archive as RunFolders
 from commissioner.operations.history.runs import Wanted, find_runs, index_runs, show_run, write_runs
 from commissioner.recordings.table import read_table, to_standstill
 from commissioner.records import SampleBlock
-from commissioner.run.archive.catalogue import find_run, summarise
-from commissioner.run.archive.folder import RunFolder, read_blocks, read_journal, write_recording
+from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.catalogue import find_run
+from commissioner.run.archive.folder import RunFolder, write_recording
+from commissioner.run.archive.journal import read_journal
 from commissioner.run.archive.seal import read_key
+from commissioner.run.archive.summary import summarise
 from commissioner.service.archive import Archive
 from tests.support.archive.synthetic import MACHINE, make_run, result_of
 

@@ -13,8 +13,9 @@ from commissioner.link.drive.inverter import Inverter
 from commissioner.link.files.drive_file import load_profile
 from commissioner.records import SampleBlock
 from commissioner.run import restore as restoring
-from commissioner.run.archive.catalogue import summarise
-from commissioner.run.archive.folder import RunFolder, read_blocks
+from commissioner.run.archive.blocks import read_blocks
+from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.summary import summarise
 from commissioner.settings import load_motor
 from tests.support.archive.chained import rechain
 from tests.support.scripted_port import PARAMETERS, ScriptedDrive

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from commissioner.errors import UsageError
-from commissioner.run.archive.catalogue import summarise
 from commissioner.run.archive.folder import RunFolder
+from commissioner.run.archive.summary import summarise
 from commissioner.run.commission import commission
 from commissioner.run.restore import restore
 from commissioner.settings import load_motor, load_procedure

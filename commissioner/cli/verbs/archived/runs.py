@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from typing_extensions import TypedDict
@@ -10,23 +11,32 @@ from commissioner.cli.screens import screen
 from commissioner.encoding import JsonObject
 from commissioner.operations.history.runs import Archive, Wanted, find_runs, index_runs, write_runs
 from commissioner.operations.history.runs import show_run as look_up
-from commissioner.run.archive.catalogue import RunSummary
 from commissioner.run.archive.documents import Loss
+from commissioner.run.archive.summary import RunSummary
 
 SHOWN = 50
 """Rows of a list for a person, unless another number is given."""
 
 
-def list_runs(folder: Path, *, as_json: bool, wanted: Wanted | None = None, database: str | None = None) -> None:
+def find(archive: Archive, wanted: Wanted, limit: int | None, out: Path | None, *, as_json: bool) -> None:
+    """The runs that are wanted, on the screen or into the file `out`; `limit` None: all of them, of a list for a person `SHOWN`."""
+    most = limit if limit is not None else 0 if as_json or out else SHOWN
+    wanted = replace(wanted, limit=most)
+    if out is not None:
+        write_table(archive, out, as_json=as_json, wanted=wanted)
+    else:
+        list_runs(archive, as_json=as_json, wanted=wanted)
+
+
+def list_runs(archive: Archive, *, as_json: bool, wanted: Wanted) -> None:
     """The runs that are wanted, newest first."""
-    wanted = wanted or Wanted(limit=0 if as_json else SHOWN)
-    found = find_runs(Archive(folder, database), wanted)
+    found = find_runs(archive, wanted)
     if as_json:
         screen.emit_texts("runs", [row.document for row in found.rows], total=found.total)
         return
     if not found.rows:
         screen.out.print(
-            f"no runs in {screen.text(folder)}/" if wanted == Wanted(limit=wanted.limit) else "no such run"
+            f"no runs in {screen.text(archive.runs)}/" if wanted == Wanted(limit=wanted.limit) else "no such run"
         )
         return
     rows = [
@@ -39,9 +49,9 @@ def list_runs(folder: Path, *, as_json: bool, wanted: Wanted | None = None, data
         screen.out.print(f"[dim]{more} older ones: --limit 0 shows all, `commissioner runs find` looks for some[/]")
 
 
-def write_table(folder: Path, out: Path, *, as_json: bool, wanted: Wanted, database: str | None = None) -> None:
+def write_table(archive: Archive, out: Path, *, as_json: bool, wanted: Wanted) -> None:
     """The runs that are wanted as a file for a spreadsheet or a query."""
-    done = write_runs(Archive(folder, database), wanted, out)
+    done = write_runs(archive, wanted, out)
     if as_json:
         screen.emit(done)
     else:

@@ -43,7 +43,6 @@ RINGING, RINGS = (0.03, 0.1, 0.3, 1.0), 0.8
 
 class DcLinkSag(OfTheLink):
     """Relative loss of voltage at rated power through first-order lags of 0.3 to 100 ms (a dictionary). Their sum loses voltage; one
-
     alone may gain some: a choke before the capacitor makes a lag of second order, of which lags are a difference. What the motor gives
     back counts with its sign, or not at all, or is held behind diodes until it is drawn; or what is drawn and its root. Where the link
     was recorded, the part of its own swing that reaches the motor as well: 1 where the drive leaves it as it is.
@@ -86,7 +85,6 @@ class DcLinkSag(OfTheLink):
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """The sag at rated power; of a recorded link whose course the motor's own power hardly makes, the part that reaches the motor,
-
         where that is most of what is lost: in a link that is recorded coarsely the sag may be hidden.
         """
         if values.get(RECORDED_LINK):
@@ -131,7 +129,6 @@ class DcLinkSag(OfTheLink):
 
 def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float]:
     """Sag at rated power and time constant (s) of the one lag whose loss of voltage comes nearest to the sum of these, but for a
-
     constant: that only scales the four numbers, so that several lags in place of one between them have any sum. The lag is of second
     order where that leaves at most SECOND_ORDER_LEAVES of what a first one does, and no capacitor holds what is given back.
     """
@@ -155,7 +152,6 @@ def sagging(setting: Setting, values: Mapping[str, float]) -> tuple[float, float
 
 def _read(setting: Setting, values: Mapping[str, float]) -> tuple[Array, Array, list[Callable[..., Array]]]:
     """The course that the numbers make together, the command, and the courses of a unit sag behind one lag that it may be: of power with
-
     its sign, or where it is drawn; of both beside a recorded link, whose course the powers only mend: what they are made of says
     nothing of the source there.
     """
@@ -201,7 +197,6 @@ def _lagged_of(period_s: float, holds: bool, powers: Sequence[Array]) -> Callabl
 
 def _as_lags(courses: Mapping[str, Array], names: Iterable[str]) -> tuple[dict[str, float], float]:
     """The sum of the lagged powers among these names that comes nearest to the recorded link's course, and the share of its power
-
     that this leaves.
     """
     course, lags = courses[RECORDED_LINK], [n for n in names if n != RECORDED_LINK]
@@ -220,7 +215,6 @@ def _is_mostly_recorded(courses: Mapping[str, Array], values: Mapping[str, float
 
 def _courses(record: Record) -> dict[str, Array]:
     """By name, what a lagged power or the recorded link moves of the command, per unit and but for a constant part of it, at some
-
     instants of all segments.
     """
     some = [slice(None, None, max(s.count // SAG_SAMPLES, 1)) for s in record.segments]

@@ -13,7 +13,6 @@ from commissioner.diagnose.plant.model import Term
 
 class DeadTime(LegLoss):
     """v_x = v_x* - (1 + u_x) F(|i_x|) sign(i_x), F a spline over asinh(i) that rises from 0 to V_dt [V >= 0] and stays there, u_x what
-
     sets the leg apart from the mean of the three. Scales with link voltage times switching frequency where these differ between segments.
     """
 

@@ -16,7 +16,6 @@ MOST_UNEQUAL = 4.0
 """Of the mean of the three legs, by which one may differ: what a compensation leaves may have another sign in one of them."""
 LATEST_KNEE, LATEST_KNEE_OF_RATED, LATEST_KNEE_AT_SMALL_CURRENT = 0.2, 0.15, 0.6
 """Of the largest current, by which a leg has lost half of its voltage; or, up to that part of the largest, of the rated peak: there the
-
 switching's ripple ends in a test at small currents."""
 HALF = 0.5
 HARMLESS = (
@@ -82,7 +81,6 @@ def lost_by_a_leg(model: Model, layout: Layout, share: float) -> float:
 
 def tail_of_legs(model: Model, layout: Layout) -> tuple[float, float]:
     """Half of what a leg's loss rises by over the upper half of the currents at which it may bend, V, and the resistance, ohm, that this
-
     looks like: a law that goes on rising beyond cannot be told from R_s, and its form is nobody's knowledge.
     """
     rise = 0.5 * max(lost_by_a_leg(model, layout, 1.0) - lost_by_a_leg(model, layout, 0.5), 0.0)

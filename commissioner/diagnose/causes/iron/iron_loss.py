@@ -46,7 +46,6 @@ def at_no_load(facts: Facts) -> Procedure:
 
 class IronLoss(Cause):
     """Conductance g >= 0 [S] fed by the stator's induced voltage, and eddy paths g_k / (1 + s T_k) that lag behind it, with
-
     corners from 150 Hz to 1 kHz.
     """
 

@@ -17,7 +17,6 @@ CARRIED = Term("magnetic_hysteresis", "carried", "1", MEMORY, 0, 1.0, 0.0, 1.0, 
 
 class MagneticHysteresis(Cause):
     """Extra current sum h_k w_k z_k / r_k, h_k >= 0 [A], z_k memory operators of the iron flux (stops and exponential
-
     ones) with fixed scales r_k, some of them with a factor w_k that grows with the flux, or falls (`memory.loop_width`).
 
     `split` as with saturation.

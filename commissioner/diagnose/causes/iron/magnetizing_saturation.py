@@ -26,7 +26,6 @@ def in_table(x: Array, points: Points, scale: Mapping[str, float]) -> dict[str, 
 
 class MagnetizingSaturation(Cause):
     """Extra magnetizing current G(|psi|) psi, G(0) = 0, a cubic spline over the flux reached, rising beyond half of
-
     it (below, the permeability of steel may still grow: Rayleigh's foot).
     `split` moves the saturating flux between rotor (-0.5) and stator (+0.5) side of the leakage.
     """
@@ -69,7 +68,6 @@ class MagnetizingSaturation(Cause):
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:
         """Extra current against the iron at its most permeable (that of sheet at small flux is lower) where it is largest: at the
-
         largest flux, of iron that is only hard to magnetize at first below it.
         """
         layout = setting.layout

@@ -12,7 +12,6 @@ from commissioner.diagnose.plant.model import Term
 
 class RotorHeating(Warming):
     """R_R = R_R0 (1 + k integral i_R^2 / I_N^2 dt), k >= 0, relative rise per minute at rated current, with the leaks of the stator's;
-
     or in proportion to time, or settling; or anew in every segment.
     """
 

@@ -25,7 +25,6 @@ def has_several_frequencies(points: Points) -> bool:
 
 class RotorSkinEffect(Cause):
     """Rotor branches g_k / (1 + s T_k) beside 1/R_R, g_k >= 0 [S], corners from 12.5 to 800 Hz, two thirds of an octave apart, and closer
-
     where one acts. No branch carries more than a hundred times the motor's own conductance: a bar's resistance rises tenfold at most.
     """
 

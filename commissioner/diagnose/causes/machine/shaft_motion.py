@@ -16,7 +16,6 @@ from commissioner.diagnose.plant.model import Model, Term
 
 class ShaftMotion(Cause):
     """Electrical speed [rad/s] as a cubic spline over time, a knot every 0.4 s of each segment, or closer where the record has such
-
     splines; and where in the pause before a segment it carried the flux left from the segment before that.
     """
 

@@ -12,7 +12,6 @@ from commissioner.diagnose.plant.model import Term
 
 class StatorHeating(Warming):
     """R_x = R_s (1 + k integral i_x^2 / I_N^2 dt): relative rise per minute at rated current, k >= 0, each phase by its
-
     own current or by the mean of the three, without a leak and with leaks of 20 and 6 s, in proportion to time, and settling (a
     dictionary); or anew in every segment.
     """

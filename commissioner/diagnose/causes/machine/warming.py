@@ -19,13 +19,11 @@ LEAKING = ("settling", *(end for end in HEAT_LEAKS_S if end))
 """What names of courses end in that bend."""
 SHORTEST_LEAK_S, MOST_LEAKS, LEAKS_TRIED, HEAT_POINTS = 3.0, 300.0, 12, 100
 """Where the one leak is looked for that does what several do together (and how often the recording may last as long as its time
-
 constant), in how many steps, and on how many points of each segment."""
 
 
 def warming(setting: Setting, values: Mapping[str, float]) -> tuple[float, float]:
     """Rise at first (1/min at rated current) and leak (1/s) of the one course of heat that comes nearest to the sum of these but
-
     for a constant, which is part of the resistance: several leaks in place of one between them begin more steeply than it does.
     """
     at_work = {symbol: value for symbol, value in values.items() if value}

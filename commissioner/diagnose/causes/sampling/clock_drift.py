@@ -18,14 +18,12 @@ RESTARTS, RUNS_ON = ("drift", "wander_cos", "wander_sin"), ("running",)
 RATES = RESTARTS + RUNS_ON
 LEAST_INCONSTANT = 0.15
 """Of what an even drift's delay has that no constant one makes (0.05 to 0.25 of its power): lags and conductances that pass for a clock
-
 have 0.04 to 0.09 of it in whole recordings, clocks 0.9 and more.
 """
 
 
 class ClockDrift(Cause):
     """eps [ppm] from the start of each segment, and a rate that wanders; or from the start of the recording: a clock that runs
-
     on while the next segment is prepared.
     """
 

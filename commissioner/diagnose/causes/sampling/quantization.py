@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 COARSE_STEP_SHARE, COARSE_STEP_NOISE = 0.0018, 0.1
 """Named as a cause: steps beyond a share of the rated peak current (12 bits over 3.7 times that, either way) that make a hundredth of the
-
 noise power.
 """
 

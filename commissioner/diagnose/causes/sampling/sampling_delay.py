@@ -20,7 +20,6 @@ LATE = "Nothing to repair: one or two sampling periods are usual. A delay that i
 
 class SamplingDelay(Cause):
     """Reported current is i(t - tau), tau >= 0 [s], and a part that is added and taken off from sample to sample; tau < 0 only in
-
     exchange for a conductance and a cable that imitate it.
     """
 

@@ -34,7 +34,6 @@ def with_the_inverter_off(facts: Facts) -> Procedure:
 
 class SensorDrift(Cause):
     """Ramp [A/min] per phase, zero at the first sample, two more that settle within the recording (a warming sensor), and a
-
     swing once to and fro (a door that opens).
     """
 

@@ -54,7 +54,6 @@ def with_a_high_tone(facts: Facts) -> Procedure:
 
 class SensorLag(Cause):
     """Sum S >= 0 [s] of the time constants of 1 / (1 + s S + s² q S²) and its shape q: 0 one lag, 1/4 two equal ones, 1/2
-
     Butterworth's; of a current without ripple, or of one that ripples with the inverter's pulses (`ripple`). The size is the sum.
     """
 

@@ -8,6 +8,7 @@ import pytest
 from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
+from tests.unit.diagnose.conftest import central_slope, currents
 
 NAMES = [
     "dead_time",
@@ -40,17 +41,6 @@ NAMES = [
     "sensor_switch_on",
 ]
 FITTED = [n for n in NAMES if n not in ("device_drop", "quantization", "lost_samples")]
-
-
-def currents(model, setting, segment=1):
-    return predict(model, setting.record, segment, setting.layout).currents_a
-
-
-def central_slope(model, setting, row, h):
-    """d current / d theta[row] by a central difference."""
-    step = h * np.eye(model.theta.size)[row]
-    more, less = (currents(model.moved(model.theta + sign * step), setting) for sign in (1.0, -1.0))
-    return (more - less) / (2.0 * h)
 
 
 def extended(nominal, setting, name, theta):

@@ -34,7 +34,6 @@ def test_bounded_step_is_the_constrained_least_squares_solution(numbers: int, bo
 
 def test_many_numbers_that_the_data_do_not_tell_beside_some_with_bounds() -> None:
     """The angles of a shaft in segments of which a part is used: hundreds of numbers without a bound, most untold or nearly
-
     twins; a solver of all of them together broke off here.
     """
     random = np.random.default_rng(7)

@@ -7,6 +7,7 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.plant.ripple import Pulses
+from tests.unit.diagnose.conftest import central_slope
 
 LINK_V, PERIOD_S, L_SIGMA = 560.0, 2e-4, 0.02
 FINE = 4000
@@ -46,10 +47,5 @@ def test_derivatives_by_lag_and_shape_hold(setting, nominal):
     model = Model(nominal.nominal, tuple(terms), tuple(2.5e-5 if t.symbol == "rippled" else 0.1 for t in terms))
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
     for row in (2, 4, 5):
-        h = 1e-3 * np.eye(6)[row]
-        more, less = (
-            predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a
-            for sign in (1.0, -1.0)
-        )
-        slope = (more - less) / 2e-3
+        slope = central_slope(model, setting, row, 1e-3)
         assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) < 0.02 * np.sqrt(np.mean(slope**2))

@@ -8,7 +8,7 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
 from commissioner.diagnose.plant.resample import step_shown
-from tests.unit.diagnose.conftest import NOMINAL, PERIOD_S
+from tests.unit.diagnose.conftest import NOMINAL, PERIOD_S, central_slope
 
 FINE = 100
 CONDUCTANCE_S = 3e-3
@@ -68,11 +68,7 @@ def test_the_sensitivity_to_iron_loss_holds_behind_a_late_lag(nominal, setting):
     jacobian = predict(model, setting.record, 0, setting.layout, wanted=terms).jacobian
     for symbol in ("conductance", "lag", "shape", "delay"):
         row = 4 + next(k for k, t in enumerate(terms) if t.symbol == symbol)
-        h = 1e-2 * np.eye(model.theta.size)[row]
-        more, less = (
-            predict(model.moved(model.theta + x), setting.record, 0, setting.layout).currents_a for x in (h, -h)
-        )
-        slope = (more - less) / 2e-2
+        slope = central_slope(model, setting, row, 1e-2, segment=0)
         assert np.abs(jacobian[row] - slope).max() < 0.03 * np.abs(slope).max(), symbol
 
 

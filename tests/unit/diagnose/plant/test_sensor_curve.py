@@ -7,6 +7,7 @@ from commissioner.diagnose.causes import CATALOGUE
 from commissioner.diagnose.plant import sensor_curve
 from commissioner.diagnose.plant.model import Model
 from commissioner.diagnose.plant.prediction import predict
+from tests.unit.diagnose.conftest import central_slope
 
 SENSOR = CATALOGUE["sensor_nonlinearity"]
 
@@ -37,12 +38,7 @@ def test_sensitivities_of_bends_hold_on_a_bent_curve(nominal, setting):
     model = Model(nominal.nominal, terms, tuple(0.01 * (k % 3 - 1) for k in range(len(terms))))
     jacobian = predict(model, setting.record, 1, setting.layout, wanted=terms).jacobian
     for row in (0, 2, *range(4, 4 + len(terms), 5)):
-        h = 1e-3 * np.eye(4 + len(terms))[row]
-        more, less = (
-            predict(model.moved(model.theta + sign * h), setting.record, 1, setting.layout).currents_a
-            for sign in (1.0, -1.0)
-        )
-        slope = (more - less) / 2e-3
+        slope = central_slope(model, setting, row, 1e-3)
         assert np.sqrt(np.mean((jacobian[row] - slope) ** 2)) < 0.01 * np.sqrt(np.mean(slope**2))
 
 
