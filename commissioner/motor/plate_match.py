@@ -203,16 +203,29 @@ def contradiction(seen: OperatingPoint, plate: Nameplate) -> Contradiction | Non
     """Whether the data's currents and powers are the plate's at this point; None where they are."""
     said = plate_point(plate, seen)
     factor = _factor(seen, said)
-    if factor is None or SCALE[0] <= factor <= SCALE[1]:
+    if factor is None and seen.power_w * said.power_w < 0.0 and abs(seen.power_w - said.power_w) > plate.rated_power_w:
+        factor, likely, given = seen.current_a / said.current_a, None, _opposite(seen, said)
+    elif factor is None or SCALE[0] <= factor <= SCALE[1]:
         return None
-    likely, why = _usual(factor)
+    else:
+        likely, why = _usual(factor)
+        given = f"give {_times(seen, said, factor)}{why}"
     return Contradiction(
         f"the data do not belong to this plate: at {seen.voltage_v * math.sqrt(3.0):.4g} V, {seen.frequency_hz:.4g} Hz and a slip "
-        f"of {seen.slip:.3g} they give {_times(seen, said, factor)}{why}",
+        f"of {seen.slip:.3g} they {given}",
         seen.current_a, said.current_a, "A", factor, likely, f"{SCALE[0]:g} ... {SCALE[1]:g} times the plate's",
         "check the current sensors' scale (and the voltages'), and that the plate is this motor's, in its connection, with its "
         "frequency and pole pairs; say which is right by --trust plate or --trust data",
     )  # fmt: skip
+
+
+def _opposite(seen: OperatingPoint, said: OperatingPoint) -> str:
+    """Power that flows the other way than this slip lets it: by more than the rated one, which no loss makes up for."""
+    way = {True: "takes", False: "gives back"}
+    return (
+        f"show {seen.power_w:.4g} W, where the plate's machine {way[said.power_w > 0.0]} {abs(said.power_w):.4g} W "
+        "(a wrong scale makes channels look crossed)"
+    )
 
 
 def doubt(seen: OperatingPoint, plate: Nameplate) -> str:
@@ -227,7 +240,7 @@ def doubt(seen: OperatingPoint, plate: Nameplate) -> str:
 
 
 def _factor(seen: OperatingPoint, said: OperatingPoint) -> float | None:
-    """Geometric mean of current, active and reactive power over the plate's; None where one of them is not positive."""
+    """Geometric mean of current, active and reactive power over the plate's; None where one of them has another sign."""
     ratios = _ratios(seen, said)
     return None if ratios is None else math.prod(ratios) ** (1.0 / 3.0)
 
@@ -235,7 +248,7 @@ def _factor(seen: OperatingPoint, said: OperatingPoint) -> float | None:
 def _ratios(seen: OperatingPoint, said: OperatingPoint) -> tuple[float, float, float] | None:
     """Current, active and reactive power over the plate's."""
     pairs = ((seen.current_a, said.current_a), (seen.power_w, said.power_w), (seen.reactive_var, said.reactive_var))
-    if any(not (a > 0.0 and b > 0.0) for a, b in pairs):
+    if any(not a * b > 0.0 for a, b in pairs):
         return None
     current, active, reactive = (a / b for a, b in pairs)
     return current, active, reactive

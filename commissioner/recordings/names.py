@@ -96,6 +96,27 @@ TIME = frozenset(
 SPEED = frozenset({"speed", "speedradpers", "wm", "omegam", "shaftspeed", "rotorspeed"})
 SPEED_PER_MINUTE = frozenset({"drehzahl", "n", "rpm", "speedrpm", "nrpm"})
 """Without a unit of its own such a column is in 1/min."""
+AXIS = frozenset({"axis", "achse", "axe", "eje", "asse"})
+SEGMENT = frozenset({"segment", "seg", "segmento", "abschnitt"})
+BESIDE = FILLING | {
+    "angle",
+    "winkel",
+    "angulo",
+    "angolo",
+    "test",
+    "along",
+    "command",
+    "commanded",
+    "no",
+    "nr",
+    "number",
+}
+"""What else the names of a standstill test's columns say."""
+WHOLE_NAMES = {
+    "achswinkel": "axis_deg", "achsenwinkel": "axis_deg", "achsspannung": "voltage_axis_v", "achsenspannung": "voltage_axis_v",
+    "vdc": "dc_link_v", "udc": "dc_link_v", "dclink": "dc_link_v", "dclinkvoltage": "dc_link_v", "dcbus": "dc_link_v",
+    "dcbusvoltage": "dc_link_v", "zwischenkreisspannung": "dc_link_v",
+}  # fmt: skip
 CONTRACT = re.compile(r"time_s|current_[uvw]_a|voltage_(?:u|v|w|uv|vw|wu)_v|speed_rad_per_s")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]")
 _PHASE = re.compile(r"l?([abcuvwrst123])(?:n|0)?")
@@ -224,6 +245,8 @@ def _meaning(bare: str, with_s: bool) -> str | None:
         return "time_s"
     if key in SPEED | SPEED_PER_MINUTE:
         return "speed_rad_per_s"
+    if at_rest := WHOLE_NAMES.get(key) or _at_rest({word for word in words if word not in BESIDE}):
+        return at_rest
     if stator := _STATOR.fullmatch(key):
         return _column(stator[1], stator[2] or stator[3])
     words = [word for word in words if word not in FILLING]
@@ -241,6 +264,16 @@ def _meaning(bare: str, with_s: bool) -> str | None:
     if short and (with_s or short.group(0) not in {"is", "us", "vs"}) and (with_s or short.group(0) != "it"):
         return _column(short.group(1), short.group(2))
     return None
+
+
+def _at_rest(words: set[str]) -> str | None:
+    """The column of a standstill test that these words mean together: the axis, the voltage along it, the segment."""
+    others = words - AXIS
+    if not words & AXIS:
+        return "segment" if len(words) == 1 and words <= SEGMENT else None
+    if not others:
+        return "axis_deg"
+    return "voltage_axis_v" if all(re.fullmatch(VOLTAGE, word) for word in others) else None
 
 
 def _column(kind: str, phase: str) -> str | None:

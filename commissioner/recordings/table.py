@@ -22,7 +22,7 @@ import pyarrow.parquet as pa_parquet
 from numpy.typing import NDArray
 
 from commissioner.errors import DataRefused, UsageError
-from commissioner.motor.computed import COMPUTED, without_computed_third
+from commissioner.motor.computed import COMPUTED, printed_step, without_computed_third
 from commissioner.paths import no_file
 from commissioner.recordings.bounds import MAX_BYTES, MAX_COLUMNS, bounded_text, numeric_columns, too_large
 from commissioner.recordings.reading.arrow import arrow_owned
@@ -43,8 +43,8 @@ MAX_METADATA_LINES = 1000
 MOST_AVERAGED = 1000
 KEY_AND_VALUE = re.compile(r"([^:=]+)[:=](.*)")
 """Of a comment; `=` is not what we write, yet a value written so must not be lost without a word."""
-STEP_TOLERANCE, MOST_ROUNDED = 0.02, 0.1
-"""Of a period, by which time steps may differ; and by how much more at most where the time stamps are rounded."""
+STEP_TOLERANCE, MOST_ROUNDED, COARSEST_S = 0.02, 0.1, 1e-3
+"""Of a period, by which time steps may differ; by how much more at most where the time stamps are rounded, and to what at the coarsest."""
 
 TEXT_KEYS = frozenset(
     {"connection", "name", "drive", "source", "note", "motor", "scenario", "run", "kind", "resistance_measured"}
@@ -327,16 +327,15 @@ def sample_period(table: Table, segment: Signal) -> float:
     period = float(named) if named not in (None, "") else _mean_step(steps)
     multiple = steps / period
     deviation = np.abs(multiple - np.maximum(np.round(multiple), 1.0))
-    worst = int(np.argmax(deviation))
-    tolerance = STEP_TOLERANCE
-    if deviation[worst] > tolerance:
-        tolerance += min(_resolution(time) / period, MOST_ROUNDED)
-    if deviation[worst] > tolerance:
+    printed = printed_step(time)[1:][np.diff(segment) == 0]
+    tolerance = STEP_TOLERANCE + np.minimum(np.minimum(printed, COARSEST_S) / period, MOST_ROUNDED)
+    worst = int(np.argmax(deviation - tolerance))
+    if deviation[worst] > tolerance[worst]:
         raise _refuse(
             table.source,
             "the time steps are not equal",
             float(steps[worst]),
-            f"multiples of {period:.6g} s within {tolerance:.0%}",
+            f"multiples of {period:.6g} s within {tolerance[worst]:.0%}",
             "record at a fixed rate, or resample with known time stamps",
         )
     return period
@@ -345,12 +344,6 @@ def sample_period(table: Table, segment: Signal) -> float:
 def _mean_step(steps: Signal) -> float:
     """Of those over one period: time stamps are rounded, and the median is one of two values beside it."""
     return float(np.mean(steps[np.round(steps / np.median(steps)) <= 1.0]))
-
-
-def _resolution(time: Signal) -> float:
-    """Of time stamps, s: of the last decimal that they are written with, or of the number that holds them."""
-    decimals = (10.0**-d for d in range(3, 10) if np.all(np.abs(time / 10.0**-d - np.round(time / 10.0**-d)) < 1e-3))
-    return max(next(decimals, 0.0), float(np.spacing(np.abs(time).max())))
 
 
 def _read_parquet(path: Path) -> Table:

@@ -22,6 +22,7 @@ WHOLE = {
     "u/min": ("speed", math.pi / 30), "tr/min": ("speed", math.pi / 30), "giri/min": ("speed", math.pi / 30), "min⁻¹": ("speed", math.pi / 30), "min^-1": ("speed", math.pi / 30),
     "min": ("time", 60.0), "minutes": ("time", 60.0), "h": ("time", 3600.0), "deg": ("angle", 1.0),
     "°": ("angle", 1.0), "degree": ("angle", 1.0), "degrees": ("angle", 1.0),
+    "grad": ("angle", 1.0), "grados": ("angle", 1.0), "gradi": ("angle", 1.0), "degrés": ("angle", 1.0), "rad": ("angle", 180.0 / math.pi),
     "n·m": ("torque", 1.0), "n m": ("torque", 1.0), "秒": ("time", 1.0), "毫秒": ("time", 1e-3),
     "微秒": ("time", 1e-6), "安": ("current", 1.0), "毫安": ("current", 1e-3), "伏": ("voltage", 1.0),
     "с": ("time", 1.0), "мс": ("time", 1e-3), "мкс": ("time", 1e-6), "а": ("current", 1.0), "ма": ("current", 1e-3),

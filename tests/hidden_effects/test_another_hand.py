@@ -25,6 +25,13 @@ def named(is_short):
     return made
 
 
+def test_two_sensors_of_unequal_gain_are_named_on_one_axis_and_equal_ones_are_not():
+    for gain, names in ((1.02, ["sensor_gain_mismatch"]), (1.0, [])):
+        seen = diagnose([replace(recorded(Machine(gains=(1.0, gain, 1.0)), 1.0, count=1), current_w_a=None)])
+        assert [c.name for c in seen.causes] == names, seen.reason
+        assert all(c.sizes["gain_v_over_u"][0] == pytest.approx(0.02, abs=1e-3) for c in seen.causes)
+
+
 def long(*values):
     return pytest.param(*values, marks=pytest.mark.campaign)
 

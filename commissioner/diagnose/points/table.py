@@ -13,7 +13,7 @@ from commissioner.diagnose.intake.points import Array, Points
 from commissioner.diagnose.intake.refusal import refused
 from commissioner.diagnose.points.resistance import column_of, star_resistance, unread_columns
 from commissioner.errors import DataRefused
-from commissioner.records import POINT_COLUMNS
+from commissioner.records import POINT_COLUMNS, POINT_FORMS
 
 LEAST_POINTS, MOST_POINTS = 5, 300
 LEAST_SPREAD, LEAST_FLUX_SPREAD = 1.3, 1.15
@@ -25,8 +25,11 @@ NO_LOAD_SLOPE = -0.5
 
 
 def is_points_table(columns: Sequence[str]) -> bool:
-    """Whether the names are meant to be a points table's: most of what one needs, and no time."""
-    return "time_s" not in columns and sum(name in columns for name in POINT_COLUMNS) >= 2
+    """Whether the names are meant to be a points table's: most of what one needs, or a test or other meters' forms of it, and no time."""
+    beside = ("test", *POINT_FORMS) if "frequency_hz" in columns else ()
+    return "time_s" not in columns and (
+        sum(name in columns for name in POINT_COLUMNS) >= 2 or any(name in columns for name in beside)
+    )
 
 
 def lacking(columns: Mapping[str, Array], needed: Sequence[str] = POINT_COLUMNS) -> DataRefused | None:

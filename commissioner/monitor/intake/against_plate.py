@@ -45,12 +45,12 @@ def doubt_of(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> Find
 
 
 def _point(audited: Audited, shaft_hz: float | None, plate: Nameplate) -> OperatingPoint | None:
-    """What was measured at the shaft's slip; None where the shaft, or a slip of a motor, is not seen."""
+    """What was measured at the shaft's slip; None where the shaft, or a slip of a machine that works, is not seen."""
     seen = audited.fundamental
     if seen is None or shaft_hz is None:
         return None
     slip = 1.0 - plate.pole_pairs * shaft_hz / seen.frequency_hz
-    if not 0.0 < slip < 0.5:
+    if slip == 0.0 or abs(slip) >= 0.5:
         return None
     return OperatingPoint(
         abs(seen.voltage_v) / math.sqrt(2.0), seen.frequency_hz, slip, abs(seen.current_a) / math.sqrt(2.0), seen.power_w,

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from commissioner.monitor.intake.findings import Findings, Fundamental
 from commissioner.monitor.signals.supply import SupplyAngle, Vector
+from commissioner.motor.computed import printed_step
 from commissioner.motor.nameplate import Nameplate
 from commissioner.records import RunningRecording, Signal
 
@@ -153,17 +154,8 @@ def _straight(time: Signal) -> tuple[float, Signal]:
 def _is_printed_line(time: Signal) -> bool:
     """True where the stamps leave a straight line by no more than the digits in which they were printed."""
     slope, deviation = _straight(time)
-    quantum = _printed_step(time) / slope
-    return bool(quantum < 2.0 and np.ptp(deviation) <= 1.02 * quantum + 1e-6)
-
-
-def _printed_step(time: Signal) -> float:
-    """The decimal step in which the stamps were printed, 0 where there is none of 0.1 us or coarser."""
-    sample = time[:500]
-    for digits in range(1, 8):
-        if np.all(np.abs(sample - np.round(sample, digits)) < 1e-9):
-            return float(10.0**-digits)
-    return 0.0
+    quantum = float(printed_step(time).max()) / slope
+    return bool(quantum < 2.0 and np.ptp(deviation) <= 1.1 * quantum + 1e-6)
 
 
 def hidden_jitter(v: Vector, supply: SupplyAngle, fundamental: Fundamental, period: float, findings: Findings) -> None:

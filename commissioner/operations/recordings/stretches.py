@@ -9,6 +9,7 @@ from commissioner.monitor.chain import Observation, Refused, Wishes, observe
 from commissioner.monitor.contract import State
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.findings import Finding
+from commissioner.monitor.intake.levels import LARGEST_CURRENT, LEAST_CURRENT
 from commissioner.monitor.intake.states.stretches import Stretch, cut_out, states
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.monitor.partial import Partial, of_terminals, refused_audit
@@ -37,12 +38,11 @@ def in_its_states(
         return seen, recording, [as_state(s, used=s.state == "steady") for s in stretches]
     steady = [s for s in stretches if s.state == "steady" and s.duration_s > 3.0 * MARGIN_S]
     if not steady:
-        said = ", ".join(f"{s.state} {s.start_s:.3g} ... {s.end_s:.3g} s" for s in stretches)
-        finding = Finding(
-            "no_steady_stretch", "refused", "the motor is never in a steady state", said, "a steady stretch of a second",
-            "record longer at constant supply and load",
-        )  # fmt: skip
-        return _not_watched(recording, finding), recording, [as_state(s, used=False) for s in stretches]
+        return (
+            _not_watched(recording, _never_steady(stretches, plate)),
+            recording,
+            [as_state(s, used=False) for s in stretches],
+        )
     longest = max(steady, key=lambda s: s.duration_s)
     part = cut_out(recording, longest, MARGIN_S)
     note = ReadingNote(
@@ -54,6 +54,20 @@ def in_its_states(
         if stretch in steady:
             _add_own(state, recording, stretch, plate, wishes, is_watched=stretch is longest)
     return seen, part, out
+
+
+def _never_steady(stretches: tuple[Stretch, ...], plate: Nameplate) -> Finding:
+    """A current that is a start's all along may as well be another unit's."""
+    if {s.state for s in stretches} == {"start"}:
+        share = stretches[-1].current_a / plate.rated_current_a
+        return Finding(
+            "current_level", "refused", f"the currents are {share:.3g} times the rated one all along", share, f"{LEAST_CURRENT:g} ... {LARGEST_CURRENT:g}",
+            "give the currents in ampere (probe factor, mA?), or correct the plate; of a motor that starts so long, record until it runs",
+        )  # fmt: skip
+    return Finding(
+        "no_steady_stretch", "refused", "the motor is never in a steady state", _listed(stretches), "a steady stretch of a second",
+        "record longer at constant supply and load",
+    )  # fmt: skip
 
 
 def _add_own(

@@ -128,10 +128,8 @@ def _are_numbers(rows: Sequence[Row]) -> bool:
 
 
 def _with_text(rows: Sequence[Row]) -> bool:
-    """Rows of numbers with a column of texts among them (a date, a state, a test's name), the same in all: two at least, where
-    the file ends with them."""
-    if len(rows) < HEAD_ROWS - 1:
-        return False
+    """Rows of numbers with a column of texts among them (a date, a state, a test's name), the same in all; fewer where the file
+    ends with them."""
     kinds = [tuple(is_numeric(c) for c in r) for r in rows]
     numbers = sum(kinds[0])
     filled = max(sum(1 for c in r if is_number(c)) for r in rows)

@@ -11,6 +11,8 @@ from commissioner.report.sheet.numbers import QUANTILE
 from commissioner.running.causes import CATALOGUE
 
 Document = Mapping[str, Any]
+LEAST_SHARE = 5e-4
+"""Of the simulation's error: less is printed as none, and is none that matters."""
 UNITS = {"us": "µs", "ohm": "Ω"}
 
 
@@ -71,6 +73,9 @@ def headline(document: Document) -> str:
     share = document["gain"]["held_out"]
     share = document["gain"]["explained_share"] if share is None else share
     others = f" With {len(causes) - 1} lesser cause{'s' if len(causes) > 2 else ''} it" if len(causes) > 1 else " It"
+    if share < LEAST_SHARE:
+        strength = causes[0]["strength_over_noise"]
+        return f"{sentence(causes[0])}.{others} is too small to matter: {strength:.2g} of the noise, beyond which the plain simulation leaves nothing."
     return f"{sentence(causes[0])}.{others} explains {100.0 * max(share, 0.0):.1f} % of the simulation's error."
 
 

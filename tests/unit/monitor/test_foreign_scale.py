@@ -112,3 +112,14 @@ def test_the_factor_of_a_lightly_loaded_motor_is_that_of_its_currents(order: tup
     assert isinstance(seen, Refused) and seen.reason.code == "plate_contradiction"
     assert "2.01 times in the geometric mean (a probe, a turns or a terminal factor?)" in seen.reason.what
     assert ("crossed_channels" in {f.code for f in seen.findings}) == is_crossed
+
+
+def test_power_against_the_slip_is_no_machine_of_the_plate_and_a_generator_is() -> None:
+    """Channels taken as crossed, of currents twice as large: driven above its speed by the slip, and taking power."""
+    at = OperatingPoint(VOLTS / math.sqrt(2.0), PLATE.rated_frequency_hz, -0.13, 0.0, 0.0, 0.0)
+    generator = plate_point(PLATE, at)
+    found = contradiction(replace(generator, power_w=PLATE.rated_power_w), PLATE)
+    assert found is not None and "gives back" in found.what and f"{-generator.power_w:.4g} W" in found.what
+    assert contradiction(generator, PLATE) is None
+    idling = plate_point(PLATE, replace(at, slip=-0.01 * PLATE.rated_slip))
+    assert contradiction(replace(idling, power_w=0.1 * PLATE.rated_power_w), PLATE) is None

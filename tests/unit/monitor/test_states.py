@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commissioner.monitor.chain import Wishes
 from commissioner.monitor.intake.carrier import means_over_carrier
 from commissioner.monitor.intake.states.naming import named
 from commissioner.monitor.intake.states.stretches import cut_out, states
 from commissioner.monitor.intake.states.windows import Levels
 from commissioner.monitor.intake.terminals import from_terminals
 from commissioner.motor.nameplate import Nameplate
-from commissioner.operations.recordings.stretches import as_state
+from commissioner.operations.recordings.stretches import as_state, in_its_states
 from commissioner.recordings.importers import read_running
 from commissioner.recordings.plate import plate_of
 from commissioner.records import RunningRecording
@@ -179,3 +180,23 @@ def test_one_steady_state_says_its_own_current_and_frequency(plate, has_volts):
     assert (state["state"], state["used"]) == ("steady", True)
     assert state["current_a"] == pytest.approx(3.2, rel=1e-3)
     assert state["frequency_hz"] == pytest.approx(41.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("scale", [5.0, 20.0, 1000.0])
+def test_a_current_of_a_start_all_along_is_asked_for_its_unit(scale):
+    t = np.arange(2400) / 1000.0
+    waves = [np.cos(2 * np.pi * 50 * t - k * 2 * np.pi / 3) for k in range(3)]
+    currents, volts = (tuple(a * w for w in waves) for a in (scale * 4.0 * np.sqrt(2.0), 326.6))
+    seen, _, states_seen = in_its_states(RunningRecording(t, currents, volts, False, None, 1e-3), PLATE, Wishes())
+    assert (
+        seen.reason.code == "current_level"
+        and "ampere" in seen.reason.remedy
+        and "starts so long" in seen.reason.remedy
+    )
+    assert seen.reason.value == pytest.approx(scale * 4.0 / PLATE.rated_current_a, rel=0.02)
+    assert [s["state"] for s in states_seen] == ["start"]
+
+
+def test_a_motor_without_volts_and_amperes_is_off_and_one_of_small_currents_is_not():
+    assert set(named(levels(current_a=(0.0, 4.0, 0.01), voltage_v=(0.0, 4.0, 0.1)), PLATE)) == {"off"}
+    assert set(named(levels(current_a=(0.0, 4.0, 0.01)), PLATE)) == {"steady"}

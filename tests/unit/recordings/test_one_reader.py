@@ -223,6 +223,9 @@ HEADS = {
     "contract": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a", 1.0),
     "names": ("Time (ms),segment,axis_deg,voltage_axis_v,Ia (mA),Ib (mA)", 1e3),
     "units": ("time_s [ms],segment,axis_deg,voltage_axis_v,current_u_a [mA],current_v_a [mA]", 1e3),
+    "german": ("Zeit [ms],Abschnitt,Achse [Grad],Spannung Achse [V],Strom U [mA],Strom V [mA]", 1e3),
+    "spanish": ("Tiempo (ms),Segmento,Eje (grados),Tensión eje (V),Corriente L1 (mA),Corriente L2 (mA)", 1e3),
+    "words": ("Time,Segment no,Axis angle (°),Axis voltage (V),I_a,I_b", 1.0),
     "other case": ("Time_S,Segment,AXIS_DEG,Voltage_Axis_V,Current_U_A,Current_V_A", 1.0),
     "unit row": ("time_s,segment,axis_deg,voltage_axis_v,current_u_a,current_v_a\nms,,,V,mA,mA", 1e3),
 }
@@ -239,6 +242,8 @@ def test_standstill_recordings_come_from_the_same_headers(tmp_path: Path, name: 
     recording = to_standstill(contract_table(path))
     assert recording.sample_period_s == pytest.approx(1 / RATE_HZ, rel=1e-6)
     np.testing.assert_allclose(recording.current_v_a, CURRENTS[1], atol=1e-4)
+    assert set(recording.axis_deg) == {60.0}
+    np.testing.assert_allclose(recording.voltage_axis_v, V[0], atol=1e-4)
 
 
 @pytest.mark.parametrize("missing", ["u", "v", "w"])

@@ -21,6 +21,8 @@ SHEETS = {
     "german": "Versuch;f [Hz];U [V];I [A];P [kW]\nGleichstrom;;13,6;28,0;\nLeerlauf;60;208;8,17;0,42\nKurzschluss;15;25;27,9;0,92\n",
     "french": "Essai;Fréquence (Hz);Tension (V);Courant (A);Puissance (W)\nCourant continu;0;13,6;28,0;380,8\n"
     "À vide;60;208;8,17;420\nRotor bloqué;15;25;27,9;920\n",
+    "a meter in every line": "test,f (Hz),V_ab (V),V_bc (V),V_ca (V),I_a (A),I_b (A),I_c (A),W1 (W),W2 (W)\ndc,0,13.6,,,28,,,,\n"
+    "no_load,60,208,208,208,8.17,8.17,8.17,1051,-631\nlocked_rotor,15,25,25,25,27.9,27.9,27.9,694,226\n",
     "short": "test,voltage_v,current_a,power_kw,frequency_hz,winding_resistance_uv_ohm\nno-load,208,8.17,0.42,60,0.4857\n"
     "locked,25,27.9,0.92,15,0.4857\n",
 }
@@ -35,6 +37,16 @@ def test_a_sheet_gives_its_circuit_under_anybodys_headers(tmp_path: Path, name: 
     found = [q["value"] for q in done.document["parameters"].values()]
     assert found[:4] == pytest.approx([0.2429, 0.1514, 3.484e-3, 35.11e-3], rel=1e-3)
     assert all(q["std"] is None for q in done.document["parameters"].values())
+
+
+def test_each_test_may_stand_in_a_file_of_its_own(tmp_path: Path) -> None:
+    head, *rows = SHEETS["contract"].splitlines()
+    paths = tuple(tmp_path / f"{k}.csv" for k in range(len(rows)))
+    for path, row in zip(paths, rows, strict=True):
+        path.write_text(f"# connection: star\n{head}\n{row}\n", encoding="utf-8")
+    done = identify_any(IdentifyRequest(paths))
+    assert isinstance(done, IdentifiedSheets)
+    assert done.document["parameters"]["rotor_resistance_ohm"]["value"] == pytest.approx(0.1514, rel=1e-3)
 
 
 def test_a_diagnosis_of_three_tests_says_that_nothing_is_left_over(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from commissioner.diagnose.intake.audit import prepare
 from commissioner.errors import DataRefused
+from commissioner.monitor.intake.clock import _is_printed_line
 from commissioner.recordings.table import Table, sample_period
 from tests.unit.diagnose.conftest import recording
 
@@ -22,6 +23,13 @@ def test_the_period_is_not_bent_by_rounded_stamps(rate_hz, decimals, begin_s):
     stamps = np.round(begin_s + np.arange(30_000) / rate_hz, decimals)
     assert period_of(stamps) == pytest.approx(1.0 / rate_hz, rel=1e-5)
     assert period_of(np.delete(stamps, [700, 701, 9000])) == pytest.approx(1.0 / rate_hz, rel=1e-5)
+
+
+def test_stamps_of_six_significant_digits_are_rounded_ones():
+    stamps = np.array([float(f"{t:.6g}") for t in np.arange(20_000) / 8000.0])
+    assert period_of(stamps) == pytest.approx(1.25e-4, rel=1e-5)
+    assert period_of(stamps, sample_period_s=1.25e-4) == 1.25e-4
+    assert _is_printed_line(stamps)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3])

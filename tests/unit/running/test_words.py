@@ -26,3 +26,8 @@ def test_a_tie_says_so():
 def test_the_headline_states_the_share_that_was_kept_aside():
     document = {"verdict": "explained", "causes": [CAUSE], "gain": {"held_out": 0.987, "explained_share": 0.999}}
     assert headline(document).endswith("It explains 98.7 % of the simulation's error.")
+    small = {
+        **document, "gain": {**document["gain"], "held_out": None, "explained_share": 0.0},
+        "causes": [{**document["causes"][0], "strength_over_noise": 0.072}],
+    }  # fmt: skip
+    assert "too small to matter: 0.072 of the noise" in headline(small) and "explains" not in headline(small)

@@ -37,8 +37,6 @@ class SensorGainMismatch(Cause):
     in_service = (title, "Values change with the axis. Beyond 1 %: have the sensors compared.")
 
     def terms(self, setting: Setting) -> tuple[Term, ...]:
-        if setting.facts.phases < 3 and setting.axes < 2:
-            return ()
         return tuple(Term(self.name, PHASES[k], "1", GAIN, k, 1e-3, -0.5, 0.5) for k in range(1, setting.facts.phases))
 
     def sizes(self, setting: Setting, values: Numbers) -> Sizes:

@@ -35,7 +35,8 @@ def named(levels: Levels, plate: Nameplate) -> list[str]:
     idle = current < OFF_CURRENT * plate.rated_current_a
     names = ["steady"] * count
     if idle.all():
-        return names
+        is_off = np.all(levels.voltage_v <= RESIDUAL_VOLTAGE * plate.rated_voltage_v / np.sqrt(3.0))
+        return ["off"] * count if is_off else names
     has_run = False
     for k in range(count):
         if idle[k]:
