@@ -30,7 +30,6 @@ HELD_OUT = 0.3
 """Share of each window that is simulated on and not fitted. None where the load, and so the speed, must be fitted all along."""
 MOSTLY_GUESSES = 0.8
 """Share of the error below which causes beside something unexplained are not named: whatever bends helps a fit a little."""
-GAINS = {"sensor_gain_mismatch": "current sensor", "voltage_gain_mismatch": "voltage channel"}
 LEAST_ERROR = 0.1
 """Power of the held-out error over the noise's, below which there is nothing to gain there."""
 
@@ -128,7 +127,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
         causes = ()
         verdict, reason = _verdict(causes, left, gain)
-    remarks += [_common_gain(c) for c in causes if c.name in GAINS]
+    remarks += [_common_gain(c) for c in causes if "_against_" in next(iter(c.sizes))]
     if not found.is_complete:
         remarks.append(
             "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
@@ -152,7 +151,7 @@ def _common_gain(c: NamedCause) -> str:
     name, (size, _, _) = next(iter(c.sizes.items()))
     share = abs(size) / (3 if name.endswith("others") else 2)
     return (
-        f"Which of the gains is right is not in the data: if one {GAINS[c.name]} alone is wrong ({name.replace('_', ' ')}), resistances and "
+        f"Which of the gains is right is not in the data: if one channel alone is wrong ({name.replace('_', ' ')}), resistances and "
         f"inductances are off by {share:.2%} of their values, beside their intervals."
     )
 
