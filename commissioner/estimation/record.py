@@ -25,6 +25,11 @@ STEADY_SHARE = 0.95
 BLOCK_S = 0.02
 OPENING_S = 0.01
 """Before a contactor has opened: each pole waits for the zero of its own current."""
+FIELD_S = 2e-3
+"""Of voltage without current before a closing: the field of a motor that still turns."""
+JUMP, JUMP_SIGMA, MOST_JUMPS = 0.05, 12.0, 20
+"""Of rated peak and of what is usual in this voltage: what its neighbours do not foretell was switched between two samples, and when is
+not known: the fit begins anew. More samples than so many are another kind of voltage."""
 OFF_VOLTAGE, OFF_CURRENT = 0.05, 0.03
 """Of rated peak: below both the contactor is open."""
 SMOOTH_S, SLOPE_S = 4e-3, 8e-3
@@ -134,7 +139,12 @@ def prepare(recordings: Sequence[RunningRecording], plate: Nameplate) -> Record:
             remarks.append(
                 f"{one.source}: the supply turns backwards (u, w, v): phases v and w are taken for one another."
             )
-        windows += _windows(one, current, voltage, plate, has_speed, scales)
+        is_against = one.speed_rad_per_s is not None and _turns_against(one.speed_rad_per_s, voltage)
+        if is_against and not is_backwards:
+            remarks.append(
+                f"{one.source}: shaft and supply turn against each other: the speed's sign is taken for wrong."
+            )
+        windows += _windows(_reversed(one) if is_against else one, current, voltage, plate, has_speed, scales)
     if not windows:
         raise _refused(
             "no stretch with voltage is long enough",
@@ -230,9 +240,19 @@ def _for_monitor(one: RunningRecording, per_period: float) -> str:
     return "; this recording of a running motor is for `commissioner monitor`: speed, torque and parameters of a steady load"
 
 
-def _turns_backwards(voltage: Array) -> bool:
+def _swept(voltage: Array) -> Array:
+    """Twice the area that the voltage's vector sweeps from each sample to the next, V^2: its sign is the supply's direction."""
     v = voltage[:, 0] + 1j * voltage[:, 1]
-    return bool(np.sum(np.imag(np.conj(v[:-1]) * v[1:])) < 0)
+    return np.asarray(np.imag(np.conj(v[:-1]) * v[1:]))
+
+
+def _turns_backwards(voltage: Array) -> bool:
+    return bool(np.nansum(_swept(voltage)) < 0)
+
+
+def _turns_against(speed: Array, voltage: Array) -> bool:
+    """Whether the shaft turns mostly in the direction opposite to the supply's, as a sensor of the other sign shows it."""
+    return bool(np.nansum(_swept(voltage) * speed[1:]) < 0)
 
 
 def _is_crossed(current: Array, voltage: Array) -> bool:
@@ -249,6 +269,19 @@ def _near(mask: Bools, by: int) -> Bools:
     return np.asarray(maximum_filter1d(mask, 2 * by + 1, mode="constant"))
 
 
+def _reversed(one: RunningRecording) -> RunningRecording:
+    """With the speed's other sign."""
+    return replace(one, speed_rad_per_s=None if one.speed_rad_per_s is None else -one.speed_rad_per_s)
+
+
+def _jumps(voltage: Array, scales: Scales) -> Bools:
+    """Samples that a cubic through two neighbours on either side does not foretell: a dip's edges, a reversing contactor."""
+    told = (4.0 * (voltage[1:-3] + voltage[3:-1]) - (voltage[:-4] + voltage[4:])) / 6.0
+    off = np.nan_to_num(np.hypot(*(voltage[2:-2] - told).T))
+    found = np.pad(off > max(JUMP_SIGMA * float(np.median(off)), JUMP * scales.voltage_v), 2)
+    return found & (np.count_nonzero(found) <= MOST_JUMPS)
+
+
 def _windows(
     one: RunningRecording, current: Array, voltage: Array, plate: Nameplate, has_speed: bool, scales: Scales
 ) -> Iterator[Window]:
@@ -257,10 +290,12 @@ def _windows(
     raw, size = np.hypot(*voltage.T), np.nan_to_num(np.hypot(current[:, 0], current[:, 1]))
     flows = size > OFF_CURRENT * min(scales.current_a, float(np.quantile(size, 0.9)))
     pole = round(OPENING_S / one.sample_period_s)
-    driven = _near(raw > OFF_VOLTAGE * scales.voltage_v, max(round(2e-3 / one.sample_period_s), 1))
+    volts = raw > OFF_VOLTAGE * scales.voltage_v
+    fed = volts & _near(flows, 1)  # what a turning field leaves at open terminals is a voltage, and no supply
+    driven = _near(volts, max(round(2e-3 / one.sample_period_s), 1))
     on = driven & _near(flows, pole) & (raw > 1e-9 * scales.voltage_v)
     steps = np.diff(one.time_s, prepend=one.time_s[0] - one.sample_period_s)
-    is_break = (steps > 1.5 * one.sample_period_s) | (steps <= 0)
+    is_break = (steps > 1.5 * one.sample_period_s) | (steps <= 0) | (_jumps(voltage, scales) & ~_near(~flows, 3))
     usable = on & finite
     begins = np.flatnonzero(usable & (~np.roll(usable, 1) | is_break | (np.arange(usable.size) == 0)))
     for first in begins:
@@ -269,12 +304,15 @@ def _windows(
         closing = first > 0 and not on[first - 1] and not is_break[first]
         begin = int(first)
         if closing:
-            begin += int(np.argmax(raw[first:last] > OFF_VOLTAGE * scales.voltage_v)) + 1
+            begin += int(np.argmax(fed[first:last])) + 1
+        field = np.count_nonzero(volts[first : max(begin - 1, first)]) * one.sample_period_s
         if last < usable.size and finite[last] and not is_break[last] and np.any(flows[first:last]):
             last = int(first) + int(np.flatnonzero(flows[first:last])[-1]) - pole
         if (last - begin) * one.sample_period_s < LEAST_S:
             continue
-        yield _window(one, current, voltage, slice(begin, int(last)), plate, has_speed, bool(closing), scales)
+        yield _window(
+            one, current, voltage, slice(begin, int(last)), plate, has_speed, bool(closing and field < FIELD_S), scales
+        )
 
 
 def _window(

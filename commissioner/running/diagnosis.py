@@ -127,6 +127,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
         causes = ()
         verdict, reason = _verdict(causes, left, gain)
+    remarks += [_common_gain(c) for c in causes if "_against_" in next(iter(c.sizes))]
     if not found.is_complete:
         remarks.append(
             "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
@@ -143,6 +144,16 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         verdict, reason, causes, gain, left, _parameters(found.nominal), _parameters(found.fit),
         next_experiment(verdict.value, [(c.name, c.equivalent) for c in causes], record), found, record, tuple(remarks),
     )  # fmt: skip
+
+
+def _common_gain(c: NamedCause) -> str:
+    """What is left open by unlike gains whose sum must be taken as zero: the mean of all, a third of one of three, half of one of two."""
+    name, (size, _, _) = next(iter(c.sizes.items()))
+    share = abs(size) / (3 if name.endswith("others") else 2)
+    return (
+        f"Which of the gains is right is not in the data: if one channel alone is wrong ({name.replace('_', ' ')}), resistances and "
+        f"inductances are off by {share:.2%} of their values, beside their intervals."
+    )
 
 
 def _gain(found: Found) -> Gain:

@@ -189,7 +189,7 @@ def _remarks(record: Record, left: Lack) -> tuple[str, ...]:
     worst = max(left.sigma, left.burst_sigma)
     if worst > LEAST_OVER_NOISE:
         out.append(
-            f"The four numbers leave {worst:.2g} times the noise: their intervals are widened, and `commissioner diagnose` says what is missing (saturation, deep bars, sensors)."
+            f"The four numbers leave {worst:.2g} times the noise: something is missing (saturation, deep bars, sensors) that may have drawn them aside by more than their intervals, widened as these are; `commissioner diagnose` names it."
         )
     if not record.has_speed and record.has_start:
         out.append(

@@ -268,7 +268,9 @@ def _refusal(seeking: Search, held: Fit, fit: Fit, other: Fit, causes: Sequence[
     is_steady = seeking.problem.record.is_steady
     if gain / other.scale < _needed(seeking, causes[-1]):
         return "gains too little"
-    if gain < RULES.least_share * max(seeking.base.chi2 - fit.chi2, 0.0):
+    left = fit.chi2 - fit.count
+    is_all_of_it = left > RULES.certain_left * fit.count and gain > RULES.all_of_it * left
+    if gain < RULES.least_share * max(seeking.base.chi2 - fit.chi2, 0.0) and not is_all_of_it:
         return "gains less than what the laws of the accepted causes leave"
     if np.sqrt(gain / fit.count) < (RULES.material_steady_sigma if is_steady else RULES.material_sigma):
         return "too small to matter"

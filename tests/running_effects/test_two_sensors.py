@@ -33,6 +33,21 @@ def test_a_gain_error_before_the_computed_third_current_is_named_with_its_size_a
     first, second = COMPUTED[computed]
     assert name == f"{first}_against_{second}"
     assert size == pytest.approx(GAIN - 1.0, abs=max(4.0 * std, 5e-4))
+    assert any(f"off by {abs(size) / 2:.2%}" in r for r in seen.remarks)
+
+
+def test_what_one_of_three_sensors_does_to_all_parameters_is_said():
+    """It draws all four by a third of its error, which no interval holds: a gain that all share is an impedance scale."""
+    recording, plate, _ = taken(Case(5000, "null").scenario(), 5000)
+    u, v, w = recording.currents_a
+    seen = diagnose([replace(recording, currents_a=(1.03 * u, v, w))], plate)
+    assert [c.name for c in seen.causes] == ["sensor_gain_mismatch"]
+    said = next(r for r in seen.remarks if "off by" in r)
+    share = next(float(word[:-1]) for word in said.split() if word.endswith("%")) / 100
+    plain = diagnose([recording], plate).parameters_after
+    for name, q in seen.parameters_after.items():
+        if name != "rotor_time_constant_s":
+            assert abs(q.value / plain[name].value - 1.0 + share) < 1e-3
 
 
 def test_nothing_is_named_where_two_sensors_read_right():
