@@ -292,15 +292,12 @@ def _normalised(gram: Array) -> Array:
 
 
 def columns_of(names: Sequence[str], record: Record, machine: Machine, *, knots: bool = False) -> tuple[Column, ...]:
-    """The named numbers, both fluxes of every window, the speed of one that turns already, knots of the load; of a further window also
-    where the shaft stands at its first sample: what turns with it keeps its phase within a window only."""
+    """The named numbers, both fluxes of every window, the speed of one that turns already, knots of the load."""
     out = [Column("p", AT[name]) for name in names]
     for k, w in enumerate(record.windows):
         out += [Column("x", j, k) for j in FIRST]
         if machine.has_shaft and not w.is_from_rest:
             out.append(Column("x", 8, k))
-        if k:
-            out.append(Column("x", 9, k))
     if knots:
         for k, w in enumerate(record.windows):
             out += [Column("k", j, k) for j, t in enumerate(machine.knot_times_s[k]) if t < w.time_s[-1] + CALM_S]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -127,7 +127,7 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
         remarks.append(f"Helps the fit, but is more likely another cause in disguise, and is not named: {guesses}.")
         causes = ()
         verdict, reason = _verdict(causes, left, gain)
-    remarks += [_common_gain(c) for c in causes if "_against_" in next(iter(c.sizes))]
+    remarks += _left_open(found) if causes else ()
     if not found.is_complete:
         remarks.append(
             "The time allowed was over before every cause was tried: diagnose the recording again without a limit."
@@ -146,14 +146,15 @@ def _conclude(record: Record, found: Found) -> Diagnosis:
     )  # fmt: skip
 
 
-def _common_gain(c: NamedCause) -> str:
-    """What is left open by unlike gains whose sum must be taken as zero: the mean of all, a third of one of three, half of one of two."""
-    name, (size, _, _) = next(iter(c.sizes.items()))
-    share = abs(size) / (3 if name.endswith("others") else 2)
-    return (
-        f"Which of the gains is right is not in the data: if one channel alone is wrong ({name.replace('_', ' ')}), resistances and "
-        f"inductances are off by {share:.2%} of their values, beside their intervals."
-    )
+def _left_open(found: Found) -> Iterator[str]:
+    """What a named cause leaves open of all parameters."""
+    values = dict(zip(NAMES, found.fit.machine.physical(), strict=True))
+    for one in found.accepted:
+        if share := CATALOGUE[one.cause].common(values):
+            yield (
+                f"Which of the gains is right is not in the data: if one channel alone is wrong, resistances and inductances are off by "
+                f"{share:.2%} of their values, beside their intervals."
+            )
 
 
 def _gain(found: Found) -> Gain:

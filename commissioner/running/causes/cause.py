@@ -42,7 +42,8 @@ class Confounder:
 class Cause:
     """`says` has a `{size}`. `range`: of the first size, what physics allows; outside it is another cause in disguise.
 
-    `allows`: what else physics demands of its numbers. `scenario`: entry of [effects] in the simulator; derivatives are those of
+    `allows`: what else physics demands of its numbers. `common`: what share of themselves all resistances and inductances are off by
+    if one channel alone is wrong, for which one the data do not tell. `scenario`: entry of [effects] in the simulator; derivatives are those of
     the kernel's lines, exact by complex step.
     """
 
@@ -62,6 +63,7 @@ class Cause:
     needs: Callable[[Record], bool] = field(default=lambda _: True)
     is_of_measurement: bool = False
     allows: Callable[[Values], bool] = field(default=lambda _: True)
+    common: Callable[[Values], float] = field(default=lambda _: 0.0)
 
     def is_plausible(self, values: Values, scales: Scales) -> bool:
         """Whether the first size lies in the range physics allows."""

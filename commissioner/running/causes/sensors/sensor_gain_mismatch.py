@@ -42,6 +42,13 @@ def _sizes(v: Values, _: Scales) -> Sizes:
     return {f"{PHASES[k]}_against_the_others": (apart, "")}
 
 
+def _common(v: Values) -> float:
+    """The mean of two gains, or of three, whose sum is taken as zero."""
+    if without := _computed(v):
+        return abs(v[f"current_pair_{without}"]) / 2.0
+    return abs(one_of_three(_parts(v))[1]) / 3.0
+
+
 def _scenario(v: Values, _: Scales) -> dict[str, float]:
     if without := _computed(v):
         return {"size": v[f"current_pair_{without}"], "phase": PHASES.index(PAIRS[without][0])}
@@ -67,4 +74,5 @@ CAUSE = Cause(
     confounders=(Confounder("voltage_gain_mismatch", "the third current sensor, or a start and load steps"),),
     scenario=_scenario,
     is_of_measurement=True,
+    common=_common,
 )

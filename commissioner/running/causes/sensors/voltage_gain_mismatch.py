@@ -30,4 +30,5 @@ CAUSE = Cause(
     range=(-0.6, 0.6),
     scenario=lambda v, s: {"size": _apart(v)[1], "phase": _apart(v)[0]},
     is_of_measurement=True,
+    common=lambda v: abs(_apart(v)[1]) / 3.0,
 )
