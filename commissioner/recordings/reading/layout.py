@@ -99,6 +99,8 @@ def layout_of(text: str, source: str) -> Layout:
         for separator in SEPARATORS:
             rows = _rows(lines[k:], separator)
             skip = _beside(rows)
+            if len(rows) == 1 and k > 0 and _are_numbers(_rows(lines[k - 1 : k], separator)):
+                continue  # the last row of a table with a spoilt one
             if _are_numbers([row[skip:] for row in rows]) and _go_on(rows[0], lines[k:], separator):
                 return _layout(lines, k, separator, skip, [row[skip:] for row in rows], source)
     raise DataRefused(
