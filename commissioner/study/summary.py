@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from commissioner.motor.circuit import PARAMETERS
+from commissioner.motor.circuit import PARAMETERS, QUANTILE
 from commissioner.study.rows import Row
 
 COMMISSIONED = "commissioned"
@@ -123,5 +123,5 @@ def _errors(name: str, known: Sequence[Row]) -> Errors | None:
         return None
     relative = np.abs(relative_errors(known, name))
     true, std = (np.array([row.get(f"{name}_{what}") for row in known], dtype=float) for what in ("true", "std"))
-    inside = relative * true <= 1.96 * std
+    inside = relative * true <= QUANTILE * std
     return Errors(name, len(known), tuple(float(np.quantile(relative, q)) for q in QUANTILES), float(np.mean(inside)))
