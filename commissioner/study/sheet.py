@@ -13,12 +13,13 @@ from commissioner.records import peak
 from commissioner.report.run.quantities import BY_FIELD, FOUR
 from commissioner.report.sheet import marks
 from commissioner.report.sheet.document import Margins, Page, document
-from commissioner.report.sheet.drawing import Panel
+from commissioner.report.sheet.drawing import Panel, Range, padded
 from commissioner.report.sheet.numbers import digits, half_width, with_interval
 from commissioner.study.rows import Row
 from commissioner.study.summary import COMMISSIONED, QUANTILES, Errors, Group, Summary, accepted, relative_errors
 
 _OF_RUNNING = {"mean_speed_rad_per_s": "Speed, rad/s", "mean_torque_nm": "Torque, N m"}
+FEW = 200
 OUTCOMES = (COMMISSIONED, "rejected", "aborted", "faulted")
 
 
@@ -124,18 +125,29 @@ def _errors_over_cases(rows: Sequence[Row]) -> Iterator[tuple[marks.Text, Markup
         cases = [float(row["case"]) for row in known]
         errors = 100.0 * relative_errors(known, name)
         reach = 1.1 * peak(errors) or 1.0
-        panel = Panel(160, 104, (0.0, max(1.0, *cases)), (-reach, reach), f"errors of {name}", left=30)
-        panel.grid(4).axis("", 3).level(0.0, "res").dots(cases, errors)
+        panel = Panel(160, 104, _span(cases), (-reach, reach), f"errors of {name}", left=30)
+        _dotted(panel.grid(4).axis("", 3).level(0.0, "res"), cases, errors)
         yield Markup("{}, %").format(BY_FIELD[name].symbol), panel.drawn()
+
+
+def _span(cases: Sequence[float]) -> Range:
+    return padded([0.0, max(1.0, *cases)], 0.03)
+
+
+def _dotted(panel: Panel, cases: Sequence[float], values: Iterable[float]) -> None:
+    """Few cases as points: a dot alone is not seen."""
+    if len(cases) > FEW:
+        panel.dots(cases, list(values))
+        return
+    for case, value in zip(cases, values, strict=True):
+        panel.point(case, value, radius=1.8)
 
 
 def _flux(rows: Sequence[Row]) -> Markup:
     known = [(float(row["case"]), fraction) for row in rows if (fraction := row.get("peak_flux_fraction"))]
     cases, fractions = [case for case, _ in known], [fraction for _, fraction in known]
-    panel = Panel(
-        660, 130, (0.0, max(1.0, *cases)), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30
-    )
-    panel.grid(4).axis("", 6).level(1.0).dots(cases, fractions)
+    panel = Panel(660, 130, _span(cases), (0.0, 1.1 * max(1.0, *fractions)), "highest true flux of each case", left=30)
+    _dotted(panel.grid(4).axis("", 6).level(1.0), cases, fractions)
     return marks.figure(
         "Highest true flux of each case, of the guard’s limit",
         panel.drawn(),
